@@ -95,7 +95,8 @@ mod tests {
         watch.lap("slept");
         watch.lap("woke");
         assert!(
-            watch.stages[0].1 >= Duration::from_millis(200) && watch.stages[1].1 < watch.stages[0].1
+            watch.stages[0].1 >= Duration::from_millis(200)
+                && watch.stages[1].1 < watch.stages[0].1
         );
     }
 

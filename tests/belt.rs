@@ -4,7 +4,7 @@
 
 mod python;
 
-use petcomp::dataset::{DatasetConfig, Part, Pipeline, SampleRecord, generate};
+use petcomp::dataset::{DatasetConfig, Part, Pipeline, SampleRecord, Summary, generate};
 use petcomp::scene::{Object, Placement};
 use petcomp::{asset, io};
 use serde_json::Value;
@@ -66,6 +66,7 @@ fn a_sequence_is_written_as_tracks_and_videos() {
     generate(&plan, make, &|_| (), &AtomicBool::new(false)).unwrap();
     check_videos(&plan.folder);
     check_tracks(&plan.folder);
+    check_summary(&plan.folder);
     python::check("mot", "trackeval", &plan.folder);
 }
 
@@ -152,6 +153,14 @@ fn check_tracks(folder: &Path) {
         let image = folder.join(format!("images/train/{:06}.png", 2 + frame));
         assert_eq!(std::fs::read(shown).unwrap(), std::fs::read(image).unwrap());
     }
+}
+
+/// Two sequences of three pictures are two draws.
+fn check_summary(folder: &Path) {
+    let summary = Summary::read(folder).unwrap();
+    assert_eq!(summary.glances.len(), 6);
+    assert_eq!(summary.drawn["objects"], [3.0, 3.0]);
+    assert_eq!(summary.chosen["background"].values().sum::<u64>(), 2);
 }
 
 #[test]

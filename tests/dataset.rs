@@ -7,10 +7,11 @@ use petcomp::DeepImage;
 use petcomp::camera::Camera;
 use petcomp::dataset::index::DatasetIndex;
 use petcomp::dataset::{
-    ArchiveStore, Coco, ContactSheetOptions, DatasetConfig, DatasetCounts, LabelConfig, Obstructed,
-    Partition, PictureFormat, Pictures, Pipeline, Plan, Progress, Provenance, Sample, SampleRange,
-    SampleRecord, Shard, Sidecar, Split, SplitOrder, Summary, WebDataset, Writer, Yolo, YoloSet,
-    YoloTask, check, contact_sheet_of, generate, merge, repair, repair_archives,
+    ArchiveStore, Coco, ContactSheetOptions, DatasetConfig, DatasetCounts, Group, LabelConfig,
+    NEAR_DUPLICATE_RMS, Obstructed, Partition, PictureFormat, Pictures, Pipeline, Plan, Progress,
+    Provenance, Sample, SampleRange, SampleRecord, Shard, Sidecar, Split, SplitOrder, Summary,
+    WebDataset, Writer, Yolo, YoloSet, YoloTask, check, contact_sheet_of, generate, merge, repair,
+    repair_archives,
 };
 use petcomp::eval::read_yolo_truth_of;
 use petcomp::geom::BBox;
@@ -865,6 +866,40 @@ fn whoever_reads_a_data_yaml_finds_the_same_images() {
         let boxes: usize = truth.sheets.iter().map(|sheet| sheet.truth.len()).sum();
         assert_eq!(boxes, rows_of(&set.train));
     }
+}
+
+#[test]
+fn scenes_without_objects_are_groups_of_their_own() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 50)).unwrap();
+    let all = YoloSet::read(dir.path()).unwrap();
+    let split = all.partitioned(Partition::Grouped(Group::Selection), 0.8, 0);
+    let split = split.unwrap();
+    assert_eq!((split.train.len(), split.val.len()), (40, 10));
+    let leakage = split.leakage(NEAR_DUPLICATE_RMS).unwrap();
+    let groups = [("background", [1, 1]), ("selection", [0, 0])];
+    assert_eq!(leakage.groups, groups);
+}
+
+#[test]
+fn a_split_and_the_check_take_empty_pictures_for_no_look_alikes() {
+    let dir = tempfile::tempdir().unwrap();
+    let [made, lists] = ["made", "lists"].map(|name| dir.path().join(name));
+    make(&plan(&made, 50)).unwrap();
+    let all = YoloSet::read(&made).unwrap();
+    let split = all.partitioned(Partition::Consecutive { guard: 0 }, 0.8, 0);
+    let split = split.unwrap();
+    // Pictures 0 and 40 are empty, 1 and 41 have a label.
+    for i in [0, 1] {
+        std::fs::copy(&split.train[i], &split.val[i]).unwrap();
+    }
+    let leakage = split.leakage(NEAR_DUPLICATE_RMS).unwrap();
+    let alike: Vec<_> = leakage.near_duplicates.iter().map(|n| &n.val).collect();
+    assert_eq!(alike, [&split.val[1]]);
+    split.write(&lists).unwrap();
+    let found = faults(&lists).join("\n");
+    assert_eq!(found.matches("the same bytes as").count(), 1, "{found}");
+    assert!(found.contains("000041"), "{found}");
 }
 
 #[test]

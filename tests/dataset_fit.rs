@@ -192,6 +192,38 @@ fn pictures_of_the_recipe_itself_leave_its_camera_and_size() {
     );
 }
 
+/// 32 of the first 50 pictures are empty, which chance leaves of a half.
+#[test]
+fn empty_pictures_are_negatives_and_no_number_of_objects() {
+    let desk = Desk::new();
+    let (objects, all) = ("objects = [3, 5]\n", "[labels]\nobstructed = \"keep\"\n");
+    let half = desk.recipe("half.toml", &format!("{objects}negatives = 0.5\n{all}"));
+    let none = desk.recipe("none.toml", &format!("{objects}{all}"));
+    let real = desk.pictures(&half, 50);
+    let negatives = |recipe: &Path| {
+        let fitted = desk.fit(recipe, Some(real.clone()), FINE).unwrap();
+        let scene = desk.scene_of(&fitted);
+        assert_eq!(scene.objects, Range::new(3.0, 5.0).into());
+        scene.negatives
+    };
+    let found = negatives(&none);
+    assert!((found - 0.64).abs() < 0.03, "{found}");
+    assert_eq!(negatives(&half), 0.5);
+}
+
+#[test]
+fn of_a_sequence_on_a_belt_one_picture_is_taken() {
+    let desk = Desk::new();
+    let belt = "objects = [2, 4]\nbelt = { frames = 3, frame_rate = 15, speed = 0.3 }\n";
+    let recipe = desk.recipe("recipe.toml", belt);
+    let real = desk.pictures(&recipe, 12);
+    let fitted = desk.fit(&recipe, Some(real), ROUGH).unwrap();
+    let mut keys = fitted.keys.iter();
+    let objects = keys.find(|key| key.key == "scene.objects").unwrap();
+    assert!(objects.why.starts_with("4 pictures "), "{}", objects.why);
+    assert!(desk.scene_of(&fitted).belt.is_some());
+}
+
 #[test]
 fn the_same_files_give_the_same_bytes() {
     let desk = Desk::new();

@@ -4,10 +4,11 @@ use crate::dataset::YoloSet;
 use crate::dataset::listing::{record_of, sidecar_of};
 use crate::dataset::near_duplicates::{NearDuplicate, near_pairs};
 use crate::error::{Error, Result};
+use crate::io;
 use crate::scene::{Draws, Scene};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// How images are partitioned.
@@ -30,7 +31,7 @@ pub enum Partition {
 pub enum Group {
     /// The photo of the place.
     Background,
-    /// The choice of objects and their photos.
+    /// The choice of objects and their photos; a scene without objects is a group of its own.
     Selection,
 }
 
@@ -48,10 +49,10 @@ impl Group {
 }
 
 impl Group {
-    /// What a scene has in common with the others of its group.
-    fn key_of(self, scene: &Scene) -> String {
+    /// What a scene has in common with the others of its group; none where nothing is chosen.
+    fn key_of(self, scene: &Scene) -> Option<String> {
         match self {
-            Self::Background => scene.plate.clone(),
+            Self::Background => Some(scene.plate.clone()),
             Self::Selection => selection_of(scene),
         }
     }
@@ -93,14 +94,15 @@ impl YoloSet {
     }
 
     /// What leaks from training to validation; images are near when they differ by less than
-    /// `max_codes` (root mean square of 8-bit grey values of a small copy).
+    /// `max_codes` (root mean square of 8-bit grey values of a small copy). Images without labels
+    /// are near to none.
     ///
     /// # Errors
     /// An image or a sidecar that cannot be read.
     pub fn leakage(&self, max_codes: f64) -> Result<Leakage> {
         Ok(Leakage {
             groups: self.leaked_groups()?,
-            near_duplicates: near_pairs(&self.train, &self.val, max_codes)?,
+            near_duplicates: near_pairs(&showing(&self.train), &showing(&self.val), max_codes)?,
         })
     }
 
@@ -124,12 +126,30 @@ impl YoloSet {
     }
 }
 
-fn distinct_groups(images: &[PathBuf], group: Group) -> Result<BTreeSet<String>> {
-    Ok(groups(images, group)?.into_iter().collect())
+/// The images without those whose label file has no rows: empty scenes of a place look the same.
+fn showing(images: &[PathBuf]) -> Vec<PathBuf> {
+    let showing = images.iter().filter(|image| !is_empty(image));
+    showing.cloned().collect()
 }
 
-/// The group of each image.
+fn is_empty(image: &Path) -> bool {
+    io::read_text(YoloSet::label_of(image)).is_ok_and(|rows| rows.trim().is_empty())
+}
+
+fn distinct_groups(images: &[PathBuf], group: Group) -> Result<BTreeSet<String>> {
+    Ok(keys(images, group)?.into_iter().flatten().collect())
+}
+
+/// The group of each image; one without a key is alone in a group named by its place.
 fn groups(images: &[PathBuf], group: Group) -> Result<Vec<String>> {
+    let keys = keys(images, group)?.into_iter().enumerate();
+    Ok(keys
+        .map(|(place, key)| key.unwrap_or_else(|| place.to_string()))
+        .collect())
+}
+
+/// What each image has in common with the others of its group.
+fn keys(images: &[PathBuf], group: Group) -> Result<Vec<Option<String>>> {
     images
         .par_iter()
         .map(|image| Ok(group.key_of(&record_of(image)?.drawn)))
@@ -182,11 +202,11 @@ fn check_ratio(ratio: f64) -> Result<()> {
     Err(Error::value("ratio", what))
 }
 
-/// The photos of a scene's objects, in an order of their own.
-fn selection_of(scene: &Scene) -> String {
+/// The photos of a scene's objects, in an order of their own; none without objects.
+fn selection_of(scene: &Scene) -> Option<String> {
     let mut photos = photos_of(scene);
     photos.sort();
-    photos.join(" ")
+    (!photos.is_empty()).then(|| photos.join(" "))
 }
 
 fn photos_of(scene: &Scene) -> Vec<String> {
@@ -215,7 +235,6 @@ fn unknown_group(name: &str) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     fn listing(n: usize) -> YoloSet {
         YoloSet {

@@ -76,24 +76,32 @@ impl Pipeline {
         Self::new(config, library.into(), places).with_sizes_checked_in(image)
     }
 
-    /// The same for a recipe that is being tuned, in pictures that may be smaller than its own of
-    /// `whole` pixels: objects need be large enough in those alone. Falls are remembered.
+    /// The same for pictures that may be smaller than the recipe's own of `whole` pixels: objects
+    /// need be large enough in those alone.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    #[doc(hidden)]
+    pub fn open_reduced(config: DatasetConfig, whole: [u32; 2]) -> Result<Self> {
+        let library = Library::open(&config.assets)?.into();
+        let places = open_backgrounds(&config)?.into();
+        Self::new(config, library, places).with_sizes_checked_in(whole)
+    }
+
+    /// The same for a recipe that is being tuned: falls are remembered.
     ///
     /// # Errors
     /// As [`open`](Self::open).
     #[doc(hidden)]
     pub fn for_tuning(config: DatasetConfig, whole: [u32; 2]) -> Result<Self> {
-        let library = Library::open(&config.assets)?.into();
-        let places = open_backgrounds(&config)?.into();
-        let tuned = Self {
+        Ok(Self {
             falls: Arc::new(Falls::of_last(REMEMBERED_FALLS)),
-            ..Self::new(config, library, places)
-        };
-        tuned.with_sizes_checked_in(whole)
+            ..Self::open_reduced(config, whole)?
+        })
     }
 
     /// The same with another config: what both name is not opened again, and objects that fall as
-    /// they fell before do not fall again. `whole` is as in [`for_tuning`](Self::for_tuning).
+    /// they fell before do not fall again. `whole` is as in [`open_reduced`](Self::open_reduced).
     ///
     /// # Errors
     /// As [`open`](Self::open).

@@ -26,9 +26,10 @@ pub struct Summary {
     /// Images of both parts.
     pub images: [usize; 2],
     /// Drawn numbers by the key of their distribution in the recipe: `scale`, `start.x`,
-    /// `lights[0].height`.
+    /// `lights[0].height`; on a belt of each sequence once.
     pub drawn: BTreeMap<String, Vec<f64>>,
-    /// How often each was chosen: photos of the place, assets, photos of an asset.
+    /// How often each was chosen, on a belt for a sequence: photos of the place, assets, photos of
+    /// an asset.
     pub chosen: BTreeMap<&'static str, BTreeMap<String, u64>>,
     /// Seen share of each object, 0 to 1.
     pub visible: Vec<f64>,
@@ -211,14 +212,29 @@ impl Summary {
 
     fn add(&mut self, sample: &ReadSample, line: &JournalLine) {
         let record = &sample.record;
-        self.add_draws(record);
-        self.add_choices(&record.drawn);
+        if self.is_drawn_anew(sample) {
+            self.add_draws(record);
+            self.add_choices(&record.drawn);
+        }
         for object in &record.labels.objects {
             self.add_object(object, record);
         }
         self.add_balance(sample.part, line);
         let rejected = record.rejected.iter().map(|why| (sample.k, why.clone()));
         self.rejected.extend(rejected);
+    }
+
+    /// Whether a sample shares its draws with none before it, as pictures of a sequence do.
+    fn is_drawn_anew(&self, sample: &ReadSample) -> bool {
+        let belt = sample.record.drawn.belt;
+        let frames = belt.map_or(1, |belt| belt.frames.max(1));
+        let last = self.glances.last();
+        last.is_none_or(|last| last.index / frames != sample.k / frames)
+    }
+
+    /// Whether its pictures come in sequences.
+    pub(super) fn is_on_belt(&self) -> bool {
+        self.identity["recipe"]["scene"]["belt"].is_object()
     }
 
     fn add_balance(&mut self, part: Part, line: &JournalLine) {

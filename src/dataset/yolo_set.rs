@@ -2,7 +2,7 @@
 //! choice of its images, as lists that trainers read, without copies.
 
 use crate::dataset::Part;
-use crate::dataset::listing::{images_in, place_of, whole_path};
+use crate::dataset::listing::{images_in, is_list, place_of, whole_path};
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::error::{Error, Result};
 use crate::eval::label_of;
@@ -34,11 +34,7 @@ impl YoloSet {
     /// or list that cannot be read.
     pub fn read(folder: &Path) -> Result<Self> {
         let folder = whole_path(folder)?;
-        let path = folder.join("data.yaml");
-        let (yaml, problems) = DataYaml::read(&io::read_text(&path)?);
-        if let Some((line, what)) = problems.into_iter().next() {
-            return Err(yaml_problem(&path, line, &what));
-        }
+        let yaml = read_yaml(&folder)?;
         let root = yaml.root(&folder);
         let [train, val] = Part::ALL.map(|part| images_of(&root, yaml.folders(part)));
         let test = yaml.test().iter().map(|place| place_of(&root, place));
@@ -50,7 +46,22 @@ impl YoloSet {
         })
     }
 
-    /// The same of a set to train on, whose parts both have images.
+    /// The files that choose the images of a set: `data.yaml` and the lists that it names.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a `data.yaml` that is missing or that trainers would not take.
+    pub fn choosing_files(folder: &Path) -> Result<Vec<PathBuf>> {
+        let folder = whole_path(folder)?;
+        let yaml = read_yaml(&folder)?;
+        let root = yaml.root(&folder);
+        let parts = Part::ALL.map(|part| yaml.folders(part));
+        let places = parts.into_iter().flatten().chain(yaml.test());
+        let places = places.map(|place| place_of(&root, place));
+        let lists = places.filter(|place| is_list(place));
+        Ok(lists.chain([folder.join("data.yaml")]).collect())
+    }
+
+    /// The set of [`YoloSet::read`] to train on, whose parts both have images.
     ///
     /// # Errors
     /// Those of [`YoloSet::read`], and [`Error::File`] for a part without images.
@@ -143,6 +154,16 @@ impl YoloSet {
             .map(|place| place.strip_prefix(folder).unwrap_or(place))
             .map(|place| place.display().to_string())
             .collect()
+    }
+}
+
+/// The `data.yaml` of a folder, as trainers would take it.
+fn read_yaml(folder: &Path) -> Result<DataYaml> {
+    let path = folder.join("data.yaml");
+    let (yaml, problems) = DataYaml::read(&io::read_text(&path)?);
+    match problems.into_iter().next() {
+        Some((line, what)) => Err(yaml_problem(&path, line, &what)),
+        None => Ok(yaml),
     }
 }
 

@@ -83,11 +83,20 @@ impl LabelFolder {
         let size = match (size, image) {
             (Some(size), _) => size,
             (None, Some(image)) => image_size(image)?,
-            (None, None) => return Err(missing_image(&self.image_folder, name)),
+            (None, None) => return Err(self.missing_image(name)),
         };
         let truth = truth_of(self.labels.get(name).map(PathBuf::as_path), size)?;
         let picture = image.map(|path| picture_of(path.clone(), size));
         Ok((EvalImage::new(name, truth), size, picture))
+    }
+
+    /// What is wrong with a label that has no image.
+    fn missing_image(&self, name: &str) -> Error {
+        let label = self.labels[name].display();
+        let what = format!(
+            "no image \"{name}\" (.jpg, .png, ..) for {label} to take the size from; name their folder (--images) or their size (--size)"
+        );
+        Error::file(&self.image_folder, what)
     }
 }
 
@@ -277,7 +286,9 @@ fn by_name(paths: Vec<PathBuf>) -> Result<FilesByName> {
 
 fn same_name(path: &Path, first: &Path) -> Error {
     let first = first.display();
-    let what = format!("named as {first}, expected another name: folders do not tell images apart");
+    let what = format!(
+        "named as {first}, expected another name: folders do not tell images apart; of several runs, name each one's own folder"
+    );
     Error::file(path, what)
 }
 
@@ -288,13 +299,6 @@ fn is_jpeg_or_png(format: Option<Format>) -> bool {
 fn image_size(image: &Path) -> Result<[u32; 2]> {
     let header = io::read_header(image)?;
     Ok([header.width as u32, header.height as u32])
-}
-
-fn missing_image(folder: &Path, name: &str) -> Error {
-    let what = format!(
-        "no image \"{name}\" (.jpg, .png, ..) to take the size from; name their folder (--images) or their size (--size)"
-    );
-    Error::file(folder, what)
 }
 
 /// A line: class, box in shares of the image, and what stands behind.
@@ -464,6 +468,7 @@ mod tests {
         let told = read_yolo_truth(labels.path(), None, Some([9, 9])).unwrap_err();
         let told = told.to_string();
         assert!(told.contains("room1/a.txt: named as ") && told.contains("/a.txt, expected"));
+        assert!(told.ends_with("name each one's own folder"), "{told}");
         let labels = folder(&[("a.txt", BOX)]);
         let images = folder(&[("a.jpg", ""), ("a.heic", "")]);
         let truth = read_yolo_truth(labels.path(), Some(images.path()), Some([9, 9])).unwrap();
@@ -630,6 +635,7 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(said.contains("images/val: no image \"IMG_1\""), "{said}");
+        assert!(said.contains("labels/val/IMG_1.txt to take"), "{said}");
         let truth = read_yolo_truth(&labels, Some(&images), None).unwrap();
         assert_eq!(truth.sizes, [[8, 6]; 2]);
         assert!(truth.pictures.iter().all(Option::is_some));

@@ -10,8 +10,17 @@ use std::f64::consts::PI;
 
 /// Pieces of the sky narrower than this throw shadows too sharp for the coarser lattice, radians.
 const SMALL_WIDTH_RAD: f64 = 0.15;
-/// Nearer to a light's face than this, metres, no factor holds for all of a receiver.
-const NEAR_FACE_M: f64 = 0.1;
+
+/// A part of a plane that light falls on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LitPatch {
+    /// Its middle.
+    pub(super) center: Vector3<f64>,
+    /// Unit normal on the side that is seen.
+    pub(super) normal: Vector3<f64>,
+    /// Metres from its middle to its far ends.
+    pub(super) reach: f64,
+}
 
 /// A point (`at.w = 1`) or a direction (`at.w = 0`) that light comes from, in homogeneous
 /// coordinates.
@@ -61,14 +70,10 @@ pub(super) struct LightSamples {
 }
 
 impl LightSamples {
-    /// What lights a receiver with this unit normal, in the plane through `point`.
-    pub(super) fn above(
-        shot: &Shot,
-        options: &RenderOptions,
-        point: &Vector3<f64>,
-        normal: &Vector3<f64>,
-    ) -> Self {
-        let faces = Self::faces_above(shot, options, point, normal);
+    /// What lights a receiver.
+    pub(super) fn above(shot: &Shot, options: &RenderOptions, patch: &LitPatch) -> Self {
+        let normal = &patch.normal;
+        let faces = Self::faces_above(shot, options, patch);
         let shining = shot.environment.iter().filter(|map| map.strength != 0.0);
         let pieces =
             shining.flat_map(|map| light::sky_pieces(map, options.ambient_samples, normal));
@@ -80,12 +85,11 @@ impl LightSamples {
     pub(super) fn faces_above(
         shot: &Shot,
         options: &RenderOptions,
-        point: &Vector3<f64>,
-        normal: &Vector3<f64>,
+        patch: &LitPatch,
     ) -> Vec<LightGroup> {
         let lights = shot.lights.iter();
         lights
-            .map(|l| LightGroup::face_above(l, options.light_samples, point, normal))
+            .map(|l| LightGroup::face_above(l, options.light_samples, patch))
             .collect()
     }
 
@@ -134,35 +138,27 @@ impl LightSamples {
 }
 
 impl LightGroup {
-    /// The part of a light that is above the plane through `point`, as bright there as in closed
-    /// form: the few nodes of a large light near by add up to several times too much or too little.
-    fn face_above(
-        light: &AreaLight,
-        count: usize,
-        point: &Vector3<f64>,
-        normal: &Vector3<f64>,
-    ) -> Self {
-        let nodes = light::nodes_above(light, count, Point3::from(*point), normal);
+    /// The part of a light that is above a receiver's plane, as bright in the receiver's middle as
+    /// in closed form: the few nodes of a large light near by add up to several times too much or
+    /// too little.
+    fn face_above(light: &AreaLight, count: usize, patch: &LitPatch) -> Self {
+        let nodes = light::nodes_above(light, count, Point3::from(patch.center), &patch.normal);
         let group = Self::area_light(light, nodes);
-        let factor = group.closed_form_ratio(light, point, normal);
+        let factor = group.closed_form_ratio(light, patch);
         Self {
             radiance: group.radiance.scale(factor as f32),
             ..group
         }
     }
 
-    /// Irradiance at a point by its light in closed form over that by its samples; 1 where there is
-    /// none, or too close to the light.
-    fn closed_form_ratio(
-        &self,
-        light: &AreaLight,
-        point: &Vector3<f64>,
-        normal: &Vector3<f64>,
-    ) -> f64 {
-        let frame = light::frame(light);
-        let exact = light::unit_irradiance(light, Point3::from(*point), *normal);
-        let sum = self.unit_irradiance(point, normal);
-        let is_clear = frame.normal.dot(&(point - frame.center.coords)) > NEAR_FACE_M;
+    /// Irradiance in a receiver's middle by its light in closed form over that by its samples; 1
+    /// where there is none, and nearer to the light than the receiver reaches: no factor holds for
+    /// all of it there.
+    fn closed_form_ratio(&self, light: &AreaLight, patch: &LitPatch) -> f64 {
+        let (frame, point) = (light::frame(light), &patch.center);
+        let exact = light::unit_irradiance(light, Point3::from(*point), patch.normal);
+        let sum = self.unit_irradiance(point, &patch.normal);
+        let is_clear = frame.normal.dot(&(point - frame.center.coords)) > patch.reach;
         if is_clear && exact > 0.0 && sum > 0.0 {
             exact / sum
         } else {
@@ -302,11 +298,22 @@ mod tests {
         }
     }
 
-    /// What lights the origin of a plane with this normal.
-    fn face(light: AreaLight, quality: Quality, normal: &Vector3<f64>) -> LightGroup {
+    /// What lights a card at the origin with this normal, from its middle to its ends `reach` long.
+    fn face(light: AreaLight, quality: Quality, normal: Vector3<f64>, reach: f64) -> LightGroup {
         let shot = Shot::new(tilted_camera()).with_light(light);
         let options = RenderOptions::from(quality);
-        LightSamples::faces_above(&shot, &options, &Vector3::zeros(), normal).remove(0)
+        let patch = LitPatch {
+            center: Vector3::zeros(),
+            normal,
+            reach,
+        };
+        LightSamples::faces_above(&shot, &options, &patch).remove(0)
+    }
+
+    /// By what the nodes of a light are scaled for a level card.
+    fn factor(light: AreaLight, quality: Quality, reach: f64) -> f32 {
+        let scaled = face(light, quality, Vector3::z(), reach).radiance;
+        scaled.g / light::radiance(&light).g
     }
 
     #[test]
@@ -316,7 +323,7 @@ mod tests {
         for normal in normals {
             let exact = light::irradiance(&disk(10.0, 1.0), Point3::origin(), normal);
             for quality in Quality::ALL {
-                let group = face(disk(10.0, 1.0), quality, &normal);
+                let group = face(disk(10.0, 1.0), quality, normal, 0.1);
                 let sum = group.unit_irradiance(&Vector3::zeros(), &normal);
                 let ratio = f64::from(group.radiance.g / exact.g) * sum;
                 assert!(
@@ -332,12 +339,18 @@ mod tests {
     #[test]
     fn small_lights_and_those_that_touch_stay_as_they_are() {
         for quality in Quality::ALL {
-            let ratio = |light: AreaLight| {
-                let scaled = face(light, quality, &Vector3::z()).radiance;
-                scaled.g / light::radiance(&light).g
-            };
-            assert!((ratio(disk(0.3, 0.8)) - 1.0).abs() < 1e-3, "{quality:?}");
-            assert_eq!(ratio(disk(1.0, 0.01)), 1.0, "{quality:?}");
+            let small = factor(disk(0.3, 0.8), quality, 0.1);
+            assert!((small - 1.0).abs() < 1e-3, "{quality:?}: {small}");
+            assert_eq!(factor(disk(1.0, 0.01), quality, 0.1), 1.0, "{quality:?}");
         }
+    }
+
+    #[test]
+    fn a_smaller_world_is_as_bright() {
+        // A bottle, and one of 2 cm, under as large a light for their size.
+        let [whole, tenth] = [1.0, 0.1]
+            .map(|scale| factor(disk(8.0 * scale, 0.8 * scale), Quality::Draft, 0.11 * scale));
+        assert!((whole - 1.0).abs() > 0.2, "{whole}");
+        assert!((tenth / whole - 1.0).abs() < 1e-5, "{tenth} {whole}");
     }
 }

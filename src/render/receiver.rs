@@ -8,7 +8,7 @@ use crate::pixel::LinearRgb;
 use crate::render::float4::Float4;
 use crate::render::half_plane::{ConvexShape, grown_side};
 use crate::render::lattice::{COARSER, Lattice};
-use crate::render::light_samples::{LightGroup, LightSamples};
+use crate::render::light_samples::{LightGroup, LightSamples, LitPatch};
 use crate::render::occluders::Occluders;
 use crate::render::ranges::{integer_range, range_overlap, range_union, range_until};
 use crate::render::shadow::{ProjectedShadow, ShadowedReceiver, TexelReads};
@@ -129,22 +129,22 @@ impl<'a> LightingContext<'a> {
         }
     }
 
-    /// What lights a plane on the side of the camera; none where it is seen edge-on. The normal is
-    /// that of every lattice.
-    fn light_samples(&self, plane: &ScenePlane) -> Option<LightSamples> {
-        let projected = ProjectedPlane::new(plane, &self.fine.view)?;
-        Some(LightSamples::above(
-            self.shot,
-            &self.options,
-            &plane.center,
-            &projected.normal,
-        ))
+    /// What lights a plane, as far as it matters, on the side of the camera; none where it is seen
+    /// edge-on. The normal is that of every lattice.
+    fn light_samples(&self, plane: &ScenePlane, reach: f64) -> Option<LightSamples> {
+        let patch = LitPatch {
+            center: plane.center,
+            normal: ProjectedPlane::new(plane, &self.fine.view)?.normal,
+            reach,
+        };
+        Some(LightSamples::above(self.shot, &self.options, &patch))
     }
 
     /// Card number `own`, at the nodes where anything is seen on it and one around. None where the
     /// card is not seen at all.
     pub(super) fn card(&self, own: usize, seen: &VisibleSide<'_>) -> Option<ReceiverIrradiance> {
-        let lights = self.light_samples(&self.occluders.cards[own].plane)?;
+        let plane = &self.occluders.cards[own].plane;
+        let lights = self.light_samples(plane, plane.half_length())?;
         let [sharp, soft] = SelectedLights::split(&lights);
         Some(ReceiverIrradiance {
             fine: self.card_on(&self.fine, own, seen, sharp)?,
@@ -176,7 +176,10 @@ impl<'a> LightingContext<'a> {
     /// The surface, at the nodes where a shadow may fall on it. None where there is no shadow, or
     /// none to be seen.
     pub(super) fn surface(&self) -> Option<ReceiverIrradiance> {
-        let lights = self.light_samples(&self.occluders.surface)?;
+        // The surface may have no end; its shadows are as large as cards.
+        let cards = self.occluders.cards.iter();
+        let reach = cards.map(|c| c.plane.half_length()).fold(0.0, f64::max);
+        let lights = self.light_samples(&self.occluders.surface, reach)?;
         let [sharp, soft] = SelectedLights::split(&lights);
         let fine = self.surface_on(&self.fine, sharp)?;
         let coarse = self.surface_on(&self.coarse, soft)?;

@@ -120,7 +120,7 @@ mod tests {
     use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
     use crate::render::RenderOptions;
     use crate::render::float4::Float4;
-    use crate::render::light_samples::LightSamples;
+    use crate::render::light_samples::{LightSamples, LitPatch};
     use crate::render::ranges::integer_range;
     use crate::render::view::{
         CameraView, LatticeArea, ProjectedPlane, ScenePlane, visible_planes,
@@ -166,6 +166,16 @@ mod tests {
             .with_card(card)
     }
 
+    /// What lights the surface.
+    fn samples(shot: &Shot, occluders: &Occluders<'_>, seen: &ProjectedPlane) -> LightSamples {
+        let patch = LitPatch {
+            center: occluders.surface.center,
+            normal: seen.normal,
+            reach: 0.15,
+        };
+        LightSamples::above(shot, &RenderOptions::default(), &patch)
+    }
+
     #[test]
     fn the_inside_of_an_opaque_card_is_as_dark_as_if_it_were_read() {
         for tilt in [0.0, 0.3, 1.2] {
@@ -176,12 +186,7 @@ mod tests {
                 ScenePlane::shadow_catcher(shot.catcher),
             );
             let seen = ProjectedPlane::new(&occluders.surface, &view).unwrap();
-            let LightSamples { sharp, soft } = LightSamples::above(
-                &shot,
-                &RenderOptions::default(),
-                &occluders.surface.center,
-                &seen.normal,
-            );
+            let LightSamples { sharp, soft } = samples(&shot, &occluders, &seen);
             let receiver = ShadowedReceiver {
                 plane: &seen,
                 area: &view.whole_area(),
@@ -230,13 +235,7 @@ mod tests {
             ScenePlane::shadow_catcher(shot.catcher),
         );
         let seen = ProjectedPlane::new(&occluders.surface, &view).unwrap();
-        let groups = LightSamples::above(
-            &shot,
-            &RenderOptions::default(),
-            &occluders.surface.center,
-            &seen.normal,
-        )
-        .sharp;
+        let groups = samples(&shot, &occluders, &seen).sharp;
         let shadows = |area: LatticeArea| {
             let receiver = ShadowedReceiver {
                 plane: &seen,

@@ -109,6 +109,11 @@ impl ScenePlane {
         ]
     }
 
+    /// Half of the longer side, metres.
+    pub(super) fn half_length(&self) -> f64 {
+        0.5 * self.size[0].max(self.size[1])
+    }
+
     /// The four corners, in turn.
     pub(super) fn corners(&self) -> [Vector3<f64>; 4] {
         let (a, b) = (self.x * (0.5 * self.size[0]), self.y * (0.5 * self.size[1]));

@@ -5,8 +5,9 @@ use crate::diagnostics::{located, report_diagnostics};
 use crate::documents::stem_of;
 use crate::exit::NeedsReview;
 use crate::global::GlobalArgs;
+use crate::output::folder_parser;
 use crate::print::{self, counted};
-use crate::values::{parse_corners, parse_metres};
+use crate::values::{check_companion, parse_corners, parse_metres};
 use petcomp::asset::{self, Asset, Built, Library, Manifest};
 use petcomp::asset::{CaptureEntry, Photo, PhotoEntry, PhotoRecord, Role, Scale, ScreenSource};
 use petcomp::matte::{CutOutOptions, MatteMethod};
@@ -25,7 +26,7 @@ pub(crate) enum AssetCommand {
         list: PathBuf,
         /// Asset folder; what it has of photos that are not in the list stays, and so do classes,
         /// until the folder is deleted
-        #[arg(short, long, value_name = "FOLDER")]
+        #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
         output: PathBuf,
     },
     /// Cut out photos of one object
@@ -60,7 +61,7 @@ pub(crate) struct AddPhotoArgs {
     #[arg(required = true)]
     photos: Vec<PathBuf>,
     /// Asset folder
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
     /// Name of the asset; by default that of the first photo
     #[arg(long)]
@@ -326,19 +327,6 @@ fn describe_size(record: &PhotoRecord) -> String {
     let [length, width] = record.object_m.map(|m| m * 1e3);
     let (file, error) = (&record.file, record.error_m * 1e3);
     format!("{file}: {length:.1} x {width:.1} mm (+- {error:.1})")
-}
-
-/// Fails where an option is given without the one that it belongs to.
-pub(crate) fn check_companion(
-    name: &str,
-    is_given: bool,
-    to: &str,
-    is_there: bool,
-) -> petcomp::Result<()> {
-    match is_given && !is_there {
-        true => Err(Error::value(name, format!("given without {to}"))),
-        false => Ok(()),
-    }
 }
 
 impl AddPhotoArgs {

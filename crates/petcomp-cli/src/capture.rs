@@ -1,6 +1,7 @@
 //! `petcomp capture`: an object on a luminous display.
 
 use crate::global::GlobalArgs;
+use crate::output::folder_parser;
 use crate::values::parse_pixel_size;
 use petcomp::capture::{Display, Frame, write_frames};
 use std::path::PathBuf;
@@ -15,7 +16,7 @@ pub(crate) enum CaptureCommand {
 #[derive(clap::Args)]
 pub(crate) struct FramesArgs {
     /// Folder to write
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
     /// Pixels of the display: best its own number, so that nothing is scaled
     #[arg(long, value_name = "WxH", value_parser = parse_pixel_size)]

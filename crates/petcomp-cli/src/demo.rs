@@ -1,6 +1,7 @@
 //! `petcomp demo`: a sample dataset from the photographs in the repository.
 
 use crate::global::GlobalArgs;
+use crate::output::folder_parser;
 use crate::print;
 use crate::{asset, dataset};
 use petcomp::dataset::{DatasetConfig, DatasetCounts, Pipeline};
@@ -13,7 +14,7 @@ pub(crate) struct DemoArgs {
     #[arg(long, value_name = "FOLDER", default_value = "tests/samples")]
     samples: PathBuf,
     /// Folder to write into
-    #[arg(short, long, value_name = "FOLDER", default_value = "demo")]
+    #[arg(short, long, value_name = "FOLDER", default_value = "demo", value_parser = folder_parser())]
     output: PathBuf,
     /// Number of pictures
     #[arg(short = 'n', long, value_name = "N", default_value_t = 24)]

@@ -2,6 +2,7 @@
 
 use crate::documents::stem_of;
 use crate::global::GlobalArgs;
+use crate::output::folder_parser;
 use crate::print;
 use crate::values::{count, parse_pixel_size};
 use petcomp::dataset::YoloSet;
@@ -44,7 +45,7 @@ pub(crate) struct EvalArgs {
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Folder for metrics.json, tables (CSV), pictures (SVG) and the page eval.html
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: Option<PathBuf>,
 }
 

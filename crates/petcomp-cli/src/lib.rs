@@ -20,6 +20,7 @@ mod global;
 mod interruption;
 mod label;
 mod matte;
+mod output;
 mod print;
 mod progress;
 mod render;

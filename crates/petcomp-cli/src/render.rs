@@ -1,5 +1,6 @@
 //! `petcomp render`: scene -> picture.
 
+use crate::distinct_files::check_distinct;
 use crate::documents::{SceneArgs, at_quality};
 use crate::global::GlobalArgs;
 use anyhow::bail;
@@ -33,6 +34,7 @@ pub(crate) struct RenderArgs {
 
 pub(crate) fn run(args: &RenderArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     args.check_output()?;
+    check_distinct(args.scene.files(), args.targets())?;
     let scene = args.scene.read_scene()?;
     let pipeline = Pipeline::open_for(args.config_for(&scene)?, &scene)?;
     let (scene, shot) = pipeline
@@ -56,6 +58,12 @@ impl RenderArgs {
             "tif" | "tiff" | "png" | "jpg" | "jpeg" => Ok(()),
             _ => bail!("{path}: no format for this extension, expected .png, .jpg, .exr or .tif"),
         }
+    }
+
+    /// What is written.
+    fn targets(&self) -> impl Iterator<Item = &PathBuf> {
+        let extras = self.preview.iter().chain(&self.resolved);
+        extras.chain([&self.output])
     }
 
     fn config_for(&self, scene: &Scene) -> anyhow::Result<DatasetConfig> {

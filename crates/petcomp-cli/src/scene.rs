@@ -3,6 +3,7 @@
 use crate::distinct_files::check_distinct;
 use crate::documents::RecipeArgs;
 use crate::global::GlobalArgs;
+use crate::output::folder_parser;
 use crate::print;
 use petcomp::dataset::DatasetConfig;
 use petcomp::scene::{Card, EdgeTreatment, PostProcess, cycles};
@@ -33,7 +34,7 @@ pub(crate) struct ExportSceneArgs {
     #[arg(long, value_name = "RENDERER")]
     to: Renderer,
     /// Folder to write
-    #[arg(value_name = "FOLDER")]
+    #[arg(value_name = "FOLDER", value_parser = folder_parser())]
     folder: PathBuf,
 }
 

@@ -1,5 +1,6 @@
 //! `petcomp settle`: dropped objects come to rest.
 
+use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use petcomp::dataset::DatasetConfig;
 use petcomp::settle::{SettleOptions, Settled, preview, settle_traced, trace_csv};
@@ -32,6 +33,7 @@ pub(crate) struct SettleArgs {
 const TRACE_RATE: f64 = 60.0;
 
 pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    check_distinct(args.inputs(), args.targets())?;
     let scene: Scene = io::read_document(&args.scene)?;
     let options = args.options_for(&scene)?;
     let settled = args.settle(scene, &options)?;
@@ -46,6 +48,16 @@ pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> 
 }
 
 impl SettleArgs {
+    fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        self.options.iter().chain([&self.scene])
+    }
+
+    /// What is written.
+    fn targets(&self) -> impl Iterator<Item = &PathBuf> {
+        let extras = self.trace.iter().chain(&self.preview);
+        extras.chain([&self.output])
+    }
+
     /// Lets the objects fall and writes the trace, for a failed fall too: it shows what went wrong.
     fn settle(&self, scene: Scene, options: &SettleOptions) -> petcomp::Result<Settled> {
         let (settled, samples) = settle_traced(scene, options, self.trace_interval(options))

@@ -1,7 +1,8 @@
-//! Values on the command line that are more than one number or name.
+//! Values on the command line that are more than one number or name, and options that belong
+//! together.
 
 use clap::builder::RangedU64ValueParser;
-use petcomp::LinearRgb;
+use petcomp::{Error, LinearRgb};
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
@@ -9,6 +10,19 @@ use std::str::FromStr;
 /// A number of things within a range: more of them would take days, or all of the memory.
 pub(crate) fn count(range: RangeInclusive<u64>) -> RangedU64ValueParser<usize> {
     RangedU64ValueParser::new().range(range)
+}
+
+/// Fails where an option is given without the one that it belongs to.
+pub(crate) fn check_companion(
+    name: &str,
+    is_given: bool,
+    to: &str,
+    is_there: bool,
+) -> petcomp::Result<()> {
+    match is_given && !is_there {
+        true => Err(Error::value(name, format!("given without {to}"))),
+        false => Ok(()),
+    }
 }
 
 /// Four points from `X,Y X,Y X,Y X,Y`.

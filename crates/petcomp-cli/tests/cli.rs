@@ -280,6 +280,21 @@ fn batches_of_sets_that_name_other_classes_are_refused() {
 }
 
 #[test]
+fn a_set_for_training_alone_has_batches_and_anchors() {
+    let desk = Desk::new();
+    write_slab(&desk.path("set/images/a.png"));
+    desk.write("set/labels/a.txt", "0 0.5 0.5 0.4 0.4\n");
+    desk.write("set/none.txt", "");
+    let yaml = "train: images\nval: none.txt\nnames: [cap]\n";
+    desk.write("set/data.yaml", yaml);
+    desk.ok(&words(
+        "dataset batches --real set --synthetic set -o batches.jsonl",
+    ));
+    let said = desk.ok(&words("dataset anchors set -n 1"));
+    assert!(said.contains("mean IoU 1.000"), "{said}");
+}
+
+#[test]
 fn photos_that_would_become_one_cut_out_are_refused() {
     let desk = Desk::new();
     write_slab(&desk.path("one/can.png"));
@@ -528,6 +543,21 @@ fn ablations_differ_in_the_switch_that_is_asked_for() {
 }
 
 #[test]
+fn recipes_of_long_switches_are_written() {
+    let desk = Desk::new();
+    desk.write("recipe.toml", "[scene]\nobjects = 3\n");
+    let numbers: Vec<String> = (1..=100).map(|n| n.to_string()).collect();
+    let weights = ["1"; 100].join(", ");
+    let values = numbers.join(", ");
+    let switch = format!("scene.objects={{ values = [{values}], weights = [{weights}] }}");
+    let ablate = "dataset ablate recipe.toml -n 0 -o out --switch";
+    let out = desk.ok(&[&words(ablate)[..], &[switch.as_str()]].concat());
+    let mut recipes = out.lines();
+    assert!(recipes.all(|path| desk.path(path).exists()), "{out}");
+    assert_eq!(out.lines().count(), 2, "{out}");
+}
+
+#[test]
 fn a_recipe_beside_a_dataset_is_not_written_over() {
     let desk = Desk::new();
     desk.write("recipe.toml", "[scene]\nobjects = 3\n");
@@ -556,6 +586,14 @@ fn a_url_is_no_folder_of_its_own_name() {
         "dataset split set -o",
         "dataset subset set --head 0.5 -o",
         "dataset merge shard -o",
+        "dataset train-kit --real set --synthetic set -o",
+        "eval found truth -o",
+        "asset build photos.toml -o",
+        "asset add a.png --class cap --length 0.2 -o",
+        "capture frames --size 64x48 -o",
+        "matte segment a.png -o",
+        "demo -o",
+        "scene export s.toml recipe.toml --to cycles",
     ] {
         let told = desk.refused(&words(&format!("{line} s3://bucket/data")));
         assert!(told.contains("output: a URL, expected a folder"), "{told}");
@@ -671,7 +709,21 @@ fn no_command_writes_over_what_it_reads() {
     write_slab(&desk.path("a.png"));
     desk.write("a.label.json", label(SQUARE));
     desk.write("set/data.yaml", "train: .\nval: .\nnames: [cap]\n");
-    let files = ["a.png", "a.label.json", "set/data.yaml"];
+    let lists = "train: ../b/train.txt\nval: ../b/val.txt\nnames: [cap]\n";
+    desk.write("a/data.yaml", lists);
+    desk.write("b/train.txt", "1.png\n2.png\n");
+    desk.write("b/val.txt", "3.png\n");
+    desk.write("recipe.toml", "");
+    desk.write("s.toml", "");
+    let files = [
+        "a.png",
+        "a.label.json",
+        "set/data.yaml",
+        "b/train.txt",
+        "b/val.txt",
+        "recipe.toml",
+        "s.toml",
+    ];
     let content = || files.map(|name| std::fs::read(desk.path(name)).ok());
     let before = content();
     for words in [
@@ -686,8 +738,14 @@ fn no_command_writes_over_what_it_reads() {
         &["diff", "a.png", "a.png", "-o", "a.png"],
         &["scene", "draw", "recipe.toml", "-o", "recipe.toml"],
         &["label", "s.toml", "-o", "s.toml"],
+        &words("render s.toml recipe.toml -o f.png --resolved recipe.toml")[..],
+        &words("render s.toml -o f.png --resolved ./s.toml")[..],
+        &words("settle s.toml -o s.toml")[..],
+        &words("settle s.toml -o rest.toml --options o.toml --trace o.toml")[..],
         &["dataset", "split", "set", "-o", "./set"],
         &["dataset", "subset", "set", "--head", "0.5", "-o", "set"],
+        &["dataset", "split", "a", "-o", "b"],
+        &["dataset", "subset", "a", "--head", "0.5", "-o", "b"],
     ] {
         let told = desk.refused(words);
         assert!(told.contains("is read and would be written over"), "{told}");
@@ -1257,6 +1315,19 @@ fn a_scene_goes_through_the_stages_one_by_one() {
         .iter()
         .all(|f| desk.path("blender").join(f).exists())
     );
+}
+
+#[test]
+fn objects_need_be_large_enough_in_the_whole_picture_alone() {
+    let desk = Desk::new();
+    demo(&desk);
+    // The median object is 12 px long, in the preview 6.
+    let small = words("dataset generate demo/recipe.toml -o look --set scene.scale=0.08");
+    desk.ok(&[&small[..], &["--preview", "1"]].concat());
+    assert!(desk.path("look/sheet.png").exists());
+    let half = ["-n", "1", "--set", "scene.image=[320,240]"];
+    let told = desk.refused(&[&small[..], &half].concat());
+    assert!(told.contains("expected at least 8"), "{told}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 // Corners: four clicks on a photo become a label, and its camera is seen at once.
 
-import { api, at, choice, element, frame, lengths, query, say, shortcuts, trying } from "./studio.js";
+import { api, at, choice, element, frame, lengths, picture, query, say, shortcuts, trying } from "./studio.js";
 import { photoList } from "./photo_list.js";
 import { INK, PhotoView, loaded, viewKeys } from "./photo_view.js";
 
@@ -10,7 +10,10 @@ const NAMES = ["top left", "top right", "bottom right", "bottom left"];
 
 /** What was changed and is not saved, by photo. */
 const drafts = new Map();
-/** The photo on the stage: { photo, label, version, corners, history, view, markers }. */
+/**
+ * The photo on the stage: { photo, label, version, corners, history, camera, markers, lensSigma, changes, saving }.
+ * `lensSigma` is the error of the lens's height as the file states it, `changes` counts what was changed here.
+ */
 let open = null;
 /** How many photos were asked for: what comes of all but the last is dropped. */
 let asked = 0;
@@ -46,19 +49,29 @@ async function show(photo) {
   asked += 1;
   const number = asked;
   const state = drafts.get(photo) ?? await load(photo);
-  const picture = state && await trying(() => loaded(query("api/photo", { file: photo })));
+  const image = state && await trying(() => fresh(photo));
   if (number !== asked) return;
   history.replaceState(null, "", query("corners", { photo }));
   document.title = `${photo.split("/").pop()} · Corners`;
   at("title").textContent = photo.split("/").pop();
   list.choose(photo);
-  if (picture) showOpened(state, picture);
+  if (image) showOpened(state, image);
   else showNothing();
 }
 
-function showOpened(state, picture) {
+/** The photo as its file is now: an image takes what the page has shown before, unasked. */
+async function fresh(photo) {
+  const address = await picture(query("api/photo", { file: photo }));
+  try {
+    return await loaded(address);
+  } finally {
+    URL.revokeObjectURL(address);
+  }
+}
+
+function showOpened(state, image) {
   open = state;
-  view.show(picture);
+  view.show(image);
   view.setPoints(open.corners, -1);
   showFields();
   showMarks();
@@ -72,7 +85,8 @@ function showNothing() {
   open = null;
   view.show(null);
   view.setPoints([], -1);
-  for (const id of [...Object.keys(LENGTHS), "surface", "camera", "cropped"]) at(id).value = "";
+  for (const id of Object.keys(LENGTHS)) units.show(at(id), null);
+  for (const id of ["surface", "camera", "cropped"]) at(id).value = "";
   for (const id of ["facts", "advice"]) at(id).replaceChildren();
   for (const id of ["snap", "turn", "undo", "save"]) at(id).disabled = true;
   at("hint").textContent = "Choose another photo.";
@@ -89,8 +103,12 @@ function likeOf(photo) {
 async function load(photo) {
   const like = entryOf(photo)?.label ? null : likeOf(photo);
   return trying(async () => {
-    const { label, version } = await api(query("api/corners/label", { photo, like }));
-    return { photo, label, version, corners: fromLabel(label), history: [], camera: null, markers: [] };
+    const { label, version, remark } = await api(query("api/corners/label", { photo, like }));
+    if (remark) say(`${remark}: the label of ${photo} begins without it`, "bad");
+    return {
+      photo, label, version, corners: fromLabel(label), history: [], camera: null, markers: [],
+      lensSigma: statedSigma(label.camera), changes: 0, saving: false,
+    };
   });
 }
 
@@ -120,11 +138,16 @@ function remember() {
   open.history.push(open.corners.map((corner) => [...corner]));
 }
 
+/** What was changed since is not saved, however late the answers to what was asked before. */
+function keep(state) {
+  state.changes += 1;
+  if (drafts.get(state.photo) === state) return;
+  drafts.set(state.photo, state);
+  showMarks();
+}
+
 function changed(finished) {
-  if (!drafts.has(open.photo)) {
-    drafts.set(open.photo, open);
-    showMarks();
-  }
+  keep(open);
   if (finished) remember();
   solve();
 }
@@ -177,10 +200,15 @@ function turn() {
 async function snap() {
   if (open?.corners.length !== 4) return;
   const here = open;
+  const before = String(here.corners);
   say("looking for edges ...");
   await trying(async () => {
     const snapped = await api("api/corners/snap", { photo: here.photo, corners_px: here.corners });
     if (open !== here) return;
+    if (String(here.corners) !== before) {
+      say("the corners have moved meanwhile, and stay: S looks for edges near them");
+      return;
+    }
     const found = snapped.found.filter(Boolean).length;
     setCorners(snapped.corners_px, view.chosen);
     say(found === 4 ? "all four sides lie on edges" : `${found} of 4 sides show an edge; the others stay`, found === 4 ? "good" : "");
@@ -196,7 +224,7 @@ async function findMarkers() {
     here.markers = markers;
     if (label) {
       here.label.points = label.points;
-      drafts.set(here.photo, here);
+      keep(here);
     }
     if (open !== here) return;
     const known = label ? `, ${label.points.length} corners of known place` : markers.length ? "; a click near a corner of one takes it" : "";
@@ -223,18 +251,28 @@ function set(table, key, value) {
 }
 
 /** A tape's height is known to 3 %, as the doctor takes it, unless the label says otherwise. */
-function setLens(label, value) {
-  set(label.camera, "height_m", value);
-  set(label.camera, "height_sigma_m", value === null ? null : rounded(3 * value) / 100);
+const tapeSigma = (height) => rounded(3 * height) / 100;
+
+/** What a label says of the error of the lens's height, beyond what this page writes there. */
+function statedSigma({ height_m: height, height_sigma_m: sigma }) {
+  return sigma === tapeSigma(height) ? undefined : sigma;
 }
 
+function setLens(label, value) {
+  set(label.camera, "height_m", value);
+  set(label.camera, "height_sigma_m", value === null ? null : open.lensSigma ?? tapeSigma(value));
+}
+
+/** Their slope is not typed here, and stays. */
 function setWall(label, value) {
-  set(label.surface, "wall", value === null ? null : { ...label.surface.wall, height_m: value });
+  const wall = { ...label.surface.wall };
+  set(wall, "height_m", value);
+  set(label.surface, "wall", Object.keys(wall).length ? wall : null);
 }
 
 function showFields() {
   const { label } = open;
-  for (const [id, [read]] of Object.entries(LENGTHS)) at(id).value = units.shown(read(label));
+  for (const [id, [read]] of Object.entries(LENGTHS)) units.show(at(id), read(label));
   at("surface").value = label.surface.id;
   at("camera").value = label.camera.id ?? "";
   at("cropped").value = label.image.cropped === undefined ? "" : String(label.image.cropped);
@@ -404,19 +442,37 @@ function drawCamera() {
 // Saving.
 
 async function save(next = true) {
-  if (!open || at("panel").querySelector(":invalid")) return;
+  if (!open || open.saving || !isReadable()) return;
   const here = open;
-  await trying(async () => {
-    const saved = await saveOrAsk(here);
-    if (!saved) return;
-    here.version = saved.version;
-    drafts.delete(here.photo);
-    last = here.photo;
-    Object.assign(entryOf(here.photo), { label: true, camera: Boolean(saved.camera) });
-    showMarks();
-    say(saved.camera ? `saved ${saved.name} and ${saved.camera}` : `saved ${saved.name}; no camera: ${saved.why}`, saved.camera ? "good" : "bad");
-    if (next && saved.camera) list.next((entry) => !entry.label);
-  });
+  here.saving = true;
+  await trying(() => saveOpened(here, next));
+  here.saving = false;
+}
+
+/** Whether each field holds what it should; the first that does not is shown. */
+function isReadable() {
+  const wrong = at("panel").querySelector("input:invalid");
+  if (!wrong) return true;
+  if (at("more").contains(wrong)) at("more").open = true;
+  wrong.reportValidity();
+  say(`not saved: ${wrong.id}: ${wrong.value}, ${wrong.validationMessage}`, "bad");
+  return false;
+}
+
+async function saveOpened(here, next) {
+  const before = here.changes;
+  const saved = await saveOrAsk(here);
+  if (!saved) return;
+  const isWhole = here.changes === before;
+  here.version = saved.version;
+  if (isWhole) drafts.delete(here.photo);
+  last = here.photo;
+  Object.assign(entryOf(here.photo), { label: true, camera: Boolean(saved.camera) });
+  showMarks();
+  const rest = isWhole ? "" : "; not what was changed meanwhile";
+  say(saved.camera ? `saved ${saved.name} and ${saved.camera}${rest}` : `saved ${saved.name}${rest}; no camera: ${saved.why}`,
+    saved.camera && isWhole ? "good" : "bad");
+  if (next && saved.camera && isWhole) list.next((entry) => !entry.label);
 }
 
 /** Saves; where somebody else has saved since, asks whose label it shall be. */
@@ -457,12 +513,13 @@ async function solveTogether() {
 function table(solved) {
   const row = (cell, cells) => element("tr", {}, ...cells.map((text) => element(cell, {}, text)));
   return element("table", { class: "solved" },
-    row("th", ["Photo", "Shares", "Focal length", "Corners"]),
+    row("th", ["Photo", "Shares", "Focal length", "Corners", "Remark"]),
     ...solved.map((one) => row("td", [
       one.photo.split("/").pop(),
       one.together > 1 ? `${one.together} photos` : "alone",
-      one.focal_px === null ? one.why : `${one.focal_px.toFixed(0)} px ± ${(100 * one.focal_sigma).toFixed(1)} %`,
+      one.focal_px === null ? "none" : `${one.focal_px.toFixed(0)} px ± ${(100 * one.focal_sigma).toFixed(1)} %`,
       one.rms_px === null ? "" : `${one.rms_px.toFixed(2)} px`,
+      one.why ?? "",
     ])));
 }
 

@@ -240,11 +240,17 @@ class Pane {
     const { folder, listing } = this;
     const row = this.rows[this.place];
     this.image.src = address(this, row);
+    this.tell(null);
     const sample = await api(query("api/dataset/sample", { folder, listing, row }));
     if (listing !== this.listing || row !== this.rows[this.place]) return;
-    Object.assign(this, { sample, marked: null, layers: null });
     this.folders.value = folder;
-    this.title.textContent = `${sample.name} · ${this.place + 1} of ${this.rows.length}`;
+    this.tell(sample);
+  }
+
+  /** Tells what is known of its picture; null before that is read: nothing of another one. */
+  tell(sample) {
+    Object.assign(this, { sample, marked: null, layers: null });
+    this.title.textContent = `${sample ? `${sample.name} · ` : ""}${this.place + 1} of ${this.rows.length}`;
     this.draw();
     if (viewer.active === this) showDetails(this);
   }
@@ -269,9 +275,9 @@ class Pane {
   }
 
   draw() {
-    if (!this.sample) return;
-    const [width, height] = this.sample.image;
+    const [width, height] = this.sample?.image ?? [0, 0];
     Object.assign(this.canvas, { width, height });
+    if (!this.sample) return;
     const pen = this.canvas.getContext("2d");
     const { objects } = this.sample;
     const line = Math.max(1, width / 500);

@@ -51,18 +51,26 @@ function mark({ verdict, strokes }) {
   return VERDICTS[verdict] ?? [strokes ? `${strokes} ${strokes === 1 ? "stroke" : "strokes"}` : "", ""];
 }
 
+/** The list tells what is in the file. */
+function markSaved(entry, { verdict, strokes }) {
+  Object.assign(entry, { verdict, strokes: strokes.length });
+  list.showMarks();
+}
+
 async function open(photo) {
   const entry = list.entryOf(photo);
   Object.assign(state, { entry, review: null, solved: null, undone: [], shown: null, unsaved: null });
   Object.assign(stage, { size: null, strokes: [] });
   stage.draw();
   list.choose(photo);
+  for (const id of ["flags", "facts"]) at(id).replaceChildren();
   showReview();
   await trying(async () => {
     await state.saving;
     const review = await api(query("api/mattes/review", { photo }));
     if (state.entry !== entry) return;
     state.review = review;
+    markSaved(entry, review);
     stage.strokes = review.strokes;
     showReview();
     await solve();
@@ -83,6 +91,7 @@ async function solve() {
   state.review.size = solved.size;
   if (!stage.size) stage.open(solved.size);
   setRadius();
+  showReview();
   showSolved();
   await showLayers();
   const trouble = state.unsaved ?? solved.refused;
@@ -208,13 +217,12 @@ function setVerdict(verdict) {
 /** Saves the review of the photo, after what is being saved already. */
 function keep() {
   const { entry, review } = state;
-  Object.assign(entry, { verdict: review.verdict, strokes: review.strokes.length });
-  list.showMarks();
   const { size, strokes, verdict } = review;
   state.saving = state.saving.then(() => trying(async () => {
     try {
       const saved = await api("api/mattes/review", { photo: entry.photo, size, strokes, verdict, version: review.version });
       Object.assign(review, { version: saved.version });
+      markSaved(entry, { verdict, strokes });
       state.unsaved = null;
       at("canvas").dataset.saved = `${saved.file} ${saved.version}`;
       say(`saved ${saved.file}`, "good");
@@ -230,7 +238,7 @@ function showReview() {
   at("undo").disabled = at("clear").disabled = !strokes.length;
   at("redo").disabled = !state.undone.length;
   for (const [id, said] of [["accept", "accepted"], ["reject", "rejected"]]) {
-    at(id).disabled = !state.review;
+    at(id).disabled = !state.review || !state.solved;
     at(id).setAttribute("aria-pressed", verdict === said);
   }
 }
@@ -260,6 +268,8 @@ at("accept").addEventListener("click", () => setVerdict("accepted"));
 at("reject").addEventListener("click", () => setVerdict("rejected"));
 at("wipe").addEventListener("input", () => setWipe(at("wipe").value));
 at("radius").addEventListener("input", setRadius);
+// These keys are the brush's while it has the focus, and the wipe's otherwise.
+at("radius").addEventListener("keydown", (event) => { if (["ArrowLeft", "ArrowRight"].includes(event.key)) event.stopPropagation(); });
 at("plate").addEventListener("change", () => setLayer("plate"));
 
 function showStrokes() {

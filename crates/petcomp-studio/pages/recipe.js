@@ -11,6 +11,8 @@ const ONE_STEP_MS = 700;
 /** The recipe's file as it was read, and what its edits make of it. */
 const recipe = { file: "", version: "", saved: null, draft: null, edits: [] };
 const steps = { past: [], future: [], last: 0, path: "" };
+/** What is edited while a save runs, and is not in what it has sent; null where none runs. */
+let meanwhile = null;
 let groups = [];
 
 // Values as TOML.
@@ -37,11 +39,13 @@ function edit(path, toml) {
   if (!isSameMove) steps.past.push(recipe.edits);
   Object.assign(steps, { future: [], last: now, path });
   recipe.edits = withEdit(recipe.edits, path, toml, recipe.saved.own);
+  meanwhile?.push([path, toml]);
   changed();
 }
 
 function travel(from, to) {
-  if (!from.length) return;
+  // What a save has sent cannot be taken back from it.
+  if (!from.length || meanwhile) return;
   to.push(recipe.edits);
   recipe.edits = from.pop();
   steps.path = "";
@@ -78,17 +82,27 @@ async function draftOnce() {
   document.title = `${edits.length ? "• " : ""}${recipe.file} · petcomp studio`;
   if (drafting.redraw) showSettings();
   else markSettings();
-  drafting.redraw = false;
+  // Something newer was asked for meanwhile, and is not in these controls yet.
+  drafting.redraw &&= drafting.wanted;
   pictures.show();
 }
 
 async function save() {
-  if (!recipe.edits.length) return;
-  const { file, version, edits } = recipe;
-  recipe.version = await api("api/recipe/save", { file, version, edits });
-  recipe.saved = await api(query("api/recipe/open", { file }));
-  recipe.edits = [];
-  Object.assign(steps, { past: [], future: [], path: "" });
+  if (!recipe.edits.length || meanwhile) return;
+  const newer = [];
+  meanwhile = newer;
+  const { file, version, edits: sent } = recipe;
+  try {
+    const next = await api("api/recipe/save", { file, version, edits: sent });
+    const saved = await api(query("api/recipe/open", { file }));
+    // Another recipe was opened.
+    if (meanwhile !== newer) return;
+    const edits = newer.reduce((done, [path, toml]) => withEdit(done, path, toml, saved.own), []);
+    Object.assign(recipe, { version: next, saved, edits });
+    Object.assign(steps, { past: edits.length ? [[]] : [], future: [], path: "" });
+  } finally {
+    if (meanwhile === newer) meanwhile = null;
+  }
   pictures.forgetBefore();
   await changed({ redraw: true });
   say(`${file} saved`, "good");
@@ -437,6 +451,7 @@ function filterSettings() {
 
 async function open(file) {
   const opened = await api(query("api/recipe/open", { file }));
+  meanwhile = null;
   Object.assign(recipe, { file, version: opened.version, draft: opened, saved: opened, edits: [] });
   Object.assign(steps, { past: [], future: [], path: "" });
   history.replaceState(null, "", query("recipe", { file }));

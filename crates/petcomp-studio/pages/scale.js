@@ -62,8 +62,8 @@ function setMode(next) {
   for (const name of Object.keys(MODES)) at(name).setAttribute("aria-pressed", String(name === mode));
   at("first").textContent = mode === "ruler" ? "Length between them" : "Width of the screen";
   at("second").hidden = mode === "ruler";
-  at("width").value = units.shown(sides.width);
-  at("height").value = units.shown(sides.height);
+  units.show(at("width"), sides.width);
+  units.show(at("height"), sides.height);
   view.setPoints(points[mode], -1);
   showFacts();
 }
@@ -156,8 +156,9 @@ function drawLines() {
 
 async function save() {
   const scale = scaleNow();
-  if (!open || !scale) return;
+  if (!open || open.isSaving || !scale) return;
   const here = open;
+  here.isSaving = true;
   await trying(async () => {
     const { photo, version } = here;
     const saved = await api("api/scale/save", { photo, version, scale, asset: at("asset").value, class: at("class").value });
@@ -167,6 +168,7 @@ async function save() {
     say(`saved in ${saved.list}`, "good");
     list.next((entry) => !entry.scaled);
   });
+  here.isSaving = false;
 }
 
 for (const id of ["width", "height"]) {

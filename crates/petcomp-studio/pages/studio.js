@@ -172,10 +172,15 @@ export function lengths(select, changed) {
     changed();
   });
   const unit = () => Number(select.value);
+  const shown = (metres) =>
+    (metres === undefined || metres === null ? "" : String(Number((metres / unit()).toPrecision(6))));
   return {
     /** A length as a field shows it. */
-    shown(metres) {
-      return metres === undefined || metres === null ? "" : String(Number((metres / unit()).toPrecision(6)));
+    shown,
+    /** Shows a length in a field, in place of whatever was typed there. */
+    show(field, metres) {
+      field.value = shown(metres);
+      field.setCustomValidity("");
     },
     /** What a field says, in metres; null for nothing, undefined for what is no length: the field then says so. */
     read(field) {

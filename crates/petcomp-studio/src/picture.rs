@@ -6,7 +6,8 @@ use crate::studio::Studio;
 use crate::turn::blocking;
 use axum::Router;
 use axum::extract::State;
-use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
+use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, ETAG, IF_NONE_MATCH};
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use petcomp::io::{Format, ToFile};
@@ -14,6 +15,7 @@ use petcomp::{Image, Mix, PremulRgba, filter, io};
 use serde::Deserialize;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::UNIX_EPOCH;
 
 /// Extensions of what may be a photo.
 const EXTENSIONS: [&str; 11] = [
@@ -69,19 +71,39 @@ struct PhotoQuery {
     side: Option<usize>,
 }
 
-/// A photo: the file itself where the browser can show it whole, or else a JPEG of it.
+/// A photo: the file itself where the browser can show it whole, or else a JPEG of it. The browser
+/// may keep it, and asks every time whether it still is what the file holds.
 async fn photo(
     State(studio): State<Arc<Studio>>,
     Query(query): Query<PhotoQuery>,
+    headers: HeaderMap,
 ) -> Answer<Response> {
     let path = studio.folder.file(&query.file)?;
+    let tag = tag_of(&path)?;
+    let known = headers.get(IF_NONE_MATCH);
+    let is_known = known.is_some_and(|known| *known == tag);
+    let keeping = [(CACHE_CONTROL, "private, no-cache".to_owned()), (ETAG, tag)];
+    if is_known {
+        return Ok((StatusCode::NOT_MODIFIED, keeping).into_response());
+    }
     // The file itself need not wait for small pictures of others.
     let _permit = match query.side {
         Some(_) => Some(studio.decoding.acquire().await),
         None => None,
     };
     let response = blocking(move || shown(&path, query.side)).await?;
-    Ok(([(CACHE_CONTROL, "private, max-age=60")], response).into_response())
+    Ok((keeping, response).into_response())
+}
+
+/// A mark of the state of a file: when it was written, and its length.
+fn tag_of(path: &Path) -> Answer<String> {
+    let meta = std::fs::metadata(path).map_err(unreadable)?;
+    let written = meta.modified().map_err(unreadable)?;
+    let nanos = written
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default()
+        .as_nanos();
+    Ok(format!("\"{nanos:x}-{:x}\"", meta.len()))
 }
 
 /// A picture as the browser can show it, small where a longer side is given. Otherwise it keeps its

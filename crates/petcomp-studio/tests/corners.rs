@@ -5,7 +5,8 @@ mod browser;
 use browser::studio::{Studio, copy_files, samples};
 use browser::{Browser, CTRL, SHIFT};
 use petcomp::camera::{self, CameraFile, Label, Solution};
-use petcomp::io;
+use petcomp::{Image, LinearRgb, io};
+use serde_json::{Value, json};
 use std::path::Path;
 use std::time::Instant;
 
@@ -274,4 +275,254 @@ fn a_phone_shows_the_photo_first() {
     assert!(wide.as_f64().unwrap() <= 412.0, "{wide}");
     browser.screenshot("studio_phone");
     browser.assert_content();
+}
+
+/// The JSON of an answer.
+fn body(answer: &str) -> Value {
+    let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+    assert!(head.starts_with("HTTP/1.1 200"), "{answer}");
+    serde_json::from_str(body).unwrap()
+}
+
+/// Answers of a route wait for `window.goOn()`; `window.asked` counts what it was asked.
+fn hold_answers(browser: &mut Browser, route: &str) {
+    browser.eval(&format!(
+        "(() => {{ const real = window.fetch; window.asked = 0; window.fetch = async (path, options) => {{ \
+         if (!String(path).includes('{route}')) return real(path, options); \
+         window.asked += 1; const answer = await real(path, options); \
+         await new Promise((go) => {{ window.goOn = go; }}); return answer; }}; }})()"
+    ));
+}
+
+/// Opens another photo by its place in the list.
+fn choose_photo(browser: &mut Browser, photo: &str) {
+    browser.click_on(&format!("[data-photo='{photo}'] button"));
+    browser.wait(&format!(
+        "document.querySelector('#title').innerText === '{photo}'"
+    ));
+}
+
+#[test]
+fn markers_leave_points_that_were_measured_by_hand() {
+    let dir = photos(&["bg0004"]);
+    let studio = Studio::over(dir.path());
+    let mut label: Value = io::read_json(dir.path().join("bg0004.label.json")).unwrap();
+    label["points"] =
+        json!([{ "xyz_m": [-0.28, 0.185, 0.0], "px": [253.6, 208.7], "note": "by hand" }]);
+    let asked = json!({ "photo": "bg0004.jpg", "label": label }).to_string();
+    let found = body(&studio.post("api/corners/markers", &asked));
+    let points = found["label"]["points"].as_array().unwrap();
+    assert_eq!(points.len(), 1 + 4 * 4);
+    assert!(points.iter().any(|point| point["note"] == "by hand"));
+}
+
+#[test]
+fn a_label_that_cannot_be_read_stands_in_no_other_photos_way() {
+    let dir = photos(&["bg0000"]);
+    std::fs::write(dir.path().join("bg0001.label.json"), "{ oops").unwrap();
+    let studio = Studio::over(dir.path());
+    for like in ["bg0001.jpg", "gone.jpg"] {
+        let path = format!("api/corners/label?photo=bg0003.jpg&like={like}");
+        let begun = body(&studio.get(&path));
+        assert_eq!(begun["label"]["image"]["file"], "bg0003.jpg");
+        let remark = begun["remark"].as_str().unwrap();
+        assert!(remark.contains(like.split('.').next().unwrap()), "{remark}");
+    }
+    let solved = body(&studio.post(
+        "api/corners/joint",
+        r#"{ "photos": ["bg0000.jpg", "bg0001.jpg"] }"#,
+    ));
+    assert!(solved[0]["focal_px"].is_number(), "{solved}");
+    assert!(solved[1]["why"].is_string(), "{solved}");
+}
+
+#[test]
+fn a_label_that_has_no_camera_keeps_no_other_from_its_own() {
+    let dir = photos(&["bg0000", "bg0001"]);
+    let path = dir.path().join("bg0001.label.json");
+    let mut label: Value = io::read_json(&path).unwrap();
+    label["surface"]["corners_px"] = Value::Null;
+    io::write_json(&path, &label).unwrap();
+    let studio = Studio::over(dir.path());
+    let solved = body(&studio.post(
+        "api/corners/joint",
+        r#"{ "photos": ["bg0000.jpg", "bg0001.jpg"] }"#,
+    ));
+    assert!(solved[0]["focal_px"].is_number(), "{solved}");
+    assert!(solved[1]["why"].is_string(), "{solved}");
+}
+
+#[test]
+fn a_photo_is_sent_again_when_its_file_has_changed() {
+    let dir = photos(&[]);
+    let studio = Studio::over(dir.path());
+    let ask = |tag: &str| {
+        let (root, host) = (studio.root(), studio.host());
+        let answer = studio.send(
+            format!(
+                "GET {root}api/photo?file=bg0000.jpg HTTP/1.1\r\nHost: {host}\r\n\
+                 If-None-Match: {tag}\r\nConnection: close\r\n\r\n"
+            )
+            .as_bytes(),
+        );
+        let status = answer.split(' ').nth(1).unwrap().to_owned();
+        assert!(answer.contains("no-cache"), "{status}");
+        let tag = answer.lines().find_map(|line| line.strip_prefix("etag: "));
+        (status, tag.unwrap().to_owned())
+    };
+    let (status, first) = ask("\"none\"");
+    assert_eq!(status, "200");
+    assert_eq!(ask(&first), ("304".to_owned(), first.clone()));
+    std::fs::copy(dir.path().join("bg0001.jpg"), dir.path().join("bg0000.jpg")).unwrap();
+    let (status, second) = ask(&first);
+    assert_eq!(status, "200");
+    assert_ne!(first, second);
+}
+
+#[test]
+fn a_photo_that_was_written_anew_is_shown_as_it_is() {
+    let Some(mut browser) = Browser::open(1360, 860) else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, colour: LinearRgb| {
+        io::write(dir.path().join(name), &Image::filled(64, 48, colour)).unwrap();
+    };
+    write("a.png", LinearRgb::WHITE);
+    write("b.png", LinearRgb::WHITE);
+    let studio = Studio::over(dir.path());
+    let middle = "(() => { const c = document.querySelector('#stage canvas'); \
+         return c.getContext('2d').getImageData(c.width / 2, c.height / 2, 1, 1).data[0]; })()";
+    open_photo(&mut browser, &studio, "a.png");
+    browser.wait(&format!("{middle} > 200"));
+    choose_photo(&mut browser, "b.png");
+    write("a.png", LinearRgb::new(0.01, 0.0, 0.0));
+    choose_photo(&mut browser, "a.png");
+    browser.wait(&format!("{middle} < 100"));
+    browser.assert_content();
+}
+
+#[test]
+fn what_the_label_says_of_heights_stays_when_they_are_typed_anew() {
+    let Some(mut browser) = Browser::open(1360, 860) else {
+        return;
+    };
+    let dir = photos(&["bg0000"]);
+    let path = dir.path().join("bg0000.label.json");
+    let mut label: Value = io::read_json(&path).unwrap();
+    label["camera"]["height_m"] = json!(1.02);
+    label["camera"]["height_sigma_m"] = json!(0.005);
+    label["surface"]["wall"] = json!({ "height_m": 0.05, "slope_deg": 8.0 });
+    io::write_json(&path, &label).unwrap();
+    let studio = Studio::over(dir.path());
+    open_photo(&mut browser, &studio, "bg0000.jpg");
+    browser.eval("document.querySelector('#more').open = true");
+    for (field, text) in [("#lens", "1.03"), ("#wall", "0.06")] {
+        browser.eval(&format!(
+            "(() => {{ const field = document.querySelector('{field}'); field.value = ''; \
+             field.dispatchEvent(new Event('input')); }})()"
+        ));
+        browser.fill(field, text);
+    }
+    browser.press("s", CTRL);
+    browser.wait("document.querySelector('footer').innerText.startsWith('saved')");
+    let label: Label = io::read_json(&path).unwrap();
+    let wall = label.surface.wall.unwrap();
+    assert_eq!(label.camera.height_m, Some(1.03));
+    assert_eq!(label.camera.height_sigma_m, Some(0.005));
+    assert_eq!((wall.height_m, wall.slope_deg), (Some(0.06), Some(8.0)));
+}
+
+#[test]
+fn a_mistyped_length_is_named_and_left_behind_with_its_photo() {
+    let Some(mut browser) = Browser::open(1360, 860) else {
+        return;
+    };
+    let dir = photos(&["bg0000", "bg0003"]);
+    let studio = Studio::over(dir.path());
+    open_photo(&mut browser, &studio, "bg0000.jpg");
+    browser.fill("#width", "0,5,6");
+    browser.press("s", CTRL);
+    browser.wait(
+        "document.querySelector('footer').innerText === 'not saved: width: 0,5,6, expected a length, a number'",
+    );
+    choose_photo(&mut browser, "bg0003.jpg");
+    let valid = browser.eval("document.querySelector('#width').validity.valid");
+    assert_eq!(valid, true);
+    browser.press("s", CTRL);
+    browser.wait("document.querySelector('footer').innerText.startsWith('saved bg0003')");
+    browser.assert_content();
+}
+
+#[test]
+fn what_is_typed_during_a_save_is_not_saved_and_a_save_at_a_time_is_asked_for() {
+    let Some(mut browser) = Browser::open(1360, 860) else {
+        return;
+    };
+    let dir = photos(&["bg0000"]);
+    let studio = Studio::over(dir.path());
+    open_photo(&mut browser, &studio, "bg0000.jpg");
+    hold_answers(&mut browser, "corners/save");
+    browser.eval("document.querySelector('#more').open = true");
+    browser.fill("#surface", "trayB");
+    browser.press("s", CTRL);
+    browser.wait("!!window.goOn");
+    browser.press("s", CTRL);
+    assert_eq!(browser.eval("window.asked"), 1);
+    browser.fill("#surface", "trayC");
+    browser.eval("window.goOn(), 0");
+    browser.wait("document.querySelector('footer').innerText.startsWith('saved')");
+    let mark = browser.text("[data-photo='bg0000.jpg'] .mark");
+    assert_eq!(mark, "not saved");
+    let label: Label = io::read_json(dir.path().join("bg0000.label.json")).unwrap();
+    assert_eq!(label.surface.id, "trayB");
+    choose_photo(&mut browser, "bg0001.jpg");
+    choose_photo(&mut browser, "bg0000.jpg");
+    let typed = browser.eval("document.querySelector('#surface').value");
+    assert_eq!(typed, "trayC");
+    browser.assert_content();
+}
+
+#[test]
+fn corners_that_moved_while_edges_were_looked_for_stay() {
+    let Some(mut browser) = Browser::open(1360, 860) else {
+        return;
+    };
+    let dir = photos(&["bg0000"]);
+    let studio = Studio::over(dir.path());
+    open_photo(&mut browser, &studio, "bg0000.jpg");
+    hold_answers(&mut browser, "corners/snap");
+    browser.press("s", 0);
+    browser.wait("!!window.goOn");
+    browser.press("r", 0);
+    browser.eval("window.goOn(), 0");
+    browser.wait("document.querySelector('footer').innerText.includes('moved meanwhile')");
+    browser.press("s", CTRL);
+    browser.wait("document.querySelector('footer').innerText.startsWith('saved')");
+    let label: Label = io::read_json(dir.path().join("bg0000.label.json")).unwrap();
+    let mut turned = truth("bg0000");
+    turned.rotate_left(1);
+    assert_eq!(label.surface.corners_px, Some(turned));
+}
+
+#[test]
+fn a_photo_that_contradicts_the_others_is_shown_with_its_warning() {
+    let Some(mut browser) = Browser::open(1360, 860) else {
+        return;
+    };
+    let dir = photos(&["bg0000", "bg0003"]);
+    let studio = Studio::over(dir.path());
+    open_photo(&mut browser, &studio, "bg0000.jpg");
+    browser.eval(
+        "(() => { const real = window.fetch; window.fetch = (path, options) => \
+         String(path).includes('corners/joint') ? Promise.resolve(Response.json([{ photo: 'bg0000.jpg', together: 2, \
+         focal_px: 900, focal_sigma: 0.01, rms_px: 0.2, why: 'contradicts the other photos' }])) : real(path, options); })()",
+    );
+    browser.click_on("#joint");
+    browser.wait_for("dialog table");
+    let shown = browser.text("dialog table");
+    assert!(
+        shown.contains("900 px") && shown.contains("contradicts the other photos"),
+        "{shown}"
+    );
 }

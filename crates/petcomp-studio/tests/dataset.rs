@@ -117,6 +117,30 @@ fn a_folder_that_is_listed_again_shifts_no_picture_of_the_first_list() {
     browser.assert_content();
 }
 
+#[test]
+fn nothing_of_another_picture_stands_beside_one_whose_record_cannot_be_read() {
+    let Some(mut browser) = Browser::open(1280, 800) else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let dataset = tray::with_dataset(dir.path(), COUNT);
+    let studio = Studio::over(dir.path());
+    browser.go(&studio.page("dataset?folder=dataset"));
+    browser.click_on(".tile[data-row='0']");
+    browser.wait_for("#details .objects tbody tr");
+    for part in std::fs::read_dir(dataset.join("scenes")).unwrap() {
+        for record in std::fs::read_dir(part.unwrap().path()).unwrap() {
+            std::fs::write(record.unwrap().path(), "{").unwrap();
+        }
+    }
+    browser.press("ArrowRight", 0);
+    browser.wait("document.querySelector('footer').className === 'bad'");
+    assert_eq!(browser.text(".pane .name"), format!("2 of {COUNT}"));
+    assert_eq!(browser.text("#details"), "");
+    let drawn = "document.querySelector('.pane canvas').width";
+    assert_eq!(browser.eval(drawn), 0);
+}
+
 /// A dataset of which only the list is there, but for its first picture's files.
 fn listed_only(folder: &Path, count: usize) {
     let text = r#"{ "format": 1, "classes": ["cap", "none"] }"#;

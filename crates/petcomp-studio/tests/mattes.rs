@@ -154,6 +154,45 @@ fn what_another_tab_has_saved_is_not_overwritten() {
     browser.drag(&dot);
     browser.wait("document.querySelector('footer').innerText.includes('has changed since')");
     assert_eq!(review(folder.path()), Some(other));
+    // The list tells what is in the file.
+    let marks =
+        "[...document.querySelectorAll('#photos .mark')].map((mark) => mark.textContent).join()";
+    assert_eq!(browser.eval(marks), ",");
+    browser.click_on("#photos button");
+    browser.wait(&format!("{marks} === 'rejected,'"));
+}
+
+#[test]
+fn nothing_of_another_photo_stands_beside_one_that_cannot_be_read() {
+    let Some(mut browser) = Browser::open(1280, 800) else {
+        return;
+    };
+    let folder = folder();
+    std::fs::write(folder.path().join("two.png"), "").unwrap();
+    let studio = Studio::over(folder.path());
+    showing(&mut browser, |browser| browser.go(&studio.page("mattes")));
+    browser.wait_for("#facts dd");
+    browser.click_on("[data-photo='two.png'] button");
+    browser.wait("document.querySelector('footer').className === 'bad'");
+    let told = "document.querySelectorAll('#flags li, #facts dd').length";
+    assert_eq!(browser.eval(told), 0);
+    let verdicts = "document.querySelectorAll('.verdicts button:disabled').length";
+    assert_eq!(browser.eval(verdicts), 2);
+}
+
+#[test]
+fn arrows_move_the_brush_that_has_the_focus() {
+    let Some(mut browser) = Browser::open(1280, 800) else {
+        return;
+    };
+    let folder = folder();
+    let studio = Studio::over(folder.path());
+    showing(&mut browser, |browser| browser.go(&studio.page("mattes")));
+    browser.press("o", 0);
+    browser.eval("document.querySelector('#radius').focus()");
+    browser.press("ArrowRight", 0);
+    browser.wait("document.querySelector('#radius').value === '46'");
+    assert_eq!(browser.eval("document.querySelector('#wipe').value"), "0");
 }
 
 /// A review of a picture of this size with so many strokes.

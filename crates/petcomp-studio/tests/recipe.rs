@@ -164,6 +164,76 @@ fn of_three_lights_the_first_is_removed_twice() {
     assert_eq!(powers.collect::<Vec<_>>(), [30.0]);
 }
 
+const EDITED: &str = "document.querySelectorAll('.setting.edited').length";
+
+/// A studio over a recipe alone, and its page.
+fn recipe_alone(browser: &mut Browser) -> (tempfile::TempDir, Studio) {
+    let dir = tempfile::tempdir().unwrap();
+    io::write_text(dir.path().join("recipe.toml"), tray::RECIPE).unwrap();
+    let studio = Studio::over(dir.path());
+    browser.go(&studio.page("recipe?file=recipe.toml"));
+    browser.wait_for(".setting");
+    (dir, studio)
+}
+
+/// The first number of a setting.
+fn number(path: &str) -> String {
+    format!("document.querySelector(\".setting[data-path='{path}'] input[type=number]\")")
+}
+
+fn set_number(browser: &mut Browser, path: &str, value: &str) {
+    let field = number(path);
+    browser.eval(&format!(
+        "{field}.value = '{value}'; {field}.dispatchEvent(new Event('change'))"
+    ));
+}
+
+#[test]
+fn settings_show_what_two_undos_at_once_leave() {
+    let Some(mut browser) = Browser::open(1440, 900) else {
+        return;
+    };
+    let (_dir, _studio) = recipe_alone(&mut browser);
+    let gain = format!("{}.value", number("scene.gain_ev"));
+    let before = browser.eval(&gain);
+    for (path, count) in [("scene.gain_ev", 1), ("scene.scale", 2)] {
+        set_number(&mut browser, path, "0.25");
+        browser.wait(&format!("{EDITED} === {count}"));
+    }
+    browser.eval("for (let i = 0; i < 2; i++) document.querySelector('#undo').click()");
+    browser.wait(&format!("{EDITED} === 0"));
+    assert_eq!(browser.eval(&gain), before);
+}
+
+#[test]
+fn an_edit_while_a_save_runs_stays_and_is_not_saved() {
+    let Some(mut browser) = Browser::open(1440, 900) else {
+        return;
+    };
+    let (dir, _studio) = recipe_alone(&mut browser);
+    set_number(&mut browser, "scene.scale", "0.25");
+    browser.wait(&format!("{EDITED} === 1"));
+    // The save has been made, and its end waits.
+    browser.eval(
+        "(() => { const asked = window.fetch; window.fetch = async (path, options) => { \
+         if (path.includes('recipe/open')) await new Promise((go) => { window.answer = go; }); \
+         return asked(path, options); }; })()",
+    );
+    browser.press("s", CTRL);
+    browser.wait("!!window.answer");
+    set_number(&mut browser, "scene.gain_ev", "0.25");
+    browser.wait(&format!("{EDITED} === 2"));
+    browser.eval("window.answer()");
+    browser.wait(&format!("{EDITED} === 1"));
+    let gain = format!("{}.value", number("scene.gain_ev"));
+    assert_eq!(browser.eval(&gain), "0.25");
+    let can_save = "!document.querySelector('#save').disabled";
+    assert_eq!(browser.eval(can_save), true);
+    let text = io::read_text(dir.path().join("recipe.toml")).unwrap();
+    assert!(text.contains("scale = [0.25"), "{text}");
+    assert!(!text.contains("gain_ev"), "{text}");
+}
+
 #[test]
 fn objects_need_be_large_enough_in_the_pictures_of_the_dataset_alone() {
     let dir = tempfile::tempdir().unwrap();
@@ -195,6 +265,16 @@ fn a_recipe_that_leads_out_of_the_folder_is_refused() {
         answer.contains("is not in the folder of this studio"),
         "{answer}"
     );
+}
+
+#[test]
+fn a_new_recipe_takes_no_name_of_another_file() {
+    let dir = tempfile::tempdir().unwrap();
+    io::write_text(dir.path().join("recipe.toml"), tray::RECIPE).unwrap();
+    let studio = Studio::over(dir.path());
+    let answer = studio.post("api/recipe/new", r#"{ "file": "recipe.toml" }"#);
+    let expected = "recipe.toml: there is such a file already";
+    assert!(answer.contains(expected), "{answer}");
 }
 
 #[test]

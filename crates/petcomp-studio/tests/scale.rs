@@ -20,6 +20,17 @@ fn two_ends_of_a_length_give_pixels_per_metre() {
     let studio = Studio::over(dir.path());
     browser.go(&studio.page("scale?photo=b0000_0.png"));
     browser.wait("document.querySelector('#title').innerText === 'b0000_0.png'");
+    // What is mistyped beside one photo is in nobody's way beside another.
+    let is_valid = "document.querySelector('#width').validity.valid";
+    browser.fill("#width", "0,5,6");
+    browser.wait(&format!("!{is_valid}"));
+    for photo in ["b0001_0.png", "b0000_0.png"] {
+        browser.click_on(&format!("[data-photo='{photo}'] button"));
+        browser.wait(&format!(
+            "document.querySelector('#title').innerText === '{photo}'"
+        ));
+    }
+    browser.wait(is_valid);
     let [left, top, width, height] = browser.place("#stage canvas");
     let at = |x: f64, y: f64| [left + x * width, top + y * height];
     browser.click(at(0.4, 0.5));
@@ -27,8 +38,14 @@ fn two_ends_of_a_length_give_pixels_per_metre() {
     browser.fill("#width", "0.1");
     browser.wait("document.querySelectorAll('#facts dt').length > 1");
     browser.screenshot("studio_scale");
-    browser.click_on("#save");
+    // Pressed twice, it saves once.
+    browser.eval(
+        "(() => { const asked = window.fetch; window.saves = 0; \
+         window.fetch = (path, options) => { window.saves += path.includes('scale/save'); return asked(path, options); }; \
+         for (let i = 0; i < 2; i++) document.querySelector('#save').click(); })()",
+    );
     browser.wait("document.querySelector('footer').innerText.includes('saved in photos.toml')");
+    assert_eq!(browser.eval("window.saves"), 1);
     let after = io::read_text(&list).unwrap();
     assert_ne!(before, after);
     let others = |text: &str| {

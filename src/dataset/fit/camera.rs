@@ -100,8 +100,14 @@ impl Fitting<'_> {
         let number = Path::new(picture)
             .file_stem()
             .and_then(|stem| stem.to_str()?.parse().ok());
-        let scene = number.and_then(|k| self.pipeline.draw(self.options.seed, k).ok());
-        scene.map_or_else(String::new, |scene| scene.plate)
+        let recipe = &self.config.scene;
+        let explained = |k: u64| {
+            self.pipeline
+                .explain_with(recipe, self.options.seed, k)
+                .ok()
+        };
+        let scene = number.and_then(explained);
+        scene.map_or_else(String::new, |(scene, _)| scene.plate)
     }
 }
 

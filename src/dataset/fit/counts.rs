@@ -3,7 +3,7 @@
 use super::falls::Fall;
 use super::statistics::{Moments, Weighted};
 use crate::eval::drawn;
-use crate::scene::Count;
+use crate::scene::{Count, Recipe};
 use libm::erf;
 use std::collections::BTreeMap;
 
@@ -168,7 +168,8 @@ pub(super) fn label_histogram(counts: &[usize]) -> Vec<f64> {
 ///
 /// # Method
 /// Expectation-maximisation from equal weights, smoothed by (1, 2, 1) / 4 in every step ([Silverman
-/// et al. 1990]): without, a few pictures leave a few peaks.
+/// et al. 1990]): without, a few pictures leave a few peaks. Pictures without objects are a kind of
+/// their own, and are not.
 ///
 /// [Silverman et al. 1990]: https://doi.org/10.1111/j.2517-6161.1990.tb01788.x
 pub(super) fn object_weights(odds: &LabelOdds, times: &[f64]) -> Vec<f64> {
@@ -178,7 +179,6 @@ pub(super) fn object_weights(odds: &LabelOdds, times: &[f64]) -> Vec<f64> {
     weights[0] = empty;
     for _ in 0..EM_STEPS {
         weights = smoothed(&maximised(odds, times, &weights));
-        weights[0] *= empty;
         normalise(&mut weights);
     }
     weights
@@ -196,13 +196,13 @@ fn maximised(odds: &LabelOdds, times: &[f64], weights: &[f64]) -> Vec<f64> {
     explained
 }
 
-/// Weights averaged with their neighbours; what would go beyond the ends stays.
+/// Weights averaged with their neighbours, but for that of no objects; what would go beyond the ends
+/// stays.
 fn smoothed(weights: &[f64]) -> Vec<f64> {
     let last = weights.len() - 1;
-    let at = |i: usize| weights[i];
-    (0..=last)
-        .map(|i| (at(i.saturating_sub(1)) + 2.0 * at(i) + at((i + 1).min(last))) / 4.0)
-        .collect()
+    let at = |i: usize| weights[i.clamp(1, last)];
+    let averaged = (1..=last).map(|i| (at(i - 1) + 2.0 * at(i) + at(i + 1)) / 4.0);
+    std::iter::once(weights[0]).chain(averaged).collect()
 }
 
 fn normalise(weights: &mut [f64]) {
@@ -213,20 +213,40 @@ fn normalise(weights: &mut [f64]) {
 }
 
 /// How much likelier each picture is with fitted weights than with others, on average: those that
-/// are fitted to all pictures but this one, natural logarithm.
+/// are fitted to all pictures but this one, natural logarithm. Both have the others' share without
+/// objects.
 pub(super) fn gain_on_pictures_left_out(odds: &LabelOdds, times: &[f64], others: &[f64]) -> f64 {
     let seen = times.iter().enumerate().filter(|(_, times)| **times > 0.0);
     let gains = seen.map(|(labels, n)| {
         let mut rest = times.to_vec();
         rest[labels] -= 1.0;
-        let fitted = object_weights(odds, &rest);
+        let fitted = with_empty(&object_weights(odds, &rest), others[0]);
         let [fitted, others] = [&fitted, others].map(|weights| odds.chance(weights, labels));
         n * (fitted.max(LEAST_ODDS) / others.max(LEAST_ODDS)).ln()
     });
     gains.sum::<f64>() / times.iter().sum::<f64>()
 }
 
-/// The weights that a recipe gives to numbers of objects up to `most`.
+/// The weights that a recipe gives to numbers of objects up to `most`: negatives have none.
+pub(super) fn recipe_weights(recipe: &Recipe, most: usize) -> Vec<f64> {
+    let weights = weights_of(&recipe.objects, most);
+    let filled = (1.0 - recipe.negatives) * (1.0 - weights[0]);
+    with_empty(&weights, 1.0 - filled)
+}
+
+/// The same weights, but for the share without objects.
+pub(super) fn with_empty(weights: &[f64], share: f64) -> Vec<f64> {
+    let mut weights = weights.to_vec();
+    weights[0] = 0.0;
+    normalise(&mut weights);
+    for weight in &mut weights {
+        *weight *= 1.0 - share;
+    }
+    weights[0] = share;
+    weights
+}
+
+/// The weights of numbers of objects up to `most`.
 pub(super) fn weights_of(count: &Count, most: usize) -> Vec<f64> {
     let mut weights = vec![0.0; most + 1];
     match count {
@@ -248,8 +268,10 @@ pub(super) fn weights_of(count: &Count, most: usize) -> Vec<f64> {
     weights
 }
 
-/// Weights as a recipe has them, in tenths of a percent, without those that are next to nothing.
+/// Weights as a recipe has them, in tenths of a percent, without those that are next to nothing and
+/// that of no objects.
 pub(super) fn count_of(weights: &[f64]) -> Count {
+    let weights = with_empty(weights, 0.0);
     let pairs = weights.iter().enumerate();
     let kept: Vec<_> = pairs.filter(|(_, w)| **w >= LEAST_WEIGHT).collect();
     Count::Weighted {
@@ -278,7 +300,7 @@ pub(super) fn mean_of(weights: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Draws;
+    use crate::scene::{Draws, Range};
 
     /// Falls of which each object has a label with this chance.
     fn falls(chance: f64) -> Vec<Fall> {
@@ -356,8 +378,32 @@ mod tests {
     }
 
     #[test]
+    fn empty_pictures_are_none_with_one_object() {
+        let odds = LabelOdds::new(&falls(1.0), 5);
+        let weights = object_weights(&odds, &[25.0, 0.0, 0.0, 8.0, 8.0, 9.0]);
+        assert!((weights[0] - 0.5).abs() < 0.01, "{weights:?}");
+        assert!(weights[1] < LEAST_WEIGHT, "{weights:?}");
+        let Count::Weighted { values, .. } = count_of(&weights) else {
+            panic!("no histogram")
+        };
+        assert!(values[0] > 1, "{values:?}");
+    }
+
+    #[test]
+    fn negatives_and_a_number_of_0_have_no_objects() {
+        let recipe = Recipe {
+            objects: Range::new(0.0, 3.0).into(),
+            negatives: 0.5,
+            ..Recipe::default()
+        };
+        let weights = recipe_weights(&recipe, 4);
+        assert_eq!(weights, [0.625, 0.125, 0.125, 0.125, 0.0]);
+        assert_eq!(with_empty(&weights, 0.25), [0.25, 0.25, 0.25, 0.25, 0.0]);
+    }
+
+    #[test]
     fn weights_are_those_of_the_recipe_and_back() {
-        let weights = weights_of(&crate::scene::Range::new(2.0, 5.0).into(), 24);
+        let weights = weights_of(&Range::new(2.0, 5.0).into(), 24);
         assert_eq!(weights[2..6], [0.25; 4]);
         let Count::Weighted { values, weights } = count_of(&weights) else {
             panic!("no histogram")

@@ -53,16 +53,20 @@ impl MeasuredSet {
     /// # Errors
     /// A folder without images; a label that cannot be read.
     pub(super) fn read(folder: &Path, width: u32) -> Result<Self> {
-        let set = LabelledSet::read(folder)?;
+        Ok(Self::new(LabelledSet::read(folder)?, width))
+    }
+
+    /// The same of pictures whose labels are read.
+    pub(super) fn new(set: LabelledSet, width: u32) -> Self {
         let pictures = set.spread(MAX_MEASURED).into_par_iter();
         let pixels = pictures.filter_map(|picture| {
             let pixels = PixelMeasures::read(picture, width as usize)?;
             Some((picture.path.to_string_lossy().into_owned(), pixels))
         });
-        Ok(Self {
+        Self {
             pixels: pixels.collect(),
             set,
-        })
+        }
     }
 
     /// Boxes of the pictures that have a label file.

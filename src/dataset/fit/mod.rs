@@ -6,7 +6,8 @@
 //! best (`counts`), and the spread is that whose labels lie as the real ones do (`starts`).
 //! Ranges of camera and light are fitted by the mean and the variance of what they add to
 //! (`knobs`), measured around the labels on pictures of the recipe as on the real ones. What the
-//! pictures do not decide, by a bootstrap over them and over the recipe's own, stays as it is.
+//! pictures do not decide, by a bootstrap over them and over the recipe's own, stays as it is. Of a
+//! sequence on a belt one picture is taken, and the recipe's own are made without one (`sequences`).
 
 mod camera;
 mod counts;
@@ -17,15 +18,17 @@ mod moved_paths;
 mod places;
 mod plates;
 mod report;
+mod sequences;
 mod starts;
 mod statistics;
 
+use crate::dataset::page::labelled_pictures::LabelledSet;
 use crate::dataset::recipe_text::{KeyEdit, with_edits};
 use crate::dataset::{DatasetConfig, Format, LabelConfig, Pictures, Pipeline, Yolo, generate};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::plot::Page;
-use crate::scene::Range;
+use crate::scene::{BeltRanges, Range, Recipe};
 use falls::stopped;
 use measured::MeasuredSet;
 use moved_paths::moved_paths;
@@ -105,12 +108,14 @@ pub fn fit(
     progress: &(dyn Fn(u64, u64) + Sync),
     stop: &'static AtomicBool,
 ) -> Result<Fit> {
-    let config = DatasetConfig::read(&plan.recipe, &[])?;
+    let recipe = DatasetConfig::read(&plan.recipe, &[])?;
+    let config = plain_pictures(&recipe);
     let pipeline = Pipeline::open(config.clone())?.stopped_by(stop);
     let plates = plates::measured_plates(&pipeline)?;
     let fitting = Fitting {
         moved_paths: moved_paths(&config, &plan.recipe, &plan.output)?,
         pipeline,
+        belt: recipe.scene.belt,
         config,
         options: plan.options,
         keys: Vec::new(),
@@ -125,9 +130,11 @@ pub fn fit(
 
 /// A recipe on its way.
 struct Fitting<'a> {
-    /// Of the recipe as it was.
+    /// Of the recipe as it was, without its belt.
     pipeline: Pipeline,
-    /// The recipe as far as it is fitted.
+    /// What the recipe's belt is.
+    belt: Option<BeltRanges>,
+    /// The recipe as far as it is fitted, of [plain pictures](plain_pictures).
     config: DatasetConfig,
     options: FitOptions,
     keys: Vec<FittedKey>,
@@ -152,14 +159,20 @@ impl Fitting<'_> {
         plates: &[MeasuredPlate],
         plan: &FitPlan,
     ) -> Result<Fit> {
-        let real = MeasuredSet::read(folder, self.config.scene.image[0])?;
+        let real = self.real_pictures(folder)?;
         check_labels(folder, &real)?;
         self.steps.expect(self.expected_steps());
         let before = self.rendered()?;
+        let negatives = self.config.scene.negatives;
         let weights = self.fit_places(&real)?;
         let matched = plates::match_objects(&mut self.config, plates);
         self.keys.extend(matched);
-        self.fit_camera(&real, &before)?;
+        // Negatives come from all photos of the place, and so have another light.
+        let refilled = match self.config.scene.negatives == negatives {
+            true => None,
+            false => Some(self.rendered()?),
+        };
+        self.fit_camera(&real, refilled.as_ref().unwrap_or(&before))?;
         let sets = Compared {
             after: self.rendered()?,
             real,
@@ -167,6 +180,16 @@ impl Fitting<'_> {
         };
         let page = report::of_pictures(&self.keys, &weights, &sets, plates);
         self.finish(plan, page)
+    }
+
+    /// Those of a folder: on a belt one of each sequence.
+    fn real_pictures(&self, folder: &Path) -> Result<MeasuredSet> {
+        let set = LabelledSet::read(folder)?;
+        let set = match &self.belt {
+            Some(belt) => sequences::one_of_each(&set, belt),
+            None => set,
+        };
+        Ok(MeasuredSet::new(set, self.config.scene.image[0]))
     }
 
     /// About so many falls and pictures.
@@ -201,7 +224,7 @@ impl Fitting<'_> {
     }
 
     fn render_into(&self, folder: &Path) -> Result<()> {
-        let pipeline = Pipeline::open(plain_pictures(&self.config))?.stopped_by(self.stop);
+        let pipeline = Pipeline::open(self.config.clone())?.stopped_by(self.stop);
         let FitOptions { pictures, seed, .. } = self.options;
         let plan = pipeline.plan(pictures, seed, folder)?;
         let sample = |k| pipeline.sample(seed, k).inspect(|_| self.steps.step());
@@ -209,9 +232,13 @@ impl Fitting<'_> {
     }
 }
 
-/// The recipe's pictures with boxes and nothing beside them.
+/// The recipe's pictures with boxes and nothing beside them, each of a fall of its own.
 fn plain_pictures(config: &DatasetConfig) -> DatasetConfig {
     DatasetConfig {
+        scene: Recipe {
+            belt: None,
+            ..config.scene.clone()
+        },
         labels: LabelConfig {
             formats: vec![Format::Yolo],
             yolo: Yolo {

@@ -3,7 +3,7 @@
 
 use super::counts::{self, LabelOdds, label_histogram};
 use super::falls::{Fall, FallPlan, log_size};
-use super::knobs::{Difference, SCALE};
+use super::knobs::{Difference, SCALE, three_digits};
 use super::measured::MeasuredSet;
 use super::starts::{self, Candidate, FittedLever, LEVERS, Lever, places_of};
 use super::statistics::{Bootstrapped, Moments, Weighted, rounds};
@@ -23,12 +23,15 @@ pub(super) const OBJECT_COUNTS: [usize; 17] = [
 const MIN_SATURATED: usize = 8;
 const SATURATED_RATIO: f64 = 1.05;
 const MAX_FLAT: usize = 2;
+/// Chance takes a share of pictures farther from its own, in standard deviations, in 2.5 % of cases.
+const CHANCE_SIGMAS: f64 = 2.24;
 /// So many times the falls, once it is known how objects fall.
 pub(super) const MORE_FALLS: u64 = 4;
 
 impl Fitting<'_> {
     /// Fits scale, spread, friction, scale again (what lies in a heap looks another size) and number
-    /// of objects, in this order, and returns the weights of the numbers.
+    /// of objects, which of none is the share of negatives, in this order, and returns the weights of
+    /// the numbers.
     pub(super) fn fit_places(&mut self, real: &MeasuredSet) -> Result<Vec<f64>> {
         let boxes = real.boxes();
         let counts: Vec<usize> = boxes.iter().map(Vec::len).collect();
@@ -199,65 +202,130 @@ impl Fitting<'_> {
     }
 
     fn fit_objects(&mut self, counts: &[usize], own: &Candidate) {
-        let before = self.config.scene.objects.clone();
-        let others = counts::weights_of(&before, own.odds.most_objects());
-        let redrawn = self.redrawn_counts(counts, own);
-        let gain = gain_over(&others, counts, own, &redrawn);
+        let scene = &mut self.config.scene;
+        let before = counts::recipe_weights(scene, own.odds.most_objects());
+        let redrawn = redrawn_counts(counts, own, self.options.seed);
+        let empty = EmptyShare::new(counts, own, &redrawn);
+        let gain = gain_over(&before, counts, own, &redrawn);
         let why = describe_objects(counts, own, &redrawn, &gain);
-        let mut key = unfitted("scene.objects", count_text(&before), why);
+        let mut objects = unfitted("scene.objects", count_text(&scene.objects), why);
+        let why = empty.describe(counts);
+        let mut negatives = unfitted("scene.negatives", scene.negatives.to_string(), why);
         let labels = own.odds.mean_labels(&own.weights);
-        if !self.is_mean_of(counts, labels) {
-            key.why += &unexplained(labels);
-        } else if gain.value > 0.0 && gain.is_decided() {
-            self.config.scene.objects = counts::count_of(&own.weights);
-            key.fitted = Some(count_text(&self.config.scene.objects));
+        let is_explained = is_mean_of(counts, labels, self.options.seed);
+        if !is_explained {
+            objects.why += &unexplained(labels);
+            negatives.why += &unexplained(labels);
         }
-        self.keys.push(key);
-    }
-
-    /// Rounds of a bootstrap over the real pictures and over the falls.
-    fn redrawn_counts(&self, counts: &[usize], own: &Candidate) -> Vec<RedrawnCounts> {
-        let seed = self.options.seed;
-        let most = counts.iter().copied().max().unwrap_or(0);
-        let pictures = rounds(counts.len(), seed).zip(0..);
-        let redrawn = pictures.map(|(times, round)| RedrawnCounts {
-            odds: LabelOdds::redrawn(&own.falls, most, (!seed, round)),
-            times: histogram_of(counts, &times),
-        });
-        redrawn.collect()
-    }
-
-    /// Whether pictures with so many labels on average could be the real ones.
-    fn is_mean_of(&self, counts: &[usize], labels: f64) -> bool {
-        let mean = |times: &[u32]| {
-            let sum: f64 = counts
-                .iter()
-                .zip(times)
-                .map(|(n, t)| *n as f64 * f64::from(*t))
-                .sum();
-            sum / counts.len() as f64
-        };
-        let redrawn = rounds(counts.len(), self.options.seed).map(|times| mean(&times));
-        let interval = interval(mean(&vec![1; counts.len()]), redrawn.collect());
-        (interval.low..=interval.high).contains(&labels)
+        let mut decided = [
+            empty.is_decided_against(before[0]),
+            gain.value > 0.0 && gain.is_decided(),
+        ];
+        // What names 0 objects has negatives in it: the one is not right without the other.
+        if counts::weights_of(&scene.objects, 1)[0] > 0.0 {
+            decided = [decided.contains(&true); 2];
+        }
+        let [is_empty_decided, are_numbers_decided] = decided.map(|is| is && is_explained);
+        if is_empty_decided {
+            scene.negatives = three_digits(own.weights[0]);
+            negatives.fitted = Some(scene.negatives.to_string());
+        }
+        if are_numbers_decided {
+            scene.objects = counts::count_of(&own.weights);
+            objects.fitted = Some(count_text(&scene.objects));
+        }
+        self.keys.extend([objects, negatives]);
     }
 }
 
-/// One round: how likely labels are, and how many pictures have each number of them.
+/// One round: how likely labels are, how many pictures have each number of them, and the weights of
+/// numbers of objects that explain those.
 struct RedrawnCounts {
     odds: LabelOdds,
     times: Vec<f64>,
+    weights: Vec<f64>,
 }
 
-/// How much likelier a picture that is left out is by fitted weights than by others.
+/// Rounds of a bootstrap over the real pictures and over the falls.
+fn redrawn_counts(counts: &[usize], own: &Candidate, seed: u64) -> Vec<RedrawnCounts> {
+    let most = counts.iter().copied().max().unwrap_or(0);
+    let pictures = rounds(counts.len(), seed).zip(0..);
+    let redrawn = pictures.map(|(times, round)| {
+        let odds = LabelOdds::redrawn(&own.falls, most, (!seed, round));
+        let times = histogram_of(counts, &times);
+        RedrawnCounts {
+            weights: counts::object_weights(&odds, &times),
+            odds,
+            times,
+        }
+    });
+    redrawn.collect()
+}
+
+/// Whether pictures with so many labels on average could be the real ones.
+fn is_mean_of(counts: &[usize], labels: f64, seed: u64) -> bool {
+    let mean = |times: &[u32]| {
+        let sum: f64 = counts
+            .iter()
+            .zip(times)
+            .map(|(n, t)| *n as f64 * f64::from(*t))
+            .sum();
+        sum / counts.len() as f64
+    };
+    let redrawn = rounds(counts.len(), seed).map(|times| mean(&times));
+    let interval = interval(mean(&vec![1; counts.len()]), redrawn.collect());
+    (interval.low..=interval.high).contains(&labels)
+}
+
+/// Share of the real pictures that have no objects.
+struct EmptyShare {
+    value: f64,
+    /// What it is in the rounds of a bootstrap.
+    rounds: Vec<f64>,
+    pictures: usize,
+}
+
+impl EmptyShare {
+    fn new(counts: &[usize], own: &Candidate, redrawn: &[RedrawnCounts]) -> Self {
+        Self {
+            value: own.weights[0],
+            rounds: redrawn.iter().map(|r| r.weights[0]).collect(),
+            pictures: counts.len(),
+        }
+    }
+
+    /// Whether a recipe's share is another: by a bootstrap, and by what chance leaves of that share,
+    /// since all rounds agree where no picture is empty.
+    fn is_decided_against(&self, before: f64) -> bool {
+        let rounds = self.rounds.iter().map(|share| share - before);
+        let sigma = (before * (1.0 - before) / self.pictures as f64).sqrt();
+        let difference = self.value - before;
+        difference.abs() > CHANCE_SIGMAS * sigma
+            && Bootstrapped::new(difference, rounds).is_decided()
+    }
+
+    fn describe(&self, counts: &[usize]) -> String {
+        let interval = interval(self.value, self.rounds.clone());
+        let [value, low, high] = [interval.value, interval.low, interval.high].map(|s| 100.0 * s);
+        let unlabelled = counts.iter().filter(|labels| **labels == 0).count();
+        format!(
+            "{unlabelled} of {} pictures have no label, {value:.0} % ({low:.0} to {high:.0}) no objects",
+            self.pictures
+        )
+    }
+}
+
+/// How much likelier a picture that is left out is by fitted weights than by those of before, with
+/// as many pictures without objects.
 fn gain_over(
-    others: &[f64],
+    before: &[f64],
     counts: &[usize],
     own: &Candidate,
     redrawn: &[RedrawnCounts],
 ) -> Bootstrapped {
+    let others = counts::with_empty(before, own.weights[0]);
     let gain =
-        |odds: &LabelOdds, times: &[f64]| counts::gain_on_pictures_left_out(odds, times, others);
+        |odds: &LabelOdds, times: &[f64]| counts::gain_on_pictures_left_out(odds, times, &others);
     let rounds = redrawn.iter().map(|r| gain(&r.odds, &r.times));
     Bootstrapped::new(gain(&own.odds, &label_histogram(counts)), rounds)
 }
@@ -268,7 +336,7 @@ fn describe_objects(
     redrawn: &[RedrawnCounts],
     gain: &Bootstrapped,
 ) -> String {
-    let mean = |r: &RedrawnCounts| counts::mean_of(&counts::object_weights(&r.odds, &r.times));
+    let mean = |r: &RedrawnCounts| counts::mean_of(&r.weights);
     let interval = interval(
         counts::mean_of(&own.weights),
         redrawn.iter().map(mean).collect(),

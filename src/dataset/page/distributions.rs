@@ -20,10 +20,14 @@ const MAX_CLASS_MAPS: usize = 12;
 
 /// Adds every drawn value against its distribution.
 pub(super) fn add_drawn(page: &mut Page, summary: &Summary) {
-    page.heading("What was drawn").text(
-        "Bars: values in the dataset. Dashed line: the recipe's distribution; about one bar in twenty lies outside the \
+    let values = match summary.is_on_belt() {
+        true => "values in the dataset, one for each of its sequences",
+        false => "values in the dataset",
+    };
+    page.heading("What was drawn").text(&format!(
+        "Bars: {values}. Dashed line: the recipe's distribution; about one bar in twenty lies outside the \
          band around it by chance. What does not vary is in the table below.",
-    );
+    ));
     let (mut charts, fixed) = drawn_values(summary);
     let chosen = summary.chosen.iter();
     charts.extend(chosen.map(|(what, counts)| choice_histogram(what, counts)));

@@ -3,11 +3,11 @@
 use super::Darkroom;
 use super::painted_plane::PaintedPlane;
 use crate::filter::sample_bilinear;
-use crate::geom::{BBox, Point2, Point3, Vector3};
+use crate::geom::{BBox, Point2, Point3};
 use crate::image::Image;
 use crate::light;
 use crate::pixel::{Film, LinearRgb, Mix};
-use crate::render::light_samples::LightSamples;
+use crate::render::light_samples::{LightSamples, LitPatch};
 use crate::render::view::ScenePlane;
 use crate::scene::{Card, Cylinder};
 use std::f32::consts::PI;
@@ -93,8 +93,12 @@ impl BentShading {
         let behind = plane.is_seen_from_behind(&darkroom.view.eye);
         let side = if behind { -1.0 } else { 1.0 };
         let light_at = |arc: f64| {
-            let normal = card.quad.world_from_card.rotation * cylinder.normal(arc) * side;
-            open_irradiance(darkroom, &plane.center, &normal)
+            let patch = LitPatch {
+                center: plane.center,
+                normal: card.quad.world_from_card.rotation * cylinder.normal(arc) * side,
+                reach: plane.half_length(),
+            };
+            open_irradiance(darkroom, &patch)
         };
         let flat = light_at(0.0);
         let nodes = (0..SHADING_NODES).map(|k| {
@@ -118,18 +122,14 @@ impl BentShading {
     }
 }
 
-/// Irradiance at a point over the surface with nothing but the surface in the way.
-fn open_irradiance(
-    darkroom: &Darkroom<'_>,
-    point: &Vector3<f64>,
-    normal: &Vector3<f64>,
-) -> LinearRgb {
-    let (shot, options) = (darkroom.shot, darkroom.options);
+/// Irradiance in the middle of a patch over the surface with nothing but the surface in the way.
+fn open_irradiance(darkroom: &Darkroom<'_>, patch: &LitPatch) -> LinearRgb {
+    let (shot, options, normal) = (darkroom.shot, darkroom.options, &patch.normal);
     // A plane at an angle to the surface sees this share of the sky over it.
     let sky = shot.ambient.scale(PI * (0.5 + 0.5 * normal.z) as f32);
-    let faces = LightSamples::faces_above(shot, options, point, normal);
+    let faces = LightSamples::faces_above(shot, options, patch);
     let lit = faces.iter().fold(sky, |sum, group| {
-        let irradiance = group.unit_irradiance(point, normal) as f32;
+        let irradiance = group.unit_irradiance(&patch.center, normal) as f32;
         sum + group.radiance.scale(irradiance)
     });
     let maps = shot.environment.iter().filter(|map| map.strength != 0.0);

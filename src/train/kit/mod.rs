@@ -84,22 +84,27 @@ const VARIANTS: [Variant; 5] = [
 /// `balanced.py`, `commands.sh`.
 ///
 /// Lists and `path:` are whole paths, since YOLOv5 takes others from the folder of its clone: the
-/// kit may be written anywhere, but then neither it nor the datasets may move.
+/// kit may be written anywhere, but then neither it nor the datasets may move. Where no synthetic
+/// image is for validation, the variants that need some are left out, which `commands.sh` says.
 ///
 /// # Errors
 /// Those of [`YoloSet::open`] and [`Balance::weights`]; [`Error::Value`] when the two datasets name
 /// other classes.
 pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
-    let real = open_set(&options.real)?;
-    let synthetic = open_set(&options.synthetic)?;
+    let real = YoloSet::open(&whole_folder(&options.real)?)?;
+    let synthetic = open_for_training(&whole_folder(&options.synthetic)?)?;
     check_classes([&real, &synthetic], [&options.real, &options.synthetic])?;
     let counts = [real.train.len() as u64, synthetic.train.len() as u64];
     let balance = balance_document(&options.balance, counts)?;
+    let (variants, left_out) = VARIANTS
+        .iter()
+        .partition::<Vec<_>, _>(|variant| variant.has_validation(&synthetic));
     io::create_folder(folder)?;
     write_lists(folder, &real, &synthetic)?;
-    write_variants(folder, &real.classes)?;
+    write_variants(folder, &variants, &real.classes)?;
     io::write_json(folder.join("balance.json"), &balance)?;
-    write_scripts(folder, &training_commands(options, counts))
+    let commands = commands_head(options, counts) + &without_validation(&left_out);
+    write_scripts(folder, &(commands + &training_commands(options, &variants)))
 }
 
 fn write_scripts(folder: &Path, commands: &str) -> Result<()> {
@@ -108,9 +113,9 @@ fn write_scripts(folder: &Path, commands: &str) -> Result<()> {
     io::write_text(folder.join("commands.sh"), commands)
 }
 
-fn write_variants(folder: &Path, classes: &[String]) -> Result<()> {
+fn write_variants(folder: &Path, variants: &[&Variant], classes: &[String]) -> Result<()> {
     let whole = io::absolute(folder)?;
-    for variant in &VARIANTS {
+    for variant in variants {
         let path = folder.join(format!("{}.yaml", variant.name));
         io::write_text(path, &variant.to_yaml(&whole, classes))?;
     }
@@ -161,12 +166,30 @@ fn write_list(path: &Path, images: &[PathBuf]) -> Result<()> {
     io::write_text(path, &lines)
 }
 
-fn open_set(folder: &Path) -> Result<YoloSet> {
-    let whole = std::fs::canonicalize(folder).map_err(|e| Error::file(folder, e))?;
-    YoloSet::open(&whole)
+fn whole_folder(folder: &Path) -> Result<PathBuf> {
+    std::fs::canonicalize(folder).map_err(|e| Error::file(folder, e))
+}
+
+/// A set to learn from, which may have no images for validation.
+///
+/// # Errors
+/// Those of [`YoloSet::read`], and [`Error::File`] where no images are for training.
+#[doc(hidden)]
+pub fn open_for_training(folder: &Path) -> Result<YoloSet> {
+    let set = YoloSet::read(folder)?;
+    if set.train.is_empty() {
+        let what = "train: no images, expected at least one";
+        return Err(Error::file(folder.join("data.yaml"), what));
+    }
+    Ok(set)
 }
 
 impl Variant {
+    /// Whether there are images to choose the best epoch by; a synthetic dataset may have none.
+    fn has_validation(&self, synthetic: &YoloSet) -> bool {
+        !synthetic.val.is_empty() || !self.val.contains(&"synthetic_val")
+    }
+
     /// With a string of JSON for the kit's folder, which is one of YAML too.
     fn to_yaml(&self, folder: &Path, classes: &[String]) -> String {
         let path = serde_json::json!(folder.to_string_lossy());
@@ -178,16 +201,16 @@ impl Variant {
     }
 }
 
-/// The commands of all trainings, with equally many updates for the single sources told in words.
-fn training_commands(options: &KitOptions, counts: [u64; 2]) -> String {
+/// The commands of all trainings.
+fn training_commands(options: &KitOptions, variants: &[&Variant]) -> String {
     let KitOptions {
         seeds,
         epochs,
         batch,
         ..
     } = options;
-    let mut text = commands_head(options, counts);
-    for Variant { name, .. } in VARIANTS.iter().filter(|v| v.name != "combined") {
+    let mut text = String::new();
+    for Variant { name, .. } in variants.iter().filter(|v| v.name != "combined") {
         text += &format!(
             "\n# {name}\nfor seed in $(seq 1 {seeds}); do\n  python \"$YOLOV5/train.py\" --data {name}.yaml --hyp hyp.yaml \
              --weights yolov5s.pt --img 640 --epochs {epochs} --batch-size {batch} --cos-lr --seed \"$seed\" \
@@ -213,6 +236,16 @@ fn commands_head(options: &KitOptions, [real, synthetic]: [u64; 2]) -> String {
     )
 }
 
+/// Which variants there are no images for.
+fn without_validation(left_out: &[&Variant]) -> String {
+    if left_out.is_empty() {
+        return String::new();
+    }
+    let names: Vec<_> = left_out.iter().map(|variant| variant.name).collect();
+    let names = names.join(", ");
+    format!("# Left out, since no synthetic image is for validation: {names}.\n")
+}
+
 fn yaml_list(names: &[&str]) -> String {
     names
         .iter()
@@ -225,11 +258,10 @@ mod tests {
     use super::*;
     use crate::{Image, LinearRgb};
 
-    fn dataset(root: &Path, name: &str, train: usize, names: &str) -> PathBuf {
+    fn dataset(root: &Path, name: &str, [train, val]: [usize; 2], names: &str) -> PathBuf {
         let folder = root.join(name);
-        for part in ["train", "val"] {
+        for (part, count) in [("train", train), ("val", val)] {
             io::create_folder(folder.join("images").join(part)).unwrap();
-            let count = if part == "train" { train } else { 1 };
             for i in 0..count {
                 let path = folder.join("images").join(part).join(format!("{i}.png"));
                 io::write(path, &Image::filled(16, 16, LinearRgb::WHITE)).unwrap();
@@ -246,7 +278,7 @@ mod tests {
     /// A kit of two real images and six synthetic ones.
     fn written(root: &Path, name: &str) -> PathBuf {
         let [real, synthetic] =
-            [("real", 2), ("made", 6)].map(|(name, n)| dataset(root, name, n, "[cap]"));
+            [("real", 2), ("made", 6)].map(|(name, n)| dataset(root, name, [n, 1], "[cap]"));
         let kit = root.join(name);
         write(&kit, &KitOptions::new(real, synthetic)).unwrap();
         kit
@@ -277,6 +309,27 @@ mod tests {
         );
         let commands = io::read_text(kit.join("commands.sh")).unwrap();
         assert!(commands.contains("seq 1 6") && commands.contains("--cos-lr"));
+    }
+
+    #[test]
+    fn a_synthetic_dataset_may_be_for_training_alone() {
+        let root = tempfile::tempdir().unwrap();
+        let real = dataset(root.path(), "real", [2, 1], "[cap]");
+        let made = dataset(root.path(), "made", [6, 0], "[cap]");
+        let kit = root.path().join("kit");
+        write(&kit, &KitOptions::new(&real, &made)).unwrap();
+        let commands = io::read_text(kit.join("commands.sh")).unwrap();
+        let left_out = "for validation: synthetic, concatenated_val_both.\n";
+        assert!(commands.contains(left_out), "{commands}");
+        let names = VARIANTS.map(|variant| variant.name);
+        let there = names.map(|name| kit.join(format!("{name}.yaml")).exists());
+        assert_eq!(there, [true, false, true, false, true]);
+        assert!(!commands.contains("--data synthetic.yaml"), "{commands}");
+        let said = write(&kit, &KitOptions::new(made, real)).unwrap_err();
+        assert!(
+            said.to_string()
+                .ends_with("val: no images, expected at least one")
+        );
     }
 
     #[test]
@@ -315,8 +368,8 @@ mod tests {
     #[test]
     fn other_classes_are_refused() {
         let root = tempfile::tempdir().unwrap();
-        let real = dataset(root.path(), "real", 2, "[cap]");
-        let made = dataset(root.path(), "made", 2, "[cap, label]");
+        let real = dataset(root.path(), "real", [2, 1], "[cap]");
+        let made = dataset(root.path(), "made", [2, 1], "[cap, label]");
         let said = write(&root.path().join("kit"), &KitOptions::new(real, made))
             .unwrap_err()
             .to_string();

@@ -1,15 +1,16 @@
 //! `petcomp dataset ablate`: datasets of the same scenes that differ in one switch of the recipe,
 //! the paper's or any other.
 
-use super::output::folder_parser;
 use super::{LongRunConsent, generate_supervised, print_counts};
 use crate::documents::RecipeArgs;
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
+use crate::output::folder_parser;
 use crate::print;
 use petcomp::Error;
 use petcomp::dataset::{DatasetConfig, Pipeline};
 use petcomp::io::{self, Override};
+use petcomp::scene::Draws;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -38,11 +39,12 @@ pub(crate) fn run(args: &AblateArgs, global: &GlobalArgs) -> anyhow::Result<()> 
     for (name, config) in &datasets {
         check_recipe(&args.output.join(name), config)?;
     }
-    for (name, config) in datasets {
+    for (name, config) in &datasets {
+        write_recipe(&args.output.join(name), config)?;
+    }
+    for (name, _) in &datasets {
         let folder = args.output.join(name);
-        io::create_folder(&folder)?;
         let recipe = recipe_in(&folder);
-        config.write(&recipe)?;
         print::line(recipe.display());
         if args.count > 0 {
             args.generate(&recipe, &dataset_in(&folder), global)?;
@@ -70,6 +72,11 @@ fn check_recipe(folder: &Path, config: &DatasetConfig) -> petcomp::Result<()> {
         dataset.display()
     );
     Err(Error::file(recipe, what))
+}
+
+fn write_recipe(folder: &Path, config: &DatasetConfig) -> petcomp::Result<()> {
+    io::create_folder(folder)?;
+    config.write(recipe_in(folder))
 }
 
 impl AblateArgs {
@@ -102,10 +109,24 @@ impl AblateArgs {
     }
 }
 
-/// The switch without what file names cannot have everywhere.
+/// Most bytes of a switch in its folder's name, of which file systems take 255.
+const MAX_NAME: usize = 100;
+
+/// The switch without what file names cannot have everywhere; a long one ends in its hash.
 fn folder_name(switch: &Override) -> String {
-    let text = switch.to_string().replace([' ', '"'], "");
+    let switch = switch.to_string();
+    let name = plain_name(&switch);
+    if name.len() <= MAX_NAME {
+        return name;
+    }
+    let hash = Draws::new(0, 0).bits(&switch);
+    format!("{}-{hash:016x}", &name[..MAX_NAME])
+}
+
+/// In ASCII.
+fn plain_name(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "._-=,[]".contains(c);
+    let text = text.replace([' ', '"'], "");
     text.chars()
         .map(|c| if is_plain(c) { c } else { '_' })
         .collect()
@@ -124,5 +145,13 @@ mod tests {
             "scene.finish.noise=match_plate"
         );
         assert_eq!(name("assets=../b"), "assets=.._b");
+    }
+
+    #[test]
+    fn long_switches_have_short_names_of_their_own() {
+        let name =
+            |last: &str| folder_name(&format!("a={}{last}", "é".repeat(300)).parse().unwrap());
+        assert!(name("1").len() <= 120);
+        assert_ne!(name("1"), name("2"));
     }
 }

@@ -1,12 +1,12 @@
 //! `petcomp dataset generate`: a recipe becomes images with labels.
 
-use super::output::Output;
 use super::{
     LongRunConsent, generate_supervised, print_counts, print_trainer_inputs, write_contact_sheet,
 };
 use crate::documents::{RecipeArgs, at_quality};
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
+use crate::output::Output;
 use crate::print;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use petcomp::dataset::{self, DatasetConfig, Pipeline, Plan};
@@ -59,13 +59,14 @@ pub(crate) struct GenerateArgs {
 }
 
 pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let (config, range) = (args.config()?, args.sample_range()?);
+    let (whole, range) = (args.whole_config()?, args.sample_range()?);
+    let (whole_px, config) = (whole.scene.image, args.reduced(whole));
     let archives = config.labels.archives();
     let folder = range.folder(&args.output.folder(args.scratch.as_deref())?, archives);
     if args.resume {
         args.repair(&folder, range, archives.is_some())?;
     }
-    let pipeline = Pipeline::open(config)?.stopped_by(interruption());
+    let pipeline = Pipeline::open_reduced(config, whole_px)?.stopped_by(interruption());
     let plan = args.plan(&pipeline, range, &folder)?;
     let counts = generate_supervised(&pipeline, &plan, &args.consent, global)?;
     print_counts(&counts);
@@ -92,13 +93,17 @@ impl GenerateArgs {
         }
     }
 
-    /// The recipe as the flags change it.
-    fn config(&self) -> anyhow::Result<DatasetConfig> {
-        let config = at_quality(self.quality, self.recipe.read_config()?);
-        Ok(match self.preview {
-            Some(_) => config.preview(),
-            None => config,
-        })
+    /// The recipe as the flags change it, in pictures of its own size.
+    fn whole_config(&self) -> anyhow::Result<DatasetConfig> {
+        Ok(at_quality(self.quality, self.recipe.read_config()?))
+    }
+
+    /// The same for the pictures that are asked for.
+    fn reduced(&self, whole: DatasetConfig) -> DatasetConfig {
+        match self.preview {
+            Some(_) => whole.preview(),
+            None => whole,
+        }
     }
 
     fn plan(

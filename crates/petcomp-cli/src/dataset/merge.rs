@@ -1,9 +1,9 @@
 //! `petcomp dataset merge`: the shards of several machines become one dataset.
 
-use super::output::folder_parser;
 use super::{print_counts, print_trainer_inputs};
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
+use crate::output::folder_parser;
 use petcomp::dataset;
 use std::path::PathBuf;
 

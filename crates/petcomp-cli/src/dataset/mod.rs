@@ -6,7 +6,6 @@ mod fit;
 mod generate;
 mod inspect;
 mod merge;
-mod output;
 mod recipe;
 mod select;
 mod supervised;

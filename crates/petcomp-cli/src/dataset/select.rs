@@ -1,10 +1,10 @@
 //! `petcomp dataset split` and `subset`: lists of images, without copies.
 
-use super::output::folder_parser;
-use crate::asset::check_companion;
 use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
+use crate::output::folder_parser;
 use crate::print;
+use crate::values::check_companion;
 use petcomp::Error;
 use petcomp::dataset::{Group, Leakage, NEAR_DUPLICATE_RMS, NearDuplicate, Partition, YoloSet};
 use std::path::{Path, PathBuf};
@@ -72,7 +72,7 @@ pub(super) fn run(command: &SelectCommand, global: &GlobalArgs) -> anyhow::Resul
 
 fn write_split(args: &SplitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let how = args.partition()?;
-    check_own_folder(&args.folder, &args.output)?;
+    check_sources_stay(&args.folder, &args.output)?;
     let set = YoloSet::read(&args.folder)?;
     let split = set.partitioned(how, args.ratio, args.seed)?;
     check_both_parts(&split, &scarce(how, args.ratio))?;
@@ -103,10 +103,10 @@ impl SplitArgs {
     }
 }
 
-/// Fails where the lists would replace the data.yaml that they are made from.
-fn check_own_folder(folder: &Path, output: &Path) -> anyhow::Result<()> {
-    let [read, written] = [folder, output].map(|folder| folder.join("data.yaml"));
-    check_distinct([read], [written])
+/// Fails where a list or the data.yaml would replace one that they are made from.
+fn check_sources_stay(folder: &Path, output: &Path) -> anyhow::Result<()> {
+    let written = ["train.txt", "val.txt", "data.yaml"].map(|file| output.join(file));
+    check_distinct(YoloSet::choosing_files(folder)?, written)
 }
 
 /// Of what there may be too few, for which options.
@@ -130,7 +130,7 @@ fn check_both_parts(set: &YoloSet, scarce: &str) -> petcomp::Result<()> {
 }
 
 fn write_subset(args: &SubsetArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    check_own_folder(&args.folder, &args.output)?;
+    check_sources_stay(&args.folder, &args.output)?;
     let set = YoloSet::read(&args.folder)?;
     let subset = set.head(args.head)?;
     check_no_part_is_lost(args.head, &set, &subset)?;

@@ -1,6 +1,7 @@
 //! What trainings need of a dataset: batches, anchors, the kit for PyTorch.
 
 use crate::global::GlobalArgs;
+use crate::output::folder_parser;
 use crate::print;
 use crate::values::count;
 use clap::value_parser;
@@ -75,7 +76,7 @@ pub(crate) struct KitArgs {
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = value_parser!(u64).range(1..=1000))]
     seeds: u64,
     /// Folder to write
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
 }
 
@@ -124,8 +125,8 @@ struct MixedSets {
 
 impl MixedSets {
     fn open(args: &MixedSetArgs) -> petcomp::Result<Self> {
-        let real = YoloSet::open(&args.real)?;
-        let synthetic = YoloSet::open(&args.synthetic)?;
+        let real = train::kit::open_for_training(&args.real)?;
+        let synthetic = train::kit::open_for_training(&args.synthetic)?;
         train::kit::check_classes([&real, &synthetic], [&args.real, &args.synthetic])?;
         let counts = [&real, &synthetic].map(|set| set.train.len() as u64);
         Ok(Self {
@@ -197,7 +198,7 @@ impl KitArgs {
 }
 
 fn fit_anchors(args: &AnchorsArgs) -> anyhow::Result<()> {
-    let set = YoloSet::open(&args.folder)?;
+    let set = train::kit::open_for_training(&args.folder)?;
     let truth = read_yolo_truth_of(&set.train)?;
     let sides = box_sides(&truth, f64::from(args.side));
     print_anchors(&train::anchors(&sides, args.count, args.seed));

@@ -3,6 +3,7 @@
 use crate::diagnostics::report_diagnostics;
 use crate::documents::read_options;
 use crate::global::GlobalArgs;
+use crate::output::folder_parser;
 use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, Segmentation, segment};
 use petcomp::{Coverage, Image, LinearRgb, io};
 use std::path::{Path, PathBuf};
@@ -12,7 +13,7 @@ pub(crate) struct SegmentArgs {
     /// Photo of one object on a uniform screen or board
     photo: PathBuf,
     /// Folder for the pictures
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
     /// Options to use instead of the defaults, as TOML
     #[arg(long, value_name = "FILE")]

@@ -21,14 +21,34 @@ pub(super) struct JointPhoto {
     why: Option<String>,
 }
 
+impl JointPhoto {
+    fn without_camera(photo: &str, why: String) -> Self {
+        Self {
+            photo: photo.into(),
+            together: 1,
+            focal_px: None,
+            focal_sigma: None,
+            rms_px: None,
+            why: Some(why),
+        }
+    }
+}
+
 /// Solves the labels of photos, those of each camera together, and writes the cameras, as
-/// `petcomp camera joint` does.
+/// `petcomp camera joint` does. A label that cannot be read keeps no other from its camera.
 pub(super) fn solve(folder: &Folder, photos: &[String]) -> Answer<Vec<JointPhoto>> {
-    let labelled = photos.iter().map(|photo| labelled(folder, photo));
-    let all: Vec<LabelledPhoto> = labelled.collect::<Answer<_>>()?;
-    let mut solved = Vec::new();
+    let (mut names, mut all, mut solved) = (Vec::new(), Vec::new(), Vec::new());
+    for photo in photos {
+        match labelled(folder, photo) {
+            Ok(label) => {
+                names.push(photo.clone());
+                all.push(label);
+            }
+            Err(refusal) => solved.push(JointPhoto::without_camera(photo, refusal.what)),
+        }
+    }
     for group in camera::group_by_camera(&labels_of(&all)) {
-        let (names, members) = (chosen(photos, &group), chosen(&all, &group));
+        let (names, members) = (chosen(&names, &group), chosen(&all, &group));
         solved.extend(solve_group(folder, &names, &members)?);
     }
     solved.sort_by(|a, b| a.photo.cmp(&b.photo));
@@ -49,7 +69,10 @@ fn solve_group(
     members: &[LabelledPhoto],
 ) -> Answer<Vec<JointPhoto>> {
     let labels = labels_of(members);
-    let joint = camera::solve_joint(&labels, &SolveOptions::default()).map_err(Error::from)?;
+    let joint = match camera::solve_joint(&labels, &SolveOptions::default()) {
+        Ok(joint) => joint,
+        Err(error) => return Ok(unsolved(names, &Error::from(error))),
+    };
     let mut solved = Vec::new();
     for ((name, member), outcome) in names.iter().zip(members).zip(joint.photos) {
         solved.push(written(folder, name, member, outcome, members)?);
@@ -58,6 +81,11 @@ fn solve_group(
         solved[outlier.photo].why = Some(outlier.diagnostic().to_string());
     }
     Ok(solved)
+}
+
+fn unsolved(names: &[String], error: &Error) -> Vec<JointPhoto> {
+    let unsolved = |name: &String| JointPhoto::without_camera(name, error.to_string());
+    names.iter().map(unsolved).collect()
 }
 
 /// A camera that fits and can see objects on the surface.

@@ -17,6 +17,8 @@ pub(super) struct LabelFile {
     label: Label,
     /// The state of the file; none where there is none yet.
     version: Option<String>,
+    /// Why the label of the other photo lent nothing.
+    remark: Option<String>,
 }
 
 /// Where the label of a photo lies.
@@ -26,22 +28,27 @@ pub(super) fn path(folder: &Folder, photo: &str) -> Answer<PathBuf> {
 }
 
 /// The label of a photo, or a new one, which the label of another photo (`like`) lends what they
-/// share.
+/// share. Where that one cannot be read, the new label begins without it, and says why.
 pub(super) fn read(folder: &Folder, photo: &str, like: Option<&str>) -> Answer<LabelFile> {
     let name = beside(photo, "label.json");
     if let Some(file) = folder.text_if_any(&name)? {
         return Ok(LabelFile {
             label: io::read_json(path(folder, photo)?)?,
             version: Some(file.version),
+            remark: None,
             name,
         });
     }
-    let like = like.map(|photo| label_of(folder, photo)).transpose()?;
+    let (like, remark) = match like.map(|photo| label_of(folder, photo)).transpose() {
+        Ok(like) => (like, None),
+        Err(refusal) => (None, Some(refusal.what)),
+    };
     let label = camera::init_label(&folder.file(photo)?, &path(folder, photo)?, like.as_ref())?;
     Ok(LabelFile {
         name,
         label,
         version: None,
+        remark,
     })
 }
 

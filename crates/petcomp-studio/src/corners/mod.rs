@@ -139,19 +139,13 @@ async fn find_markers(
         let photo = studio.photo(&asked.photo)?;
         let markers = camera::any_markers(&photo);
         let label = asked.label.markers.is_some() && !markers.is_empty();
-        let label = label.then(|| camera::with_markers(without_points(asked.label), &photo));
+        let label = label.then(|| camera::with_markers(asked.label, &photo));
         Ok(Json(FoundMarkers {
             markers: markers.iter().map(Into::into).collect(),
             label: label.transpose()?,
         }))
     })
     .await
-}
-
-/// Points of markers that were found before are found anew.
-fn without_points(mut label: Label) -> Label {
-    label.points.clear();
-    label
 }
 
 #[derive(Deserialize)]

@@ -11,6 +11,7 @@ use axum::http::StatusCode;
 use petcomp::asset::{List, PhotoEntry, ScreenSource, Verdict};
 use petcomp::matte::CutOutOptions;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -106,6 +107,9 @@ impl Photos {
                 Err(refusal) => problems.push(refusal.what),
             }
         }
+        // What is said of a photo holds for all that it is listed for.
+        let mut seen = BTreeSet::new();
+        photos.retain(|listed: &ListedPhoto| seen.insert(listed.photo.clone()));
         Self {
             photos,
             problems,
@@ -173,5 +177,15 @@ mod tests {
         let all = Photos::of(&folder);
         assert_eq!(all.photos[0].photo, "a.png");
         assert!(found(&all.photos[1].photo).is_err());
+    }
+
+    #[test]
+    fn a_photo_of_two_assets_stands_once() {
+        let dir = tempfile::tempdir().unwrap();
+        let line = |asset: &str| format!("a.png,{asset},c,0.2\n");
+        let text = format!("file,asset,class,length\n{}{}", line("a"), line("b"));
+        std::fs::write(dir.path().join("photos.csv"), text).unwrap();
+        let all = Photos::of(&Folder::open(dir.path()).unwrap());
+        assert_eq!((all.photos.len(), all.problems.len()), (1, 0));
     }
 }

@@ -3,6 +3,7 @@
 mod draft;
 mod preview;
 
+use crate::folder::Folder;
 use crate::message::{Json, Query};
 use crate::refusal::{Answer, Refusal};
 use crate::server::Page;
@@ -67,6 +68,16 @@ fn check_listed(file: &str) -> Answer<()> {
     Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
 }
 
+/// Fails on the name of a file that is there.
+fn check_free(folder: &Folder, file: &str) -> Answer<()> {
+    if folder.file(file).is_err() {
+        return Ok(());
+    }
+    let file = petcomp::printable(file);
+    let what = format!("{file}: there is such a file already, expected a new name");
+    Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
+}
+
 async fn told_settings() -> Answer<Json<Vec<SettingGroup>>> {
     blocking(|| Ok(Json(settings()))).await
 }
@@ -106,6 +117,7 @@ async fn begin(
 ) -> Answer<Json<String>> {
     blocking(move || {
         check_listed(&file)?;
+        check_free(&studio.folder, &file)?;
         let saved = studio.folder.save(&file, DatasetConfig::template(), None);
         saved.map(Json)
     })

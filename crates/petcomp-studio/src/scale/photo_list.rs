@@ -225,17 +225,20 @@ fn with_scale(text: &str, file: &str, new: &ScaledPhoto<'_>) -> String {
         }
         None => lines.extend(new_block(file, new, lines.is_empty())),
     }
-    lines.join("\n") + "\n"
+    let end = if text.contains("\r\n") { "\r\n" } else { "\n" };
+    lines.join(end) + end
 }
 
-/// The lines of a photo's table with another scale, before the empty ones at its end.
+/// The lines of a photo's table with another scale, before the empty ones and the remarks at its
+/// end: those may be the next photo's.
 fn changed_block(block: &[String], scale: PhotoScale) -> Vec<String> {
     let mut lines: Vec<String> = block
         .iter()
         .filter(|line| !is_scale(line))
         .cloned()
         .collect();
-    let last = lines.iter().rposition(|line| !line.trim().is_empty());
+    let says = |line: &String| !matches!(line.trim().chars().next(), None | Some('#'));
+    let last = lines.iter().rposition(says);
     let end = last.map_or(0, |last| last + 1);
     lines.splice(end..end, scale_lines(scale));
     lines
@@ -323,6 +326,17 @@ mod tests {
             "asset = \"a\"\npx_per_metre = 1966.7\n",
         );
         assert_eq!(scaled("a.jpg"), expected);
+    }
+
+    #[test]
+    fn remarks_of_the_next_photo_and_ends_of_lines_stay() {
+        let entry = |scale: &str| {
+            let rest = "\r\n# the lid\r\n[[photos]]\r\nfile = \"b.jpg\"\r\n";
+            format!("[[photos]]\r\nfile = \"a.jpg\"\r\n{scale}\r\n{rest}")
+        };
+        let before = entry("length = 0.2");
+        let after = with_scale(&before, "a.jpg", &cup("a.jpg", 1966.72));
+        assert_eq!(after, entry("px_per_metre = 1966.7"));
     }
 
     #[test]

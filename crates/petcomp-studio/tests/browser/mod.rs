@@ -321,7 +321,9 @@ fn complaint(event: &Value) -> Option<String> {
         }
         // A newer request took its place, which pages pass over.
         "Log.entryAdded"
-            if params["entry"]["text"].as_str().is_some_and(|text| text.contains("410")) =>
+            if params["entry"]["text"]
+                .as_str()
+                .is_some_and(|text| text.contains("410")) =>
         {
             None
         }

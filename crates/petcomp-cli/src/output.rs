@@ -1,6 +1,6 @@
-//! Where a dataset goes: a folder of this machine, or an object store.
+//! Where results go: a folder of this machine, or an object store.
 
-use crate::asset::check_companion;
+use crate::values::check_companion;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use petcomp::dataset::ArchiveStore;
 use petcomp::{Error, Result};
@@ -8,7 +8,7 @@ use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What `-o` says.
+/// What `-o` of a dataset says.
 #[derive(Clone, Debug)]
 pub(crate) enum Output {
     Folder(PathBuf),
