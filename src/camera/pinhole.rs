@@ -122,6 +122,15 @@ impl Camera {
         Homography(self.intrinsics() * plane)
     }
 
+    /// The same view with so many pixels more on every side.
+    pub(crate) fn widened(&self, margin_px: u32) -> Self {
+        Self {
+            image: self.image.map(|side| side + 2 * margin_px),
+            principal_px: self.principal_px + Vector2::repeat(f64::from(margin_px)),
+            ..*self
+        }
+    }
+
     /// The same view taken at another picture size: what the camera becomes when its picture is
     /// resized.
     pub fn resized(&self, image: [u32; 2]) -> Self {

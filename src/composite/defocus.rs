@@ -6,8 +6,8 @@
 //! generation", 1981), object by object: what an object hides in part is known by its own coverage,
 //! which samples keep, and its colour there is that of what is seen of it close by. Where the
 //! objects in a pixel are equally far out of focus their soft light simply adds up, as that of any
-//! blur; else the nearer ones hide the others behind them by their soft coverage. Of a disc that
-//! reaches over a border which the object touches the part inside counts as the whole.
+//! blur; else the nearer ones hide the others behind them by their soft coverage. What is beyond the
+//! border spreads into the picture, too: the scene is rendered as far as circles reach.
 //!
 //! The plate is a photo and has its own depth of field: of it only the shadows are blurred.
 
@@ -18,11 +18,11 @@ use crate::deep::{DeepImage, DeepSample};
 use crate::geom::{Plane, Point2};
 use crate::image::Image;
 use crate::pixel::{Depth, LinearRgb, Mix, ObjectId};
-use crate::scene::{Shot, ThinLens};
+use crate::render::{RenderOptions, render_beyond};
+use crate::scene::{Card, Shot, ThinLens};
 use crate::work::{self, Kind};
 use disc::{Disc, Discs};
 use rayon::prelude::*;
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -36,14 +36,18 @@ const KNOWN_SHARE: f32 = 0.05;
 /// Weight of the surface's shadow where nothing is seen of it.
 const HIDDEN_WEIGHT: f32 = 0.01;
 
-/// The deep picture as a shot's lens sees it; the same where that is sharp everywhere.
+/// The deep picture of a shot as its lens sees it; none where that is sharp everywhere.
 ///
 /// Coverage becomes soft with the light: labels are made of the picture before.
-pub fn defocus<'a>(deep: &'a DeepImage, shot: &Shot) -> Cow<'a, DeepImage> {
-    match shot.thin_lens {
-        None => Cow::Borrowed(deep),
-        Some(lens) => Cow::Owned(Focus::new(shot, lens).of(deep)),
+pub(super) fn defocus(deep: &DeepImage, shot: &Shot, options: &RenderOptions) -> Option<DeepImage> {
+    let focus = Focus::new(shot, shot.thin_lens?);
+    let mut objects = Objects::new();
+    add_samples(&mut objects, deep, 0);
+    let reach = focus.reach_of(&shot.cards);
+    if reach > 0 {
+        add_samples(&mut objects, &render_beyond(shot, reach, options), reach);
     }
+    Some(focus.of(deep, objects))
 }
 
 /// A lens in front of a shot's camera.
@@ -53,9 +57,13 @@ struct Focus<'a> {
     distortion: RadialDistortion,
 }
 
+/// The samples of every object, in the picture and around it.
+type Objects = BTreeMap<ObjectId, Vec<PlacedSample>>;
+
 /// A deep sample, where it is, and what it hides per channel.
 struct PlacedSample {
-    at: [usize; 2],
+    /// Column and row, which may be beyond the picture's border.
+    at: [isize; 2],
     sample: DeepSample,
     hidden: LinearRgb,
 }
@@ -76,8 +84,6 @@ struct SoftObject {
     columns: Range<usize>,
     rows: Range<usize>,
     pixels: Vec<SoftPixel>,
-    /// Columns and rows that it is known in: without end where it ends before the picture does.
-    known: [Range<isize>; 2],
     /// Pixels to the farthest that a circle of confusion of the picture reaches.
     reach: isize,
 }
@@ -98,15 +104,23 @@ impl<'a> Focus<'a> {
         }
     }
 
-    fn of(&self, deep: &DeepImage) -> DeepImage {
+    /// Pixels beyond the border from which cards spread into the picture.
+    fn reach_of(&self, cards: &[Card]) -> usize {
+        let corners = cards.iter().flat_map(|card| card.quad.corners());
+        let depths = corners.map(|corner| (self.camera.camera_from_world * corner).z);
+        Discs::of_radii(depths.map(|depth| self.radius_px(depth as f32))).reach()
+    }
+
+    fn of(&self, deep: &DeepImage, objects: Objects) -> DeepImage {
         work::add(Kind::Filters, 1);
-        let soft = self.soft_objects(deep);
+        let is_tinted = objects.values().flatten().any(PlacedSample::is_tinted);
+        let soft = self.soft_objects(objects, [deep.width(), deep.height()]);
         let (width, height) = (deep.width(), deep.height());
         let pixels: Vec<_> = (0..width * height)
             .into_par_iter()
             .map(|i| self.pixel(&soft, [i % width, i / width]))
             .collect();
-        let tints = if is_tinted(deep) {
+        let tints = if is_tinted {
             pixels.iter().flatten().map(|(_, tint)| *tint).collect()
         } else {
             Vec::new()
@@ -121,11 +135,9 @@ impl<'a> Focus<'a> {
     }
 
     /// Every object, each spread on its own.
-    fn soft_objects(&self, deep: &DeepImage) -> Vec<SoftObject> {
-        let objects = samples_by_object(deep);
+    fn soft_objects(&self, objects: Objects, size: [usize; 2]) -> Vec<SoftObject> {
         let depths = objects.values().flatten().map(|s| s.sample.depth.0);
         let discs = Discs::of_radii(depths.map(|depth| self.radius_px(depth)));
-        let size = [deep.width(), deep.height()];
         objects
             .into_par_iter()
             .map(|(object, samples)| self.soft_object(object, &samples, &discs, size))
@@ -139,15 +151,15 @@ impl<'a> Focus<'a> {
         discs: &Discs,
         size: [usize; 2],
     ) -> SoftObject {
-        let places = samples.iter().map(|placed| &placed.at);
-        let [columns, rows] =
-            [0, 1].map(|axis| around(places.clone(), discs.reach(), axis, size[axis]));
+        let [columns, rows] = [0, 1].map(|axis| {
+            let places = samples.iter().map(|placed| placed.at[axis]);
+            around(places, discs.reach(), size[axis])
+        });
         let mut soft = SoftObject {
             object,
             pixels: vec![SoftPixel::default(); columns.len() * rows.len()],
             columns,
             rows,
-            known: [0, 1].map(|axis| known(places.clone(), axis, size[axis])),
             reach: discs.reach() as isize,
         };
         for sample in samples {
@@ -217,18 +229,16 @@ fn without_tints(pixel: Vec<(DeepSample, LinearRgb)>) -> Vec<DeepSample> {
     pixel.into_iter().map(|(sample, _)| sample).collect()
 }
 
-fn is_tinted(deep: &DeepImage) -> bool {
-    places(deep).any(|[x, y]| !deep.tints(x, y).is_empty())
-}
-
 fn places(deep: &DeepImage) -> impl Iterator<Item = [usize; 2]> {
     let (width, height) = (deep.width(), deep.height());
     (0..height).flat_map(move |y| (0..width).map(move |x| [x, y]))
 }
 
-fn samples_by_object(deep: &DeepImage) -> BTreeMap<ObjectId, Vec<PlacedSample>> {
-    let mut objects: BTreeMap<ObjectId, Vec<PlacedSample>> = BTreeMap::new();
-    for [x, y] in places(deep) {
+/// Adds the samples of a picture, or of one with a margin around it: then those in the margin alone.
+fn add_samples(objects: &mut Objects, deep: &DeepImage, margin: usize) {
+    let inside = [deep.width(), deep.height()].map(|side| margin..side - margin);
+    let is_inside = |[x, y]: [usize; 2]| inside[0].contains(&x) && inside[1].contains(&y);
+    for [x, y] in places(deep).filter(|at| margin == 0 || !is_inside(*at)) {
         let tints = deep.tints(x, y);
         for (i, sample) in deep.at(x, y).iter().enumerate() {
             let tint = tints.get(i).copied();
@@ -236,60 +246,34 @@ fn samples_by_object(deep: &DeepImage) -> BTreeMap<ObjectId, Vec<PlacedSample>> 
                 .entry(sample.object)
                 .or_default()
                 .push(PlacedSample {
-                    at: [x, y],
+                    at: [x, y].map(|i| i as isize - margin as isize),
                     sample: *sample,
                     hidden: tint.unwrap_or(LinearRgb::grey(sample.visible)),
                 });
         }
     }
-    objects
 }
 
-/// Columns (or rows) of a picture of `size` that are closer to some places than `reach`.
-fn around<'a>(
-    places: impl Iterator<Item = &'a [usize; 2]> + Clone,
-    reach: usize,
-    axis: usize,
-    size: usize,
-) -> Range<usize> {
-    let places = places.map(|at| at[axis]);
-    let low = places.clone().min().unwrap_or(0).saturating_sub(reach);
-    let high = places.max().map_or(0, |last| last + 1 + reach);
-    low..high.min(size)
+/// Columns (or rows) of a picture of `size` that are closer to some others than `reach`.
+fn around(columns: impl Iterator<Item = isize> + Clone, reach: usize, size: usize) -> Range<usize> {
+    let (low, high) = (columns.clone().min(), columns.max());
+    let within = |column: isize| column.clamp(0, size as isize) as usize;
+    let [low, high] = [low.unwrap_or(0), high.map_or(0, |last| last + 1)];
+    within(low - reach as isize)..within(high + reach as isize)
 }
 
-/// Columns (or rows) that an object at some places is known in: those of a picture of `size`, and
-/// all beyond an end that it does not touch.
-fn known<'a>(
-    places: impl Iterator<Item = &'a [usize; 2]> + Clone,
-    axis: usize,
-    size: usize,
-) -> Range<isize> {
-    let touches = |end: usize| places.clone().any(|at| at[axis] == end);
-    let low = if touches(0) { 0 } else { isize::MIN / 2 };
-    let high = if touches(size - 1) {
-        size as isize
-    } else {
-        isize::MAX / 2
-    };
-    low..high
+impl PlacedSample {
+    fn is_tinted(&self) -> bool {
+        self.hidden != LinearRgb::grey(self.hidden.g)
+    }
 }
 
 impl SoftObject {
-    /// Adds a sample to every pixel of its disc, by its share of the disc around that pixel as far
-    /// as the object is known there: beyond a border that it touches it is not.
+    /// Adds a sample to every pixel of its disc.
     fn spread(&mut self, placed: &PlacedSample, disc: &Disc) {
-        let middle = placed.at.map(|i| i as isize);
-        let is_whole = disc.is_whole_around(middle, &self.known);
         for (dx, dy, weight) in disc.taps() {
-            let at = [middle[0] + dx, middle[1] + dy];
-            if let Some(i) = self.index(at) {
-                let share = if is_whole {
-                    1.0
-                } else {
-                    disc.share_in(at, &self.known)
-                };
-                self.pixels[i].add(placed, weight / share);
+            if let Some(i) = self.index([placed.at[0] + dx, placed.at[1] + dy]) {
+                self.pixels[i].add(placed, *weight);
             }
         }
     }
@@ -440,7 +424,10 @@ fn near_shadows(shadow: &Image<LinearRgb>, reach: usize) -> [Range<usize>; 2] {
     let (width, height) = (shadow.width(), shadow.height());
     let dark = (0..width * height).filter(|i| shadow.pixels()[*i] != LinearRgb::WHITE);
     let places: Vec<_> = dark.map(|i| [i % width, i / width]).collect();
-    [(0, width), (1, height)].map(|(axis, size)| around(places.iter(), reach, axis, size))
+    [(0, width), (1, height)].map(|(axis, size)| {
+        let columns = places.iter().map(|at| at[axis] as isize);
+        around(columns, reach, size)
+    })
 }
 
 /// The mean factor on the plate over a disc, by what is seen of the surface.

@@ -11,6 +11,7 @@ use crate::composite::motion::moved;
 use crate::deep::DeepImage;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
+use crate::render::RenderOptions;
 use crate::scene::{PostProcess, Shot};
 use std::borrow::Cow;
 
@@ -25,13 +26,11 @@ pub(crate) struct Exposed {
 }
 
 impl Exposed {
-    /// Of samples that nothing of the place hides yet.
-    pub(crate) fn new(free: DeepImage, shot: &Shot) -> Self {
+    /// Of samples that nothing of the place hides yet. What spreads into the picture from beyond its
+    /// border is rendered with the same `options`.
+    pub(crate) fn new(free: DeepImage, shot: &Shot, options: &RenderOptions) -> Self {
         let straight = free.undisplaced();
-        let soft = match defocus(straight.as_ref().unwrap_or(&free), shot) {
-            Cow::Owned(soft) => Some(soft),
-            Cow::Borrowed(_) => None,
-        };
+        let soft = defocus(straight.as_ref().unwrap_or(&free), shot, options);
         let seen = soft.or(straight);
         let moved = moved(seen.as_ref().unwrap_or(&free), shot);
         let holdout = shot.holdout.as_deref();
@@ -152,8 +151,8 @@ mod tests {
                 holdout: None,
                 ..walled.clone()
             };
-            let [walled, open] =
-                [walled, open].map(|shot| Exposed::new(free(), &shot).frame(&shot));
+            let [walled, open] = [walled, open]
+                .map(|shot| Exposed::new(free(), &shot, &RenderOptions::default()).frame(&shot));
             for x in 16..48 {
                 let expected = if x < 32 { PLATE } else { open[(x, 40)].g };
                 assert_eq!(walled[(x, 40)].g, expected, "{motion_m:?} {x}");

@@ -33,7 +33,6 @@ pub use aov::{Aov, front, parts};
 #[doc(hidden)]
 pub use cryptomatte::cryptomatte;
 #[doc(hidden)]
-pub use defocus::defocus;
 pub(crate) use exposed::Exposed;
 pub use finish::finish;
 #[doc(hidden)]

@@ -280,7 +280,8 @@ mod tests {
             motion_m: WAY_M,
             ..shot(0.0)
         };
-        let exposed = Exposed::new(render(&moving, &Quality::Draft.into()), &moving);
+        let options = Quality::Draft.into();
+        let exposed = Exposed::new(render(&moving, &options), &moving, &options);
         // So narrow a Gaussian leaves every pixel to itself.
         let blur_px = Blur::Known(0.05);
         let [sharp, blurred] = [Blur::NONE, blur_px].map(|blur_px| {

@@ -28,5 +28,5 @@ use crate::scene::Shot;
 /// # Panics
 /// When the plate's size is not the camera's.
 pub fn picture(shot: &Shot, options: &RenderOptions) -> Image<PremulRgba> {
-    Exposed::new(render_unhidden(shot, options), shot).frame(shot)
+    Exposed::new(render_unhidden(shot, options), shot, options).frame(shot)
 }

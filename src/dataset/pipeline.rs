@@ -357,7 +357,7 @@ impl Pipeline {
         watch.lap("settle");
         let free = render::render_unhidden(&shot, &self.config.render);
         watch.lap("render");
-        let exposed = Exposed::new(free, &shot);
+        let exposed = Exposed::new(free, &shot, &self.config.render);
         let frame = exposed.finished(&shot, &scene.finish);
         let deep = exposed.into_deep();
         watch.lap("composite");
@@ -416,7 +416,7 @@ impl Pipeline {
     /// Renders a shot and finishes its frame as the scene asks.
     pub fn shoot(&self, scene: &Scene, shot: &Shot) -> (DeepImage, Image<PremulRgba>) {
         let free = render::render_unhidden(shot, &self.config.render);
-        let exposed = Exposed::new(free, shot);
+        let exposed = Exposed::new(free, shot, &self.config.render);
         let frame = exposed.finished(shot, &scene.finish);
         (exposed.into_deep(), frame)
     }

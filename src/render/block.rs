@@ -26,6 +26,14 @@ impl PixelBlock {
         ranges_meet(&self.x, &other.x) && ranges_meet(&self.y, &other.y)
     }
 
+    /// All its pixels are the other's, too.
+    pub(super) fn is_within(&self, other: &Self) -> bool {
+        let within = |own: &Range<usize>, other: &Range<usize>| {
+            other.start <= own.start && own.end <= other.end
+        };
+        within(&self.x, &other.x) && within(&self.y, &other.y)
+    }
+
     /// Number of one of its pixels, row by row.
     #[inline(always)]
     pub(super) fn number_of(&self, x: usize, y: usize) -> usize {

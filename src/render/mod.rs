@@ -68,8 +68,8 @@ mod view;
 pub use check::check;
 pub use cryptomatte::Cryptomatte;
 pub(crate) use cryptomatte::{attribute_name, hex_id, id_of_name};
-pub(crate) use deep::render_unhidden;
 pub use deep::{render, render_coverage};
+pub(crate) use deep::{render_beyond, render_unhidden};
 pub use options::RenderOptions;
 #[doc(hidden)]
 pub use reference::render_reference;

@@ -1,7 +1,6 @@
 //! Circles of confusion as weights of pixels.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 /// Larger circles are treated as this one, pixels: beyond, a picture has no objects any more.
 const MOST_RADIUS_PX: f64 = 64.0;
@@ -20,8 +19,6 @@ pub(super) struct Disc {
     taps: Vec<(isize, isize, f32)>,
     /// Pixels from its middle to its last.
     reach: isize,
-    /// Weights above and left of each corner of the pixels in the square around it, row by row.
-    sums: Vec<f64>,
 }
 
 impl Disc {
@@ -34,68 +31,12 @@ impl Disc {
         let taps = weights.into_iter();
         let taps: Vec<_> = taps.map(|(x, y, w)| (x, y, (w / sum) as f32)).collect();
         let reach = taps.iter().map(|tap| tap.0.abs()).max().unwrap_or(0);
-        Self {
-            sums: corner_sums(&taps, reach),
-            taps,
-            reach,
-        }
+        Self { taps, reach }
     }
 
     pub(super) fn taps(&self) -> &[(isize, isize, f32)] {
         &self.taps
     }
-
-    /// Share of it that is in some columns and rows where its middle is at a pixel of those.
-    #[inline]
-    pub(super) fn share_in(&self, at: [isize; 2], known: &[Range<isize>; 2]) -> f32 {
-        let [columns, rows] = [0, 1].map(|axis| self.inside(at[axis], &known[axis]));
-        if columns.len().min(rows.len()) == self.side() {
-            return 1.0;
-        }
-        let left_of = |x: usize| {
-            let above = |y: usize| self.sums[y * (self.side() + 1) + x];
-            above(rows.end) - above(rows.start)
-        };
-        (left_of(columns.end) - left_of(columns.start)) as f32
-    }
-
-    /// Those of its columns (or rows), counted from its first.
-    #[inline]
-    fn inside(&self, at: isize, known: &Range<isize>) -> Range<usize> {
-        let first = at - self.reach;
-        let low = (known.start - first).max(0) as usize;
-        let high = (known.end - first) as usize;
-        low..high.min(self.side())
-    }
-
-    /// Discs around all its pixels lie in some columns and rows.
-    pub(super) fn is_whole_around(&self, at: [isize; 2], known: &[Range<isize>; 2]) -> bool {
-        let far = 2 * self.reach;
-        (0..2).all(|i| known[i].start <= at[i] - far && at[i] + far < known[i].end)
-    }
-
-    /// Pixels along a side of the square around it.
-    #[inline]
-    fn side(&self) -> usize {
-        2 * self.reach as usize + 1
-    }
-}
-
-/// Sums of weights above and left of each corner of the pixels in the square around a disc.
-fn corner_sums(taps: &[(isize, isize, f32)], reach: isize) -> Vec<f64> {
-    let row = 2 * reach as usize + 2;
-    let mut sums = vec![0.0; row * row];
-    for (x, y, weight) in taps {
-        let [x, y] = [x, y].map(|offset| (offset + reach + 1) as usize);
-        sums[y * row + x] = f64::from(*weight);
-    }
-    for y in 1..row {
-        for x in 1..row {
-            let i = y * row + x;
-            sums[i] += sums[i - 1] + sums[i - row] - sums[i - row - 1];
-        }
-    }
-    sums
 }
 
 /// The pixels of a disc whose rim is a pixel wide, half of it inside of a radius.
@@ -206,25 +147,6 @@ mod tests {
             for found in [spread(|t| t.0), spread(|t| t.1)] {
                 let off = (found - wanted).abs();
                 assert!(off < 1e-4 + 0.005 * wanted, "{radius}: {found} {wanted}");
-            }
-        }
-    }
-
-    #[test]
-    fn the_share_inside_is_the_sum_of_the_weights_there() {
-        for radius in [0.0, 0.7, 2.5, 9.0] {
-            let disc = Disc::new(radius);
-            for (x, y) in (0..7_isize).flat_map(|y| (0..9_isize).map(move |x| (x, y))) {
-                let is_inside = |tap: &&(isize, isize, f32)| {
-                    (0..9).contains(&(x + tap.0)) && (0..7).contains(&(y + tap.1))
-                };
-                let inside = disc.taps.iter().filter(is_inside);
-                let expected: f32 = inside.map(|tap| tap.2).sum();
-                let found = disc.share_in([x, y], &[0..9, 0..7]);
-                assert!(
-                    (found - expected).abs() < 1e-5,
-                    "{radius}: {x} {y}: {found} {expected}"
-                );
             }
         }
     }

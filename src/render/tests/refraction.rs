@@ -246,7 +246,7 @@ fn what_is_seen_through_a_soft_object_is_as_sharp_as_the_photo() {
             ..PostProcess::default()
         };
         let free = render_unhidden(&shot, &RenderOptions::default());
-        let seen = Exposed::new(free, &shot).finished(&shot, &finish);
+        let seen = Exposed::new(free, &shot, &RenderOptions::default()).finished(&shot, &finish);
         let at = |x: usize| f64::from(seen[(x, 24)].g) / PASSES;
         // The stripe itself, and where it is seen, eight pixels to the left.
         assert!((30..34).all(|x| (at(x) - 0.1).abs() < 0.01), "{finish:?}");
