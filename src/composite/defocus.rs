@@ -6,8 +6,8 @@
 //! generation", 1981), object by object: what an object hides in part is known by its own coverage,
 //! which samples keep, and its colour there is that of what is seen of it close by. Where the
 //! objects in a pixel are equally far out of focus their soft light simply adds up, as that of any
-//! blur; else the nearer ones hide the others behind them by their soft coverage. What is beyond the
-//! border spreads into the picture, too: the scene is rendered as far as circles reach.
+//! blur; else the nearer ones hide the others behind them by their soft coverage. Cards beyond the
+//! border spread into the picture, too: they are rendered as far as circles reach.
 //!
 //! The plate is a photo and has its own depth of field: of it only the shadows are blurred.
 

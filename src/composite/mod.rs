@@ -32,7 +32,6 @@ mod porter_duff;
 pub use aov::{Aov, front, parts};
 #[doc(hidden)]
 pub use cryptomatte::cryptomatte;
-#[doc(hidden)]
 pub(crate) use exposed::Exposed;
 pub use finish::finish;
 #[doc(hidden)]

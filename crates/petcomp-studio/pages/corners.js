@@ -1,6 +1,6 @@
 // Corners: four clicks on a photo become a label, and its camera is seen at once.
 
-import { api, at, choice, element, frame, lengths, picture, query, say, shortcuts, trying } from "./studio.js";
+import { api, at, choice, element, frame, lengths, query, say, shortcuts, trying } from "./studio.js";
 import { photoList } from "./photo_list.js";
 import { INK, PhotoView, loaded, viewKeys } from "./photo_view.js";
 
@@ -49,7 +49,7 @@ async function show(photo) {
   asked += 1;
   const number = asked;
   const state = drafts.get(photo) ?? await load(photo);
-  const image = state && await trying(() => fresh(photo));
+  const image = state && await trying(() => loaded(photo));
   if (number !== asked) return;
   history.replaceState(null, "", query("corners", { photo }));
   document.title = `${photo.split("/").pop()} · Corners`;
@@ -57,16 +57,6 @@ async function show(photo) {
   list.choose(photo);
   if (image) showOpened(state, image);
   else showNothing();
-}
-
-/** The photo as its file is now: an image takes what the page has shown before, unasked. */
-async function fresh(photo) {
-  const address = await picture(query("api/photo", { file: photo }));
-  try {
-    return await loaded(address);
-  } finally {
-    URL.revokeObjectURL(address);
-  }
 }
 
 function showOpened(state, image) {
@@ -465,7 +455,7 @@ async function saveOpened(here, next) {
   if (!saved) return;
   const isWhole = here.changes === before;
   here.version = saved.version;
-  if (isWhole) drafts.delete(here.photo);
+  if (isWhole && drafts.get(here.photo) === here) drafts.delete(here.photo);
   last = here.photo;
   Object.assign(entryOf(here.photo), { label: true, camera: Boolean(saved.camera) });
   showMarks();

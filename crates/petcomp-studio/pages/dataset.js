@@ -239,15 +239,20 @@ class Pane {
   async show() {
     const { folder, listing } = this;
     const row = this.rows[this.place];
+    const isShown = () => listing === this.listing && row === this.rows[this.place];
     this.image.src = address(this, row);
-    this.tell(null);
-    const sample = await api(query("api/dataset/sample", { folder, listing, row }));
-    if (listing !== this.listing || row !== this.rows[this.place]) return;
-    this.folders.value = folder;
-    this.tell(sample);
+    try {
+      const sample = await api(query("api/dataset/sample", { folder, listing, row }));
+      if (!isShown()) return;
+      this.folders.value = folder;
+      this.tell(sample);
+    } catch (error) {
+      if (isShown()) this.tell(null);
+      throw error;
+    }
   }
 
-  /** Tells what is known of its picture; null before that is read: nothing of another one. */
+  /** Tells what is known of its picture; null where that cannot be read: nothing of another one. */
   tell(sample) {
     Object.assign(this, { sample, marked: null, layers: null });
     this.title.textContent = `${sample ? `${sample.name} · ` : ""}${this.place + 1} of ${this.rows.length}`;

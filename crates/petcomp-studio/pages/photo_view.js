@@ -1,5 +1,7 @@
 // A photo on a stage: zoom, shift, points that are clicked, dragged and nudged, and a magnifier.
 
+import { picture, query } from "./studio.js";
+
 const MAX_ZOOM = 32;
 /** How near to a point a press takes it, and how far a press may move and still be a click: CSS pixels. */
 const GRAB = 14;
@@ -15,11 +17,15 @@ export const INK = {
   horizon: "#40c8ff", marker: "#c58bff", shade: "rgb(0 0 0 / .65)", text: "#ffffff",
 };
 
-/** A photo for `PhotoView.show`, ready to be drawn. */
-export async function loaded(address) {
+/** A photo for `PhotoView.show`, ready to be drawn, as its file is now: an image takes what the page has shown before, unasked. */
+export async function loaded(file) {
   const photo = new Image();
-  photo.src = address;
-  await photo.decode();
+  photo.src = await picture(query("api/photo", { file }));
+  try {
+    await photo.decode();
+  } finally {
+    URL.revokeObjectURL(photo.src);
+  }
   return photo;
 }
 

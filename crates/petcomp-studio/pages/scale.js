@@ -18,7 +18,7 @@ let open = null;
 /** How many photos were asked for: what comes of all but the last is dropped. */
 let asked = 0;
 const points = { ruler: [], screen: [] };
-const units = lengths(at("unit"), () => showFacts());
+const units = lengths(at("unit"), () => setMode(mode));
 const sides = { width: null, height: null };
 
 const view = new PhotoView(at("stage"), {
@@ -34,7 +34,7 @@ async function show(photo) {
   asked += 1;
   const number = asked;
   const state = await trying(() => api(query("api/scale/photo", { photo })));
-  const picture = state && await trying(() => loaded(query("api/photo", { file: photo })));
+  const picture = state && await trying(() => loaded(photo));
   if (number !== asked) return;
   // Where one of them cannot be read, nothing of another photo is left that could be saved.
   open = picture ? { photo, ...state } : null;

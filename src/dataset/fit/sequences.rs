@@ -5,17 +5,24 @@ use crate::dataset::page::labelled_pictures::{LabelledPicture, LabelledSet};
 use crate::scene::BeltRanges;
 use rayon::prelude::*;
 
-/// The picture in the middle of each sequence, where objects lie as they came to rest.
+/// The picture in the middle of each sequence, where objects lie as they came to rest; of those with
+/// a label file where there are any.
 pub(super) fn one_of_each(set: &LabelledSet, belt: &BeltRanges) -> LabelledSet {
     let pictures = set.pictures.par_iter().enumerate();
     let placed = pictures.map(|(k, picture)| (sequence_of(picture, k as u64, belt), picture));
     let placed: Vec<(Sequence, &LabelledPicture)> = placed.collect();
     let sequences = placed.chunk_by(|(a, _), (b, _)| a == b);
-    let middle = sequences.map(|sequence| sequence[sequence.len() / 2].1.clone());
     LabelledSet {
         classes: set.classes.clone(),
-        pictures: middle.collect(),
+        pictures: sequences.map(|s| middle_of(s).clone()).collect(),
     }
+}
+
+fn middle_of<'a>(sequence: &[(Sequence, &'a LabelledPicture)]) -> &'a LabelledPicture {
+    let pictures = sequence.iter().map(|(_, picture)| *picture);
+    let labelled: Vec<_> = pictures.filter(|p| p.boxes.is_some()).collect();
+    let middle = labelled.get(labelled.len() / 2);
+    middle.unwrap_or(&sequence[sequence.len() / 2].1)
 }
 
 /// What pictures of one sequence have in common.
@@ -43,17 +50,20 @@ mod tests {
 
     #[test]
     fn pictures_without_sidecars_come_in_runs_of_the_recipe() {
-        let picture = |k: u64| LabelledPicture {
-            path: format!("{k}.png").into(),
-            boxes: None,
-        };
-        let set = LabelledSet {
-            pictures: (0..10).map(picture).collect(),
-            ..LabelledSet::default()
-        };
         let belt = toml::from_str("frames = 4\nframe_rate = 10\nspeed = 0.1").unwrap();
-        let taken = one_of_each(&set, &belt).pictures;
-        let names: Vec<_> = taken.iter().map(LabelledPicture::file_name).collect();
-        assert_eq!(names, ["2.png", "6.png", "9.png"]);
+        let taken = |has_label: fn(u64) -> bool| -> Vec<String> {
+            let pictures = (0..10).map(|k| LabelledPicture {
+                path: format!("{k}.png").into(),
+                boxes: has_label(k).then(Vec::new),
+            });
+            let set = LabelledSet {
+                pictures: pictures.collect(),
+                ..LabelledSet::default()
+            };
+            let taken = one_of_each(&set, &belt).pictures;
+            taken.iter().map(|p| p.file_name().to_string()).collect()
+        };
+        assert_eq!(taken(|_| false), ["2.png", "6.png", "9.png"]);
+        assert_eq!(taken(|k| k % 4 == 0), ["0.png", "4.png", "8.png"]);
     }
 }

@@ -22,10 +22,10 @@ pub(super) struct JointPhoto {
 }
 
 impl JointPhoto {
-    fn without_camera(photo: &str, why: String) -> Self {
+    fn without_camera(photo: &str, together: usize, why: String) -> Self {
         Self {
             photo: photo.into(),
-            together: 1,
+            together,
             focal_px: None,
             focal_sigma: None,
             rms_px: None,
@@ -44,7 +44,7 @@ pub(super) fn solve(folder: &Folder, photos: &[String]) -> Answer<Vec<JointPhoto
                 names.push(photo.clone());
                 all.push(label);
             }
-            Err(refusal) => solved.push(JointPhoto::without_camera(photo, refusal.what)),
+            Err(refusal) => solved.push(JointPhoto::without_camera(photo, 1, refusal.what)),
         }
     }
     for group in camera::group_by_camera(&labels_of(&all)) {
@@ -84,7 +84,7 @@ fn solve_group(
 }
 
 fn unsolved(names: &[String], error: &Error) -> Vec<JointPhoto> {
-    let unsolved = |name: &String| JointPhoto::without_camera(name, error.to_string());
+    let unsolved = |name: &String| JointPhoto::without_camera(name, names.len(), error.to_string());
     names.iter().map(unsolved).collect()
 }
 
