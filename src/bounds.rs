@@ -27,8 +27,8 @@ pub(crate) const SURFACE: Bounds = Bounds::metres(0.01, 50.0, "objects of 5 mm t
 pub(crate) const WALL_HEIGHT: Bounds = Bounds::metres(0.0, 50.0, "0 is a table without walls");
 /// How far they lean.
 pub(crate) const SLOPE: Bounds = Bounds::new(0.0, 80.0, "degrees from upright, outwards");
-/// Share of the light that the darkest surface reflects.
-pub(crate) const LEAST_ALBEDO: f64 = 0.001;
+/// Share of the light that a surface reflects.
+pub(crate) const ALBEDO: Bounds = Bounds::new(0.001, 1.0, "a share of the light");
 /// Distance of a camera from the surface's centre, metres.
 pub(crate) const CAMERA: Bounds = Bounds::metres(0.001, 50.0, "farther off no object is seen");
 /// What a picture shows with fewer pixels has no outline to be labelled.

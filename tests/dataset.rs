@@ -891,7 +891,9 @@ fn a_split_and_the_check_take_empty_pictures_for_no_look_alikes() {
     let split = split.unwrap();
     // Pictures 0 and 40 are empty, 1 and 41 have a label.
     for i in [0, 1] {
-        std::fs::copy(&split.train[i], &split.val[i]).unwrap();
+        let [from, to] = [&split.train[i], &split.val[i]];
+        std::fs::copy(from, to).unwrap();
+        std::fs::copy(YoloSet::label_of(from), YoloSet::label_of(to)).unwrap();
     }
     let leakage = split.leakage(NEAR_DUPLICATE_RMS).unwrap();
     let alike: Vec<_> = leakage.near_duplicates.iter().map(|n| &n.val).collect();
@@ -1769,11 +1771,41 @@ fn an_image_that_looks_like_a_trained_one_is_a_leak() {
     let train: Image<LinearRgb> = io::read(dir.path().join("images/train/000006.png")).unwrap();
     let brighter = train.map(|p| p.scale(1.01));
     io::write(dir.path().join("images/val/000005.png"), &brighter).unwrap();
+    let [from, to] = ["train/000006", "val/000005"].map(|name| format!("labels/{name}.txt"));
+    std::fs::copy(dir.path().join(from), dir.path().join(to)).unwrap();
     let found = faults(dir.path()).join("\n");
     assert!(
         found.contains("images/val/000005.png: leak: differs from images/train/000006.png"),
         "{found}"
     );
+}
+
+/// A faint object of 12 x 9 pixels on a grainy plate, and its label file.
+fn put_faint_object(dataset: &Path, name: &str, left: usize, grain: f32) {
+    let picture = Image::from_fn(64, 48, |x, y| {
+        let is_object = (left..left + 12).contains(&x) && (20..29).contains(&y);
+        let light = if is_object { 0.215 } else { 0.2 };
+        LinearRgb::grey(light + grain * ((x + y) % 2) as f32)
+    });
+    io::write(dataset.join(format!("images/{name}.png")), &picture).unwrap();
+    let center = (left as f64 + 6.0) / 64.0;
+    let row = format!("0 {center} 0.51 0.1875 0.1875\n");
+    std::fs::write(dataset.join(format!("labels/{name}.txt")), row).unwrap();
+}
+
+#[test]
+fn a_faint_object_is_a_leak_only_at_its_place() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    put_faint_object(dir.path(), "train/000006", 4, 0.0);
+    for (left, leaks) in [(48, false), (4, true)] {
+        put_faint_object(dir.path(), "val/000005", left, 0.005);
+        let set = YoloSet::read(dir.path()).unwrap();
+        let leakage = set.leakage(NEAR_DUPLICATE_RMS).unwrap();
+        assert_eq!(!leakage.near_duplicates.is_empty(), leaks, "{leakage:?}");
+        let found = faults(dir.path()).join("\n");
+        assert_eq!(found.contains("[dataset.leak]"), leaks, "{found}");
+    }
 }
 
 #[test]

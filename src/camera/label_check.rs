@@ -2,11 +2,9 @@
 
 use super::error::SolveError;
 use super::label::{Crop, Label, LabelCamera, LabelPoint, LabelSurface, LabelWall};
-use crate::bounds::{Bounds, LEAST_ALBEDO, SLOPE, WALL_HEIGHT};
+use crate::bounds::{ALBEDO, Bounds, SLOPE, WALL_HEIGHT};
 use crate::color::Albedo;
 
-/// Share of the light that a surface reflects.
-const ALBEDO: Bounds = Bounds::new(LEAST_ALBEDO, 1.0, "a share of the light");
 /// No meaningful label holds larger numbers, or positive ones smaller than one over this.
 pub(crate) const MAX_MAGNITUDE: f64 = 1e9;
 

@@ -1,13 +1,15 @@
 //! Images that look like others.
 
 use crate::color::to_srgb8;
+use crate::dataset::YoloSet;
 use crate::error::Result;
+use crate::eval::{GroundTruth, iou, yolo_sheet};
 use crate::filter::resize;
 use crate::image::Image;
 use crate::io;
 use crate::pixel::{LinearRgb, Srgb8};
 use rayon::prelude::*;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Two images that are nearly the same.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +25,12 @@ pub struct NearDuplicate {
 /// Images that differ by less than this, in 8-bit grey values, are nearly the same: photos of a
 /// scene that nobody touched differ by noise, which the small copies average to below one code; an
 /// object of 1 % of the picture and a tenth of the full scale of contrast, moved, changes it by 3.
+/// Fainter ones do not, so images whose label files say that they show other things are not the
+/// same, however little they differ.
 pub const NEAR_DUPLICATE_RMS: f64 = 2.0;
+
+/// Boxes around the same thing, drawn twice, share more than this of their union.
+const MIN_OVERLAP: f64 = 0.5;
 
 /// Sides of the small copies, pixels.
 const THUMBNAIL_PX: [usize; 2] = [32, 24];
@@ -53,27 +60,80 @@ impl Thumbnail {
         })
     }
 
-    /// The place of the nearest in a list, the first of those as near, and how far it is.
+    /// The squared errors of two that differ by less than `codes` are below this.
+    fn squared_error_limit(&self, codes: f64) -> u64 {
+        ((self.0.len() as f64 * codes * codes) as u64).saturating_add(1)
+    }
+}
+
+/// What two images are compared by.
+#[derive(Clone, Debug)]
+pub(crate) struct Look {
+    pub(crate) thumbnail: Thumbnail,
+    /// As [`boxes_in`] has them; none also without a label file.
+    pub(crate) boxes: Option<Vec<GroundTruth>>,
+}
+
+impl Look {
+    fn read(image: &Path) -> Result<Self> {
+        let labels = io::read_text(YoloSet::label_of(image)).ok();
+        Ok(Self {
+            thumbnail: Thumbnail::new(&io::read::<LinearRgb>(image)?),
+            boxes: labels.and_then(|text| boxes_in(&text)),
+        })
+    }
+
+    /// The place of the nearest in a list of those that may show the same, the first of those as
+    /// near, and how far it is.
     fn nearest_within(&self, all: &[Self], codes: f64) -> Option<(usize, f64)> {
-        let mut limit = ((self.0.len() as f64 * codes * codes) as u64).saturating_add(1);
+        let mut limit = self.thumbnail.squared_error_limit(codes);
         let mut nearest = None;
         for (i, other) in all.iter().enumerate() {
-            if let Some(error) = self.squared_error_below(limit, other) {
+            let error = self.thumbnail.squared_error_below(limit, &other.thumbnail);
+            if let Some(error) = error.filter(|_| self.may_show_the_same(other)) {
                 (nearest, limit) = (Some(i), error);
             }
         }
         let place = nearest?;
-        Some((place, self.codes_from(&all[place]))).filter(|(_, distance)| *distance < codes)
+        let distance = self.thumbnail.codes_from(&all[place].thumbnail);
+        Some((place, distance)).filter(|_| distance < codes)
+    }
+
+    /// Whether the labels are alike, or those of one are unknown.
+    fn may_show_the_same(&self, other: &Self) -> bool {
+        match (&self.boxes, &other.boxes) {
+            (Some(own), Some(others)) => are_alike(own, others),
+            _ => true,
+        }
     }
 }
 
-/// For each of `val` the nearest of `train`, as places in the lists, where it is nearer than
-/// `codes`.
-pub(crate) fn nearest(
-    train: &[Thumbnail],
-    val: &[Thumbnail],
-    codes: f64,
-) -> Vec<(usize, usize, f64)> {
+/// The boxes in the text of a label file, shares of the image; none where a row is bad.
+pub(crate) fn boxes_in(text: &str) -> Option<Vec<GroundTruth>> {
+    let sheet = yolo_sheet(text, "", [1, 1]).ok()?;
+    Some(sheet.truth)
+}
+
+/// Whether each box lies over one of the other image, and none of those is left.
+fn are_alike(own: &[GroundTruth], others: &[GroundTruth]) -> bool {
+    let mut left = others.to_vec();
+    own.len() == others.len() && own.iter().all(|b| take_partner(b, &mut left))
+}
+
+/// Takes out the box of the same class that lies best over one, and says whether there is any.
+fn take_partner(own: &GroundTruth, left: &mut Vec<GroundTruth>) -> bool {
+    let overlaps = left.iter().map(|other| match other.class == own.class {
+        true => iou(&own.bbox, &other.bbox),
+        false => 0.0,
+    });
+    let best = overlaps.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+    let partner = best.filter(|(_, overlap)| *overlap > MIN_OVERLAP);
+    partner.map(|(i, _)| left.swap_remove(i)).is_some()
+}
+
+/// For each of `val` the nearest of `train` that may show the same, as places in the lists, where
+/// it is nearer than `codes`.
+pub(crate) fn nearest(train: &[Look], val: &[Look], codes: f64) -> Vec<(usize, usize, f64)> {
     val.par_iter()
         .enumerate()
         .filter_map(|(i, own)| {
@@ -89,7 +149,7 @@ pub(crate) fn near_pairs(
     val: &[PathBuf],
     codes: f64,
 ) -> Result<Vec<NearDuplicate>> {
-    let pairs = nearest(&thumbnails(train)?, &thumbnails(val)?, codes);
+    let pairs = nearest(&looks(train)?, &looks(val)?, codes);
     let duplicates = pairs.into_iter().map(|(i, j, codes)| NearDuplicate {
         val: val[i].clone(),
         train: train[j].clone(),
@@ -98,11 +158,8 @@ pub(crate) fn near_pairs(
     Ok(duplicates.collect())
 }
 
-fn thumbnails(images: &[PathBuf]) -> Result<Vec<Thumbnail>> {
-    images
-        .par_iter()
-        .map(|path| Ok(Thumbnail::new(&io::read::<LinearRgb>(path)?)))
-        .collect()
+fn looks(images: &[PathBuf]) -> Result<Vec<Look>> {
+    images.par_iter().map(|image| Look::read(image)).collect()
 }
 
 fn grey_code(p: &Srgb8) -> u8 {
@@ -124,20 +181,66 @@ fn squared_difference(a: u8, b: u8) -> u64 {
 mod tests {
     use super::*;
 
-    fn scene(shift: usize, noise: f32) -> Thumbnail {
+    fn scene(shift: usize, noise: f32) -> Look {
         let of = |x: usize, y: usize| {
             let object = (100 + shift..140 + shift).contains(&x) && (80..120).contains(&y);
             let grain = ((x * 7919 + y * 104_729) % 97) as f32 / 97.0 - 0.5;
             LinearRgb::grey(if object { 0.5 } else { 0.2 } + noise * grain)
         };
-        Thumbnail::new(&Image::from_fn(320, 240, of))
+        Look {
+            thumbnail: Thumbnail::new(&Image::from_fn(320, 240, of)),
+            boxes: None,
+        }
+    }
+
+    fn codes_between(a: &Look, b: &Look) -> f64 {
+        a.thumbnail.codes_from(&b.thumbnail)
+    }
+
+    fn labelled(labels: &str) -> Look {
+        Look {
+            boxes: boxes_in(labels),
+            ..scene(0, 0.0)
+        }
+    }
+
+    #[test]
+    fn labels_are_alike_in_any_order_and_unknown_ones_are_like_any() {
+        let [left, right, cap] = [
+            "0 0.2 0.5 0.2 0.2",
+            "0 0.25 0.5 0.2 0.2",
+            "1 0.8 0.5 0.1 0.1",
+        ];
+        let own = labelled(&[left, right, cap].join("\n"));
+        for (rows, alike) in [
+            (vec!["1 0.81 0.5 0.1 0.1", right, left], true),
+            (vec![left, right, "0 0.8 0.5 0.1 0.1"], false),
+            (vec![left, right, "1 0.5 0.5 0.1 0.1"], false),
+            (vec![left, right], false),
+            (vec!["0 0.2"], true),
+        ] {
+            let other = labelled(&rows.join("\n"));
+            assert_eq!(own.may_show_the_same(&other), alike, "{rows:?}");
+            assert_eq!(other.may_show_the_same(&own), alike, "{rows:?}");
+        }
+    }
+
+    #[test]
+    fn a_farther_one_with_like_labels_is_nearest() {
+        let (own, moved) = (labelled("0 0.2 0.5 0.2 0.2"), labelled("0 0.8 0.5 0.2 0.2"));
+        let noisy = Look {
+            boxes: own.boxes.clone(),
+            ..scene(0, 0.1)
+        };
+        let found = own.nearest_within(&[moved, noisy], f64::INFINITY);
+        assert_eq!(found.map(|(place, _)| place), Some(1));
     }
 
     #[test]
     fn noise_is_near_and_a_moved_object_is_not() {
         let scenes = [scene(0, 0.0), scene(0, 0.05), scene(60, 0.0)];
-        assert!(scenes[0].codes_from(&scenes[1]) < NEAR_DUPLICATE_RMS);
-        assert!(scenes[0].codes_from(&scenes[2]) > 3.0 * NEAR_DUPLICATE_RMS);
+        assert!(codes_between(&scenes[0], &scenes[1]) < NEAR_DUPLICATE_RMS);
+        assert!(codes_between(&scenes[0], &scenes[2]) > 3.0 * NEAR_DUPLICATE_RMS);
         assert_eq!(
             nearest(&scenes[..1], &scenes[1..], NEAR_DUPLICATE_RMS).len(),
             1
@@ -151,8 +254,8 @@ mod tests {
         let all: Vec<_> = (0..5).map(|i| scene(i % 2 * 60, noises[i])).collect();
         for first in 0..all.len() {
             let others = &all[first..];
-            let distances = others.iter().map(|other| own.codes_from(other)).enumerate();
-            let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1));
+            let distances = others.iter().map(|other| codes_between(&own, other));
+            let nearest = distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
             for codes in [0.0, 0.5, NEAR_DUPLICATE_RMS, f64::INFINITY] {
                 let expected = nearest.filter(|(_, distance)| *distance < codes);
                 assert_eq!(own.nearest_within(others, codes), expected);

@@ -94,8 +94,8 @@ impl YoloSet {
     }
 
     /// What leaks from training to validation; images are near when they differ by less than
-    /// `max_codes` (root mean square of 8-bit grey values of a small copy). Images whose
-    /// label file has no rows are near to none.
+    /// `max_codes` (root mean square of 8-bit grey values of a small copy) and their label files,
+    /// where both have one, say the same. Images whose label file has no rows are near to none.
     ///
     /// # Errors
     /// An image or a sidecar that cannot be read.

@@ -75,6 +75,17 @@ impl Pictures {
         }
     }
 
+    /// For a picture outside of a dataset: the middle quality, and the first of several choices of
+    /// colour.
+    #[doc(hidden)]
+    pub fn middle_options(&self) -> WriteOptions {
+        WriteOptions {
+            jpeg_quality: self.jpeg_quality.middle().min as u8,
+            jpeg_chroma: self.jpeg_chroma.first().copied().unwrap_or_default(),
+            ..WriteOptions::default()
+        }
+    }
+
     /// That of a picture of a dataset.
     fn quality(&self, seed: u64, k: u64) -> u8 {
         let draws = Draws::new(seed, k);
@@ -169,6 +180,21 @@ mod tests {
         assert!((0..100).all(|k| mixed.quality(3, k) == of_quality.quality(3, k)));
         let text = serde_json::to_string(&Pictures::default()).unwrap();
         assert!(!text.contains("chroma"), "identities stay: {text}");
+    }
+
+    #[test]
+    fn nothing_is_drawn_for_a_picture_outside_of_a_dataset() {
+        let mixed = Pictures {
+            jpeg_quality: Range::new(80.0, 90.0),
+            jpeg_chroma: vec![Chroma::Quarter, Chroma::Full],
+            ..Pictures::default()
+        };
+        let options = |pictures: &Pictures| {
+            let options = pictures.middle_options();
+            (options.jpeg_quality, options.jpeg_chroma)
+        };
+        assert_eq!(options(&mixed), (85, Chroma::Quarter));
+        assert_eq!(options(&Pictures::default()), (95, Chroma::Full));
     }
 
     #[test]

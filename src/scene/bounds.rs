@@ -3,7 +3,7 @@
 //! The bounds of a recipe are those of photographs of things; a scene may come from any program and
 //! is only held to what the arithmetic of the stages bears.
 
-use crate::bounds::{Bounds, LEAST_ALBEDO};
+use crate::bounds::Bounds;
 
 /// Most objects in one scene: heaps of some hundreds are what comes to rest.
 pub(crate) const MAX_OBJECTS: usize = 1_000;
@@ -34,7 +34,6 @@ pub(super) const KELVIN: Bounds =
 pub(super) const GAIN: Bounds = Bounds::new(1e-6, 1e6, "a factor");
 pub(super) const FRICTION: Bounds =
     Bounds::new(0.0, 100.0, "a coefficient; plastics have 0.2 to 0.6");
-pub(super) const ALBEDO: Bounds = Bounds::new(LEAST_ALBEDO, 10.0, "a share of light; 1 is white");
 pub(super) const CAST_SHARE: Bounds = Bounds::new(
     -10.0,
     10.0,

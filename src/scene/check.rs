@@ -1,14 +1,14 @@
 //! Is a scene possible? Checked once, before any work.
 
-use crate::bounds::{Bounds, LONGEST_SIDE_PX, MASS, MOST_PIXELS};
+use crate::bounds::{ALBEDO, Bounds, LONGEST_SIDE_PX, MASS, MOST_PIXELS};
 use crate::camera::Camera;
 use crate::color::Albedo;
 use crate::error::{Error, Result};
 use crate::geom::{Pose, UnitQuaternion};
 use crate::pixel::LinearRgb;
 use crate::scene::bounds::{
-    ALBEDO, CAST_SHARE, EV, FOCAL, FRICTION, GRADE, LENGTH, MAX_LIGHTS, MAX_OBJECTS, PHOTO_SIDE,
-    PIXEL, PLACE, RADIANCE, SHARE, TURN,
+    CAST_SHARE, EV, FOCAL, FRICTION, GRADE, LENGTH, MAX_LIGHTS, MAX_OBJECTS, PHOTO_SIDE, PIXEL,
+    PLACE, RADIANCE, SHARE, TURN,
 };
 use crate::scene::hull::doubled_corner_area;
 use crate::scene::{

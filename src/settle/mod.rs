@@ -118,7 +118,7 @@ impl Settled {
             SettleVerdict::Rested => Ok(self.scene),
             failure => Err(Error::Unsettled {
                 what: format!(
-                    "{}, after {attempts} attempts",
+                    "{}, after {attempts} attempts (settle.attempts)",
                     failure.reason(self.seconds)
                 ),
             }),
@@ -164,10 +164,13 @@ impl SettleVerdict {
                 format!("something still moves after {seconds:.1} s (settle.time_limit)")
             }
             Self::Escaped(ids) => format!("objects {ids:?} left the surface"),
-            Self::Penetrating(depth) => format!("bodies overlap by {:.2} mm", depth * 1e3),
+            Self::Penetrating(depth) => format!(
+                "bodies overlap by {:.2} mm (settle.max_overlap)",
+                depth * 1e3
+            ),
             Self::Hanging(ids) => format!("objects {ids:?} are unsupported"),
             Self::Exploded(share) => format!(
-                "energy rose by {:.1} % of the drop's in one step",
+                "energy rose by {:.1} % of the drop's in one step (settle.max_energy_rise, settle.step)",
                 share * 100.0
             ),
         }
@@ -437,9 +440,23 @@ mod tests {
         assert_eq!(
             reported,
             format!(
-                "settle: something still moves after {seconds:.1} s (settle.time_limit), after 4 attempts"
+                "settle: something still moves after {seconds:.1} s (settle.time_limit), after 4 attempts (settle.attempts)"
             )
         );
+    }
+
+    #[test]
+    fn a_verdict_names_the_settings_that_it_follows_from() {
+        for (verdict, keys) in [
+            (SettleVerdict::Penetrating(2e-4), "settle.max_overlap"),
+            (
+                SettleVerdict::Exploded(1e-3),
+                "settle.max_energy_rise, settle.step",
+            ),
+        ] {
+            let reason = verdict.reason(1.0);
+            assert!(reason.ends_with(&format!("({keys})")), "{reason}");
+        }
     }
 
     #[test]

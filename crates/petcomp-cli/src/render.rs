@@ -6,6 +6,7 @@ use crate::global::GlobalArgs;
 use anyhow::bail;
 use petcomp::composite::{self, Aov};
 use petcomp::dataset::{DatasetConfig, Pipeline};
+use petcomp::io::WriteOptions;
 use petcomp::io::exr::write_parts;
 use petcomp::{DeepImage, Image, LinearRgb, PremulRgba, Quality, Scene, Shot, io};
 use std::path::{Path, PathBuf};
@@ -14,7 +15,8 @@ use std::path::{Path, PathBuf};
 pub(crate) struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Picture to write: .png, .jpg, or .exr for scene-linear values with alpha
+    /// Picture to write: .png, .jpg as the recipe's `pictures` says, or .exr for scene-linear values
+    /// with alpha
     #[arg(short, long, value_name = "PICTURE")]
     output: PathBuf,
     /// draft, normal or reference: how finely everything is computed; by default as the recipe or
@@ -41,7 +43,8 @@ pub(crate) fn run(args: &RenderArgs, global: &GlobalArgs) -> anyhow::Result<()> 
         .resolve(scene)
         .map_err(|e| e.in_file(&args.scene.path))?;
     let (deep, frame) = pipeline.shoot(&scene, &shot);
-    args.write_frame(&deep, &shot, &frame)?;
+    let options = pipeline.config().pictures.middle_options();
+    args.write_frame(&deep, &shot, &frame, &options)?;
     let ((w, h), objects) = (frame.size(), scene.objects.len());
     args.write_resolved(scene, pipeline.config())?;
     global.print_written(&args.output, format_args!("{w} x {h}, {objects} objects"));
@@ -75,18 +78,23 @@ impl RenderArgs {
         deep: &DeepImage,
         shot: &Shot,
         frame: &Image<PremulRgba>,
+        options: &WriteOptions,
     ) -> petcomp::Result<()> {
         if self.aov.is_empty() {
-            write_picture(&self.output, frame)?;
+            write_picture(&self.output, frame, options)?;
         } else {
             self.write_parts(deep, shot, frame)?;
         }
-        self.write_preview(frame)
+        self.write_preview(frame, options)
     }
 
-    fn write_preview(&self, frame: &Image<PremulRgba>) -> petcomp::Result<()> {
+    fn write_preview(
+        &self,
+        frame: &Image<PremulRgba>,
+        options: &WriteOptions,
+    ) -> petcomp::Result<()> {
         match &self.preview {
-            Some(path) => io::write(path, &displayed(frame)),
+            Some(path) => io::write_with(path, &displayed(frame), options),
             None => Ok(()),
         }
     }
@@ -109,10 +117,14 @@ impl RenderArgs {
     }
 }
 
-fn write_picture(path: &Path, frame: &Image<PremulRgba>) -> petcomp::Result<()> {
+fn write_picture(
+    path: &Path,
+    frame: &Image<PremulRgba>,
+    options: &WriteOptions,
+) -> petcomp::Result<()> {
     match extension_of(path).as_str() {
-        "exr" | "tif" | "tiff" => io::write(path, frame),
-        _ => io::write(path, &displayed(frame)),
+        "exr" | "tif" | "tiff" => io::write_with(path, frame, options),
+        _ => io::write_with(path, &displayed(frame), options),
     }
 }
 

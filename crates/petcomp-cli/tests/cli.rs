@@ -1276,6 +1276,15 @@ fn a_scene_goes_through_the_stages_one_by_one() {
         "{refused}"
     );
 
+    // A JPEG is compressed as the recipe says.
+    let length = |set: &str| -> u64 {
+        let args = words("render rest.json demo/recipe.toml -o frame.jpg");
+        desk.ok(&[&args[..], &["--set", set]].concat());
+        desk.path("frame.jpg").metadata().unwrap().len()
+    };
+    let [plain, poor] = ["95", "5"].map(|q| length(&format!("pictures.jpeg_quality={q}")));
+    assert!(4 * poor < plain, "{poor} {plain}");
+
     // The same picture in parts, at another quality, and for Blender.
     let parts = words("render rest.json demo/recipe.toml -o parts.exr --quality draft");
     desk.ok(&[
@@ -1328,6 +1337,7 @@ fn objects_need_be_large_enough_in_the_whole_picture_alone() {
     let half = ["-n", "1", "--set", "scene.image=[320,240]"];
     let told = desk.refused(&[&small[..], &half].concat());
     assert!(told.contains("expected at least 8"), "{told}");
+    assert!(told.contains("scene.image"), "{told}");
 }
 
 #[test]

@@ -2,10 +2,11 @@
 
 use super::label_rows::{LabelRow, read_rows};
 use crate::dataset::finding::Finding;
-use crate::dataset::near_duplicates::Thumbnail;
+use crate::dataset::near_duplicates::{Look, Thumbnail, boxes_in};
 use crate::dataset::yolo::MIN_SIDE_PX;
 use crate::dataset::{Part, YoloSet};
 use crate::diagnostic::Code;
+use crate::eval::GroundTruth;
 use crate::image::Image;
 use crate::io;
 use crate::pixel::PremulRgba;
@@ -21,7 +22,9 @@ pub(super) struct CheckedImage {
     /// It has a label file without rows.
     pub(super) is_empty: bool,
     /// None where it cannot be read.
-    pub(super) thumbnail: Option<Thumbnail>,
+    thumbnail: Option<Thumbnail>,
+    /// Of its label file, for comparing; none where there is none or a row is bad.
+    boxes: Option<Vec<GroundTruth>>,
     /// Size and checksum of its file.
     pub(super) checksum: Option<(u64, u32)>,
 }
@@ -42,11 +45,20 @@ impl CheckedImage {
             rows: Vec::new(),
             is_empty: false,
             thumbnail: None,
+            boxes: None,
             checksum,
         };
         image.read_pixels(folder);
         image.read_labels(folder, class_count);
         image
+    }
+
+    /// What it is compared by; none where it cannot be read.
+    pub(super) fn look(&self) -> Option<Look> {
+        Some(Look {
+            thumbnail: self.thumbnail.clone()?,
+            boxes: self.boxes.clone(),
+        })
     }
 
     fn read_pixels(&mut self, folder: &Path) {
@@ -75,6 +87,7 @@ impl CheckedImage {
                 .push(Finding::in_file(label, Code::MissingLabel, message));
         };
         self.is_empty = text.trim().is_empty();
+        self.boxes = boxes_in(&text);
         let (rows, findings) = read_rows(&label, &text, class_count);
         self.rows = rows;
         self.findings.extend(findings);

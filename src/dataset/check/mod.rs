@@ -11,7 +11,7 @@ use crate::dataset::folder::{self, JOURNAL};
 use crate::dataset::journal::{NumberedLines, numbered_lines};
 use crate::dataset::journal_line::JournalLine;
 use crate::dataset::listing::{images_in, is_list, place_of, whole_path};
-use crate::dataset::near_duplicates::{NEAR_DUPLICATE_RMS, Thumbnail, nearest};
+use crate::dataset::near_duplicates::{Look, NEAR_DUPLICATE_RMS, nearest};
 use crate::dataset::paths::folder_of;
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::dataset::{Part, YoloSet};
@@ -59,8 +59,8 @@ pub struct CheckedBox {
 ///   and have images;
 /// * every image decodes to its end and has sides of at least 10 pixels; no two that show something
 ///   have the same bytes;
-/// * no image for validation looks like one for training ([`NEAR_DUPLICATE_RMS`]), unless it shows
-///   nothing;
+/// * no image for validation looks like one for training ([`NEAR_DUPLICATE_RMS`]) that shows the
+///   same by its label file, unless it shows nothing;
 /// * every image has a label file and every label file an image;
 /// * rows have 5 columns (or, in files of outlines, 7 or more, an odd number), an integer class
 ///   below `nc`, shares in 0..1, sides above 0, and no duplicate in the same file;
@@ -256,9 +256,9 @@ impl Checker<'_> {
 
     /// Images for validation that look like one that is trained on.
     fn find_leaks(&mut self, images: &[CheckedImage]) {
-        let (train, train_thumbnails) = thumbnails(images, Part::Train);
-        let (val, val_thumbnails) = thumbnails(images, Part::Val);
-        for (i, j, rms) in nearest(&train_thumbnails, &val_thumbnails, NEAR_DUPLICATE_RMS) {
+        let (train, train_looks) = looks(images, Part::Train);
+        let (val, val_looks) = looks(images, Part::Val);
+        for (i, j, rms) in nearest(&train_looks, &val_looks, NEAR_DUPLICATE_RMS) {
             let (image, twin) = (val[i], train[j]);
             // The same bytes are reported already.
             if image.checksum != twin.checksum {
@@ -356,11 +356,11 @@ fn twin_message(image: &CheckedImage, twin: &CheckedImage) -> (Code, String) {
     (Code::DuplicateImage, message)
 }
 
-/// The images of a part that show something and can be read, and their thumbnails.
-fn thumbnails(images: &[CheckedImage], part: Part) -> (Vec<&CheckedImage>, Vec<Thumbnail>) {
+/// The images of a part that show something and can be read, and what they are compared by.
+fn looks(images: &[CheckedImage], part: Part) -> (Vec<&CheckedImage>, Vec<Look>) {
     images
         .iter()
         .filter(|image| image.part == part && !image.is_empty)
-        .filter_map(|image| Some((image, image.thumbnail.clone()?)))
+        .filter_map(|image| Some((image, image.look()?)))
         .unzip()
 }

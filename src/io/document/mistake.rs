@@ -52,12 +52,18 @@ fn without_rust_types(message: &str) -> String {
         return message.into();
     };
     let kind = wanted.split(' ').next().unwrap_or_default();
-    let words = match wanted {
-        "a sequence" => "a list",
-        "a map" => "a table",
+    let words = match (wanted, kind) {
+        ("a sequence", _) => "a list",
+        ("a map", _) => "a table",
+        (_, "u8" | "u16" | "u32") if !is_large_integer(front) => "an integer from 0",
         _ => plain_name(kind).unwrap_or(wanted),
     };
     format!("{front}expected {words}")
+}
+
+/// Whether what was found is too large for its type, whose upper end is otherwise not the field's.
+fn is_large_integer(found: &str) -> bool {
+    found.starts_with("invalid value: integer `") && !found.contains("`-")
 }
 
 /// What people call a kind of value that has this name in Rust or serde.

@@ -251,6 +251,22 @@ fn a_surface_of_known_albedo_decides_the_exposure() {
 }
 
 #[test]
+fn a_surface_reflects_at_most_all_of_the_light() {
+    let checked = |albedo: &str| {
+        let recipe: Recipe = toml::from_str(&format!("surface_albedo = {albedo}")).unwrap();
+        recipe.check().map_err(|e| e.to_string())
+    };
+    for (albedo, told) in [("2", "2"), ("[0.1, 0.5, 4]", "4")] {
+        let expected = "expected 0.001 to 1 (a share of the light)";
+        assert_eq!(
+            checked(albedo),
+            Err(format!("surface_albedo: {told}, {expected}"))
+        );
+    }
+    assert_eq!(checked("1"), Ok(()));
+}
+
+#[test]
 fn a_surface_of_known_colour_tells_that_of_the_light_too() {
     let albedo = LinearRgb::new(0.1, 0.2, 0.4);
     let blue = Background {
