@@ -175,6 +175,35 @@ impl DeepImage {
         &self.tiles[tile].samples[range]
     }
 
+    /// The pixels of a row that have samples, from left to right: their columns, and their samples,
+    /// front to back.
+    pub(crate) fn row(&self, y: usize) -> impl Iterator<Item = (usize, &[DeepSample])> {
+        self.row_places(y)
+            .map(|(x, tile, range)| (x, &tile.samples[range]))
+    }
+
+    /// The same pixels, and all that objects do to each, as [`flat`](Self::flat) says.
+    pub(crate) fn row_films(&self, y: usize) -> impl Iterator<Item = (usize, Film)> {
+        self.row_places(y).map(|(x, tile, range)| {
+            let tints = tile.tints.get(range.clone()).unwrap_or_default();
+            (x, flat_of(&tile.samples[range], tints))
+        })
+    }
+
+    /// The same pixels: the tile of each, and where its samples are there.
+    fn row_places(&self, y: usize) -> impl Iterator<Item = (usize, &DeepTile, Range<usize>)> {
+        let side = 1 << self.tile_bits;
+        let across = self.width.div_ceil(side);
+        let tiles = self.tiles.chunks(across).nth(y >> self.tile_bits);
+        let tiles = tiles.unwrap_or_default().iter().enumerate();
+        tiles.flat_map(move |(n, tile)| {
+            let ranges = (n * side..).zip(tile.row(y & (side - 1)));
+            ranges
+                .filter(|(_, range)| !range.is_empty())
+                .map(move |(x, range)| (x, tile, range))
+        })
+    }
+
     /// What each sample of a pixel hides of what is behind, per channel, as far as it is itself
     /// seen; empty where no object of the picture is film: every channel is the sample's
     /// `visible` then.
@@ -453,6 +482,11 @@ mod tests {
                 let tints: Vec<_> = expected.iter().map(tint_of).collect();
                 assert_eq!(deep.tints(x, y), tints, "{x} {y}");
             }
+            let row: Vec<_> = deep.row(y).map(|(x, s)| (x, s.to_vec())).collect();
+            let pixels = (0..SIZE[0]).map(|x| (x, samples_of(x, y)));
+            let filled: Vec<_> = pixels.filter(|(_, s)| !s.is_empty()).collect();
+            assert_eq!(row, filled, "{y}");
+            assert!(deep.row_films(y).all(|(x, film)| film == deep.flat(x, y)));
         }
     }
 

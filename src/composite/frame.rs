@@ -3,6 +3,7 @@
 use crate::deep::DeepImage;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
+use rayon::prelude::*;
 
 /// Folds deep samples into a picture, over `plate` where there is one.
 ///
@@ -18,12 +19,14 @@ pub fn frame(deep: &DeepImage, plate: Option<&Image<LinearRgb>>) -> Image<Premul
     let Some(plate) = plate else {
         return Image::from_fn(width, height, |x, y| over_nothing(deep.flat(x, y)));
     };
-    let size = (width, height);
-    assert_eq!(plate.size(), size, "plate and picture differ in size");
-    Image::from_fn(width, height, |x, y| {
-        let behind = deep.shadow()[(x, y)] * plate[(x, y)];
-        over(deep.flat(x, y), behind)
-    })
+    let shaded = |shadow: LinearRgb, plate: LinearRgb| (shadow * plate).opaque();
+    let mut picture = deep.shadow().zip_map(plate, shaded);
+    picture.par_rows_mut().enumerate().for_each(|(y, row)| {
+        for (x, film) in deep.row_films(y) {
+            row[x] = over(film, row[x].color());
+        }
+    });
+    picture
 }
 
 /// A film over what is behind it, opaque.

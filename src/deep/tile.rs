@@ -84,6 +84,13 @@ impl DeepTile {
         self.starts[i] as usize..self.starts[i + 1] as usize
     }
 
+    /// Where the samples of each pixel of a row of the tile are; of none where the tile has none.
+    pub(super) fn row(&self, y: usize) -> impl Iterator<Item = Range<usize>> {
+        let starts = self.starts.get(y * self.width..).unwrap_or_default();
+        let ends = starts.windows(2).take(self.width);
+        ends.map(|ends| ends[0] as usize..ends[1] as usize)
+    }
+
     /// Takes what of the plate is seen displaced out of the samples' light.
     pub(super) fn take_displaced(&mut self) {
         let displaced = std::mem::take(&mut self.displaced);

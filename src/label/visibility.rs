@@ -121,9 +121,9 @@ pub(crate) fn fold_samples(
     let mut tallies: Vec<_> = ids.iter().map(|_| VisibilityTally::new(size)).collect();
     let mut sample_count = 0;
     for y in 0..deep.height() {
-        for x in 0..deep.width() {
-            sample_count += deep.at(x, y).len();
-            for sample in deep.at(x, y) {
+        for (x, samples) in deep.row(y) {
+            sample_count += samples.len();
+            for sample in samples {
                 if let Some(i) = index_of(sample.object, ids) {
                     tallies[i].add(x, y, sample, options.alpha_threshold);
                 }

@@ -74,6 +74,12 @@ pub(super) fn side_lengths(light: &AreaLight) -> [f64; 2] {
     light.size.map(|side| side.max(MIN_SIDE_M))
 }
 
+/// The longer side of a light, or its longer diameter, metres.
+pub(crate) fn longer_side(light: &AreaLight) -> f64 {
+    let [a, b] = side_lengths(light);
+    a.max(b)
+}
+
 /// Area of a light's face, square metres.
 pub(crate) fn face_area(light: &AreaLight) -> f64 {
     let [a, b] = side_lengths(light);

@@ -42,6 +42,7 @@ mod surface;
 
 pub(crate) use ambient::ambient_directions;
 #[doc(hidden)]
+pub(crate) use area::longer_side;
 pub use area::{LightFrame, frame, radiance};
 #[doc(hidden)]
 pub use blur::plate_blur;

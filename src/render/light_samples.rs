@@ -11,6 +11,13 @@ use std::f64::consts::PI;
 /// Pieces of the sky narrower than this throw shadows too sharp for the coarser lattice, radians.
 const SMALL_WIDTH_RAD: f64 = 0.15;
 
+/// Widest step in a penumbra, nodes of the finer lattice. At 2 no golden scene is farther from Cycles
+/// by more than 2 % than with all samples, at 4 one is by 8 %.
+const PENUMBRA_STEP_CELLS: f64 = 2.0;
+
+/// Largest piece of a light, as a share of its height over what it lights.
+const MAX_PIECE: f64 = 0.25;
+
 /// A part of a plane that light falls on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LitPatch {
@@ -20,6 +27,27 @@ pub(super) struct LitPatch {
     pub(super) normal: Vector3<f64>,
     /// Metres from its middle to its far ends.
     pub(super) reach: f64,
+    /// How far things that cast shadows stand up from it, metres.
+    pub(super) occluded: f64,
+    /// Distance of two nodes of the finer lattice on it, metres; 0 where every sample is wanted.
+    pub(super) cell: f64,
+}
+
+impl LitPatch {
+    /// Samples along each side of a light: as many as its own size asks for and the width of the
+    /// widest penumbra, `most` at most.
+    fn samples_per_side(&self, light: &AreaLight, most: usize) -> usize {
+        let rise = self
+            .normal
+            .dot(&(light::frame(light).center.coords - self.center));
+        let size = light::longer_side(light);
+        let pieces = size / (MAX_PIECE * rise.max(0.0));
+        let penumbra = size * self.occluded / (rise - self.occluded).max(0.0);
+        let steps = penumbra / (PENUMBRA_STEP_CELLS * self.cell);
+        // Where nothing casts a shadow in any detail, 0 over 0, the maximum passes over it.
+        let wanted = pieces.max(steps).max(1.0);
+        (wanted.ceil() as usize).min(most.max(1))
+    }
 }
 
 /// A point (`at.w = 1`) or a direction (`at.w = 0`) that light comes from, in homogeneous
@@ -142,6 +170,7 @@ impl LightGroup {
     /// in closed form: the few nodes of a large light near by add up to several times too much or
     /// too little.
     fn face_above(light: &AreaLight, count: usize, patch: &LitPatch) -> Self {
+        let count = patch.samples_per_side(light, count);
         let nodes = light::nodes_above(light, count, Point3::from(patch.center), &patch.normal);
         let group = Self::area_light(light, nodes);
         let factor = group.closed_form_ratio(light, patch);
@@ -306,6 +335,8 @@ mod tests {
             center: Vector3::zeros(),
             normal,
             reach,
+            occluded: 0.1,
+            cell: 0.0,
         };
         LightSamples::faces_above(&shot, &options, &patch).remove(0)
     }
@@ -334,6 +365,27 @@ mod tests {
         }
         let straight = light::irradiance(&disk(10.0, 1.0), Point3::origin(), Vector3::z());
         assert!((f64::from(straight.g) / (10.0 / PI / 26.0) - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn penumbrae_of_a_few_pixels_need_few_samples() {
+        let samples = |size: f64, height: f64, occluded: f64| {
+            let patch = LitPatch {
+                center: Vector3::zeros(),
+                normal: Vector3::z(),
+                reach: 0.1,
+                occluded,
+                cell: 0.002,
+            };
+            patch.samples_per_side(&disk(size, height), 3)
+        };
+        // Penumbrae of 0, 0.3, 3 and 15 cells.
+        let by_height = [0.0, 0.01, 0.1, 0.4].map(|occluded| samples(0.05, 1.0, occluded));
+        assert_eq!(by_height, [1, 1, 2, 3]);
+        let by_size = [0.2, 0.5, 5.0].map(|size| samples(size, 1.0, 0.0));
+        assert_eq!(by_size, [1, 2, 3]);
+        let [beside, below] = [0.1, -1.0].map(|height| samples(0.01, height, 0.1));
+        assert_eq!([beside, below], [3, 3]);
     }
 
     #[test]

@@ -42,6 +42,13 @@ impl<'a> Occluders<'a> {
             tinted: known.iter().any(|mips| mips.is_film()),
         }
     }
+
+    /// How far cards stand up from the plane through a point with this unit normal, metres.
+    pub(super) fn height_above(&self, normal: &Vector3<f64>, point: &Vector3<f64>) -> f64 {
+        let corners = self.cards.iter().flat_map(|card| card.plane.corners());
+        let heights = corners.map(|corner| normal.dot(&(corner - point)));
+        heights.fold(0.0, f64::max)
+    }
 }
 
 impl<'a> Occluder<'a> {

@@ -132,10 +132,15 @@ impl<'a> LightingContext<'a> {
     /// What lights a plane, as far as it matters, on the side of the camera; none where it is seen
     /// edge-on. The normal is that of every lattice.
     fn light_samples(&self, plane: &ScenePlane, reach: f64) -> Option<LightSamples> {
+        let projected = ProjectedPlane::new(plane, &self.fine.view)?;
         let patch = LitPatch {
             center: plane.center,
-            normal: ProjectedPlane::new(plane, &self.fine.view)?.normal,
+            normal: projected.normal,
             reach,
+            occluded: self
+                .occluders
+                .height_above(&projected.normal, &plane.center),
+            cell: projected.cell_metres(&self.fine.view, &plane.center),
         };
         Some(LightSamples::above(self.shot, &self.options, &patch))
     }

@@ -172,6 +172,8 @@ mod tests {
             center: occluders.surface.center,
             normal: seen.normal,
             reach: 0.15,
+            occluded: 0.3,
+            cell: 0.0,
         };
         LightSamples::above(shot, &RenderOptions::default(), &patch)
     }

@@ -97,6 +97,8 @@ impl BentShading {
                 center: plane.center,
                 normal: card.quad.world_from_card.rotation * cylinder.normal(arc) * side,
                 reach: plane.half_length(),
+                occluded: plane.half_length(),
+                cell: 0.0,
             };
             open_irradiance(darkroom, &patch)
         };
