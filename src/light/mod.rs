@@ -42,7 +42,6 @@ mod surface;
 
 pub(crate) use ambient::ambient_directions;
 #[doc(hidden)]
-pub(crate) use area::longer_side;
 pub use area::{LightFrame, frame, radiance};
 #[doc(hidden)]
 pub use blur::plate_blur;

@@ -37,12 +37,13 @@ impl LitPatch {
     /// Samples along each side of a light: as many as its own size asks for and the width of the
     /// widest penumbra, `most` at most.
     fn samples_per_side(&self, light: &AreaLight, most: usize) -> usize {
-        let rise = self
-            .normal
-            .dot(&(light::frame(light).center.coords - self.center));
+        let way = light::frame(light).center.coords - self.center;
+        let rise = self.normal.dot(&way);
         let size = light::longer_side(light);
         let pieces = size / (MAX_PIECE * rise.max(0.0));
-        let penumbra = size * self.occluded / (rise - self.occluded).max(0.0);
+        // Of a light that faces what it lights; the lower it stands, the longer they are.
+        let slant = way.norm() / rise.max(0.0);
+        let penumbra = slant * size * self.occluded / (rise - self.occluded).max(0.0);
         let steps = penumbra / (PENUMBRA_STEP_CELLS * self.cell);
         // Where nothing casts a shadow in any detail, 0 over 0, the maximum passes over it.
         let wanted = pieces.max(steps).max(1.0);
@@ -379,13 +380,30 @@ mod tests {
             };
             patch.samples_per_side(&disk(size, height), 3)
         };
-        // Penumbrae of 0, 0.3, 3 and 15 cells.
+        // Penumbrae of 0, 0.3, 3 and 17 cells.
         let by_height = [0.0, 0.01, 0.1, 0.4].map(|occluded| samples(0.05, 1.0, occluded));
         assert_eq!(by_height, [1, 1, 2, 3]);
         let by_size = [0.2, 0.5, 5.0].map(|size| samples(size, 1.0, 0.0));
         assert_eq!(by_size, [1, 2, 3]);
         let [beside, below] = [0.1, -1.0].map(|height| samples(0.01, height, 0.1));
         assert_eq!([beside, below], [3, 3]);
+    }
+
+    #[test]
+    fn a_low_light_has_long_penumbrae() {
+        let low = AreaLight {
+            position: [2.0, 0.0, 0.4],
+            ..disk(0.06, 0.4)
+        };
+        let patch = LitPatch {
+            center: Vector3::zeros(),
+            normal: Vector3::z(),
+            reach: 0.1,
+            occluded: 0.02,
+            cell: 0.00235,
+        };
+        assert_eq!(patch.samples_per_side(&low, 3), 3);
+        assert_eq!(patch.samples_per_side(&disk(0.06, 0.4), 3), 1);
     }
 
     #[test]
