@@ -41,6 +41,7 @@ mod sky;
 mod surface;
 
 pub(crate) use ambient::ambient_directions;
+pub(crate) use area::longer_side;
 #[doc(hidden)]
 pub use area::{LightFrame, frame, radiance};
 #[doc(hidden)]
