@@ -2,11 +2,12 @@
 //! chance.
 //!
 //! `petcomp scene draw` writes such files: their table `[files]` names the folders of assets and
-//! photos.
+//! photos, their tables `[settings.labels]` say how labels are made and written. All must have the
+//! classes and the label settings of the first.
 //!
 //! `cargo run --release --example yolo_from_scenes FOLDER SCENE..`
 
-use petcomp::dataset::{DatasetConfig, Pictures, Pipeline, Plan, Sample, Yolo, generate};
+use petcomp::dataset::{DatasetConfig, Pipeline, Plan, Sample, Writer, generate};
 use petcomp::{Error, Result, Scene, io};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -18,18 +19,30 @@ fn main() -> Result<()> {
     let Some(first) = paths.first() else {
         return Err(Error::value("SCENE", "none, expected at least one file"));
     };
-    let classes = open(first)?.0.library().classes.clone();
-    let plan = Plan {
-        writers: vec![Arc::new(Pictures::default()), Arc::new(Yolo::default())],
-        ..Plan::new(&folder, paths.len() as u64, classes)
-    };
-    let sample = |k| sample(&paths[k as usize]);
+    let first = open(first)?.0;
+    let plan = plan(&first, &folder, paths.len() as u64)?;
+    let sample = |k: u64| sample(&paths[k as usize], &first);
     let counts = generate(&plan, sample, &|_| (), &AtomicBool::new(false))?;
     println!(
         "{folder}: {} images, {} labels",
         counts.images, counts.labelled
     );
     Ok(())
+}
+
+/// A dataset as the first scene has its labels.
+fn plan(first: &Pipeline, folder: &str, count: u64) -> Result<Plan> {
+    let DatasetConfig {
+        labels, pictures, ..
+    } = first.config();
+    let mut writers: Vec<Arc<dyn Writer>> = vec![Arc::new(pictures.clone())];
+    writers.extend(labels.writers(pictures));
+    let classes = labels.obstructed.classes(&first.library().classes)?;
+    Ok(Plan {
+        writers,
+        obstructed: labels.obstructed,
+        ..Plan::new(folder, count, classes)
+    })
 }
 
 /// A scene, and the assets and the photo that it names.
@@ -39,7 +52,23 @@ fn open(path: &str) -> Result<(Pipeline, Scene)> {
     Ok((Pipeline::open_for(config, &scene)?, scene))
 }
 
-fn sample(path: &str) -> Result<Sample> {
+fn sample(path: &str, first: &Pipeline) -> Result<Sample> {
     let (pipeline, scene) = open(path)?;
-    pipeline.take(scene).map_err(|e| e.in_file(path))
+    check_alike(&pipeline, first)
+        .and_then(|()| pipeline.take(scene))
+        .map_err(|e| e.in_file(path))
+}
+
+/// Fails where a scene's labels would mean something else than the first one's.
+fn check_alike(pipeline: &Pipeline, first: &Pipeline) -> Result<()> {
+    let [own, expected] = [pipeline, first].map(|opened| &opened.library().classes);
+    if own != expected {
+        let what = format!("{own:?}, expected those of the first scene, {expected:?}");
+        return Err(Error::value("classes", what));
+    }
+    if pipeline.config().labels != first.config().labels {
+        let what = "others than the first scene's, expected the same";
+        return Err(Error::value("settings.labels", what));
+    }
+    Ok(())
 }

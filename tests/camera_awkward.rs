@@ -6,7 +6,8 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests are tests")]
 
 use petcomp::camera::simulate::{Scenario, View};
-use petcomp::camera::{self, FocalSource, Label, Priors, Solution, SolveError, SolveOptions};
+use petcomp::camera::{self, FocalSource, Label, LabelPoint, MarkerMap, Priors, Solution};
+use petcomp::camera::{SolveError, SolveOptions};
 use petcomp::{Code, Severity};
 use proptest::prelude::*;
 
@@ -114,6 +115,60 @@ fn lengths_may_be_missing_but_not_both() {
     };
     let relative = camera::solve(&view.label, &unit).unwrap();
     assert_eq!(relative.size[0], 1.0);
+}
+
+#[test]
+fn points_instead_of_corners_need_both_sides() {
+    let mut label = Scenario::default().tilted(30.0).view(1, 1).label;
+    let corners = label.surface.corners_px.take().unwrap();
+    let places = [[-0.3, 0.2], [0.3, 0.2], [0.3, -0.2], [-0.3, -0.2]];
+    let point = |(px, [x, y]): ([f64; 2], [f64; 2])| LabelPoint {
+        xyz_m: [x, y, 0.0],
+        px,
+        sigma_px: None,
+        note: None,
+    };
+    label.points = corners.into_iter().zip(places).map(point).collect();
+    let refusal = |label: &Label| camera::solve(label, &SolveOptions::default()).unwrap_err();
+    solve(&label);
+    label.surface.height_m = None;
+    let one = refusal(&label).to_string();
+    assert!(
+        one.ends_with("surface.height_m: surface.height_m is missing"),
+        "{one}"
+    );
+    label.surface.width_m = None;
+    let both = refusal(&label).to_string();
+    assert!(
+        both.ends_with("surface.height_m: both are missing"),
+        "{both}"
+    );
+    label.surface.width_m = Some(0.6);
+    label.points.clear();
+    assert_eq!(refusal(&label), SolveError::NoCorners);
+    label.markers = Some(MarkerMap {
+        family: "DICT_4X4_50".into(),
+        artwork: Default::default(),
+        size_m: 0.04,
+        map: Default::default(),
+    });
+    assert_eq!(refusal(&label), SolveError::NoMarkerCorners);
+}
+
+#[test]
+fn a_stated_height_may_be_off_as_far_as_the_sides_make_it() {
+    let view = Scenario::default().tilted(30.0).view(1, 1);
+    let height = view.camera.center().z;
+    let mut label = view.label;
+    (label.camera.focal_px, label.camera.focal_fixed) = (Some(3200.0), true);
+    label.camera.height_m = Some(0.95 * height);
+    label.camera.height_sigma_m = Some(0.005 * height);
+    label.surface.dimension_sigma_m = Some(1e-5);
+    assert!(solve(&label).misfit().is_some());
+    label.surface.dimension_sigma_m = Some(0.03);
+    let solution = solve(&label);
+    assert_eq!(solution.misfit(), None);
+    assert!(solution.sigma.center[(2, 2)].sqrt() > 0.04 * height);
 }
 
 #[test]

@@ -8,10 +8,10 @@ use petcomp::camera::Camera;
 use petcomp::dataset::index::DatasetIndex;
 use petcomp::dataset::{
     ArchiveStore, Coco, ContactSheetOptions, DatasetConfig, DatasetCounts, Group, LabelConfig,
-    NEAR_DUPLICATE_RMS, Obstructed, Partition, PictureFormat, Pictures, Pipeline, Plan, Progress,
-    Provenance, Sample, SampleRange, SampleRecord, Shard, Sidecar, Split, SplitOrder, Summary,
-    WebDataset, Writer, Yolo, YoloSet, YoloTask, check, contact_sheet_of, generate, merge, repair,
-    repair_archives,
+    NEAR_DUPLICATE_RMS, Obstructed, Part, Partition, PictureFormat, Pictures, Pipeline, Plan,
+    Progress, Provenance, Sample, SampleRange, SampleRecord, Shard, Sidecar, Split, SplitOrder,
+    Summary, WebDataset, Writer, Yolo, YoloSet, YoloTask, check, contact_sheet_of, generate, merge,
+    repair, repair_archives,
 };
 use petcomp::eval::read_yolo_truth_of;
 use petcomp::geom::BBox;
@@ -1778,6 +1778,50 @@ fn an_image_that_looks_like_a_trained_one_is_a_leak() {
         found.contains("images/val/000005.png: leak: differs from images/train/000006.png"),
         "{found}"
     );
+}
+
+#[test]
+fn a_copy_is_a_leak_whatever_its_labels_say() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let path = |name: &str| dir.path().join(name);
+    let [train, val] = ["train/000006", "val/000005"];
+    let mut retouched: Image<LinearRgb> = io::read(path(&format!("images/{train}.png"))).unwrap();
+    retouched[(0, 0)] = retouched[(0, 0)].scale(0.95);
+    io::write(path("retouched.png"), &retouched).unwrap();
+    let original = format!("images/{train}.png");
+    for (picture, told) in [
+        (original.as_str(), "the same bytes as"),
+        ("retouched.png", "leak: differs from"),
+    ] {
+        std::fs::copy(path(picture), path(&format!("images/{val}.png"))).unwrap();
+        for labels in ["", "0 0.5 0.5 0.9 0.9\n"] {
+            std::fs::write(path(&format!("labels/{val}.txt")), labels).unwrap();
+            let set = YoloSet::read(dir.path()).unwrap();
+            let leakage = set.leakage(NEAR_DUPLICATE_RMS).unwrap();
+            assert_eq!(leakage.near_duplicates.len(), 1, "{picture} {labels:?}");
+            let found = faults(dir.path()).join("\n");
+            let expected = format!("images/{val}.png: {told} images/{train}.png");
+            assert!(found.contains(&expected), "{labels:?}: {found}");
+        }
+    }
+}
+
+#[test]
+fn a_dataset_may_be_made_for_one_part_alone() {
+    for (val_percent, empty) in [(0, Part::Val), (100, Part::Train)] {
+        let dir = tempfile::tempdir().unwrap();
+        let split = Split {
+            val_percent,
+            ..Split::default()
+        };
+        let plan = plan(dir.path(), 12);
+        make(&Plan { split, ..plan }).unwrap();
+        assert_eq!(faults(dir.path()), [""; 0]);
+        let checked = check(dir.path()).unwrap();
+        assert_eq!(checked.empty_part, Some(empty));
+        assert!(checked.notes().is_empty(), "{:?}", checked.notes());
+    }
 }
 
 /// A faint object of 12 x 9 pixels on a grainy plate, and its label file.

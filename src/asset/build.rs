@@ -2,9 +2,10 @@
 
 use super::MANIFEST;
 use super::entry::PhotoEntry;
+use super::files;
 use super::folder::{CutOutWriter, lock, read_or_new};
 use super::library::{Library, Photo};
-use super::list::{List, check_reviews, find_list};
+use super::list::{List, check_not_written_over, check_reviews, find_list};
 use super::manifest::{Manifest, PhotoRecord};
 use super::review::Review;
 use super::screen_source::EmptyScreens;
@@ -48,9 +49,10 @@ pub struct Built {
 /// was.
 ///
 /// # Errors
-/// A list that cannot be read or be right, or a photo that is missing (before any work); the first
-/// photo that cannot be read (the cut-outs of the others are in the folder), or [`Error::File`]
-/// where no photo gives a cut-out; [`Error::Interrupted`] after a stop; those of [`Library::open`]
+/// A list that cannot be read or be right, or a photo that is missing or lies where a file of the
+/// folder would be written (before any work); the first photo that cannot be read (the cut-outs of
+/// the others are in the folder), or [`Error::File`] where no photo gives a cut-out and a person did
+/// not reject all of them; [`Error::Interrupted`] after a stop; those of [`Library::open`]
 /// for cut-outs that were there before.
 pub fn build(
     list: impl AsRef<Path>,
@@ -61,13 +63,14 @@ pub fn build(
     let (path, folder) = (find_list(list.as_ref())?, folder.as_ref());
     let list = List::read(&path)?;
     let list = checked(list, &path, &mut read_or_new(folder)?)?;
+    check_not_written_over(&list.photos, folder)?;
     let outcomes = cut_out_all(&list, folder, progress, stop);
     let recorded = record(&list, outcomes, folder, stop);
     let (manifest, mut taken) = recorded.map_err(|e| e.in_file(&path))?;
     if let Some(error) = taken.failed.take() {
         return Err(error.in_file(&path));
     }
-    if taken.photos.is_empty() {
+    if taken.photos.is_empty() && taken.refused.len() > taken.rejected {
         return Err(no_cut_out(&path, &taken.refused));
     }
     let library = Library::from_manifest(folder, manifest, &taken.photos)?;
@@ -162,9 +165,11 @@ fn record(
     let mut manifest = read_or_new(folder)?;
     list.add_classes_to(&mut manifest)?;
     let taken = take_in(list, outcomes, &mut manifest);
-    if taken.removed || !taken.photos.is_empty() {
+    if !taken.removed.is_empty() || !taken.photos.is_empty() {
         manifest.write(folder)?;
     }
+    let mut removed = taken.removed.iter();
+    removed.try_for_each(|file| files::remove(folder, file))?;
     Ok((manifest, taken))
 }
 
@@ -176,8 +181,8 @@ struct TakenIn {
     refused: Vec<String>,
     /// How many of these a person rejected.
     rejected: usize,
-    /// The manifest had an earlier cut-out of one of these.
-    removed: bool,
+    /// Earlier cut-outs of these that the manifest had.
+    removed: Vec<String>,
     /// The first that could not be read or written, or fits no asset.
     failed: Option<Error>,
 }
@@ -189,7 +194,10 @@ fn take_in(list: &List, outcomes: Vec<Result<Photo>>, manifest: &mut Manifest) -
         match outcome.and_then(|photo| inserted(photo, entry, manifest)) {
             Ok(photo) => taken.photos.push(photo),
             Err(refusal @ Error::Photo { .. }) => {
-                taken.removed |= manifest.remove(&entry.cut_out_file());
+                let file = entry.cut_out_file();
+                if manifest.remove(&file) {
+                    taken.removed.push(file);
+                }
                 taken.refused.push(refusal.to_string());
                 taken.rejected += usize::from(is_rejected(entry));
             }
@@ -416,9 +424,15 @@ mod tests {
         for name in ["one", "two"] {
             reject(&folder, name);
         }
+        let built = build(&list, &out, &|_, _| ()).unwrap();
+        assert_eq!((built.photos, built.rejected), (0, 2));
+        assert!(Library::open(&out).unwrap().assets.is_empty());
+        assert_eq!(std::fs::read_dir(out.join("a")).unwrap().count(), 0);
+        let empty = Image::filled(120, 80, LinearRgb::new(0.04, 0.4, 0.08));
+        io::write(folder.path().join("two.png"), &empty).unwrap();
+        std::fs::remove_file(folder.path().join("two.review.json")).unwrap();
         let told = build(&list, &out, &|_, _| ()).unwrap_err().to_string();
         assert!(told.contains("no photo gave a cut-out"), "{told}");
-        assert!(Library::open(&out).unwrap().assets.is_empty());
     }
 
     #[test]
@@ -432,6 +446,7 @@ mod tests {
         let told = add().unwrap_err().to_string();
         assert!(told.contains("one.png: rejected in"), "{told}");
         assert!(Library::open(&out).unwrap().assets.is_empty());
+        assert_eq!(std::fs::read_dir(out.join("a")).unwrap().count(), 0);
     }
 
     #[test]
@@ -578,15 +593,6 @@ mod tests {
                 .ends_with("photos[1].px_per_metre: 1e308, expected 1 to 1e7 (pixels for a metre)"),
             "{scale}"
         );
-        let scale = reported("px_per_metre = 100.0", "px_per_metre = 2.0");
-        assert!(
-            scale.contains("photos.toml: photos[1].px_per_metre: 2, makes what is in two.png 30"),
-            "{scale}"
-        );
-        assert!(
-            scale.ends_with("; is it pixels for a centimetre?"),
-            "{scale}"
-        );
         assert!(
             reported("length = 0.3", "length = 0.3\nthickness = 5")
                 .contains("photos[0].thickness: 5, expected")
@@ -595,6 +601,41 @@ mod tests {
             reported("length = 0.3", "length = 0.3\nmass = 1e300")
                 .contains("photos[0].mass: 1e300, expected")
         );
+    }
+
+    #[test]
+    fn a_scale_that_is_wrong_for_one_photo_does_not_stop_the_others() {
+        let folder = folder_with(&TWO.replace("px_per_metre = 100.0", "px_per_metre = 2.0"));
+        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        let built = build(&list, &out, &|_, _| ()).unwrap();
+        assert_eq!(cut_outs(&built.library), ["a/one.exr"]);
+        let [told] = &built.refused[..] else {
+            panic!("one photo is refused")
+        };
+        let expected = "no cut-out: px_per_metre: 2, makes what is in two.png 30";
+        assert!(told.starts_with(expected), "{told}");
+        assert!(told.ends_with("; is it pixels for a centimetre?"), "{told}");
+    }
+
+    #[test]
+    fn a_photo_where_its_cut_out_would_go_is_refused_before_any_work() {
+        let folder = folder_with(&TWO.replace("one.png", "a/one.png"));
+        let photo = folder.path().join("a/one.png");
+        io::create_folder(folder.path().join("a")).unwrap();
+        io::write(&photo, &slab()).unwrap();
+        let before = std::fs::read(&photo).unwrap();
+        let list = folder.path().join("photos.toml");
+        let entry = PhotoEntry::new(&photo, "a", "cap", Scale::Length(0.3));
+        let added = add_photo(folder.path(), &entry, &[], &CutOutOptions::default());
+        for told in [
+            build(&list, folder.path(), &|_, _| ()).unwrap_err(),
+            added.unwrap_err(),
+        ] {
+            let told = told.to_string();
+            assert!(told.contains("is read and would be written over"), "{told}");
+        }
+        assert_eq!(std::fs::read(&photo).unwrap(), before);
+        assert!(!folder.path().join("a/two.exr").exists());
     }
 
     #[test]

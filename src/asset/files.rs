@@ -1,13 +1,14 @@
 //! The files of one cut-out: film and thumbnail.
 
 use super::thumbnail::thumbnail;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::Point2;
 use crate::image::Image;
 use crate::io;
 use crate::pixel::{Film, LinearRgb};
 use crate::stopwatch::Stopwatch;
 use half::f16;
+use std::io::ErrorKind;
 use std::path::Path;
 
 /// Writes film (`.exr`) and thumbnail (`.png`) under one name, and returns the film as it will be
@@ -93,6 +94,25 @@ fn through_half(value: f32) -> f32 {
 pub(super) fn flow_file(cut_out: &str) -> String {
     let stem = cut_out.strip_suffix(".exr").unwrap_or(cut_out);
     format!("{stem}.flow.exr")
+}
+
+/// All files of a cut-out, relative to the folder; a flow is not always among them.
+pub(super) fn all_of(cut_out: &str) -> [String; 3] {
+    let stem = cut_out.strip_suffix(".exr").unwrap_or(cut_out);
+    let thumbnail = format!("{stem}.png");
+    [cut_out.to_owned(), thumbnail, flow_file(cut_out)]
+}
+
+/// Deletes the files of a cut-out that the manifest tells of no more.
+///
+/// # Errors
+/// [`Error::File`] for one that cannot be deleted.
+pub(super) fn remove(folder: &Path, cut_out: &str) -> Result<()> {
+    let mut paths = all_of(cut_out).into_iter().map(|file| folder.join(file));
+    paths.try_for_each(|path| match std::fs::remove_file(&path) {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::file(path, e)),
+        _ => Ok(()),
+    })
 }
 
 /// As exact as a pixel coordinate needs to be in a file that people read.

@@ -7,6 +7,7 @@ use super::entry::PhotoEntry;
 use super::files;
 use super::flow_file;
 use super::library::{Photo, check_pixels};
+use super::list::check_not_written_over;
 use super::manifest::{Manifest, PhotoRecord};
 use super::measure::MeasuredSize;
 use super::open_photo::OpenPhoto;
@@ -38,7 +39,8 @@ const LOCK: &str = ".lock";
 /// processes may add to one folder at a time.
 ///
 /// # Errors
-/// [`Error::Value`] for a wrong name, class or size; those of reading the photo and of
+/// [`Error::Value`] for a wrong name, class or size; [`Error::File`] for a photo that lies where its
+/// cut-out would be written; those of reading the photo and of
 /// [`cut_out`](crate::matte::cut_out), naming the photo; those of writing.
 pub fn add_photo(
     folder: impl AsRef<Path>,
@@ -50,6 +52,7 @@ pub fn add_photo(
     let mut manifest = read_or_new(folder)?;
     manifest.add_classes(classes, entry.label_class().into_iter())?;
     entry.check(&manifest)?;
+    check_not_written_over(std::slice::from_ref(entry), folder)?;
     let entry = &entry.clone().with_body(manifest.known_body(&entry.asset));
     let writer = CutOutWriter {
         folder,
@@ -61,6 +64,7 @@ pub fn add_photo(
     let mut manifest = read_or_new(folder)?;
     if is_refusal(&outcome) && manifest.remove(&entry.cut_out_file()) {
         manifest.write(folder)?;
+        files::remove(folder, &entry.cut_out_file())?;
     }
     let photo = outcome?;
     manifest.add_classes(classes, entry.label_class().into_iter())?;
@@ -105,10 +109,12 @@ impl CutOutWriter<'_> {
     /// Writes the cut-out and the thumbnail of one photo, and returns the photo as it would be read
     /// back.
     pub(super) fn write(&self, entry: &PhotoEntry) -> Result<Photo> {
-        match &entry.captured {
+        let mut photo = match &entry.captured {
             Some(captured) => self.write_captured(entry, captured),
             None => self.write_cut_out(entry),
-        }
+        }?;
+        photo.record.source_crc32 = Some(Checksum::from_file(&entry.file)?.crc32);
+        Ok(photo)
     }
 
     /// Measures an object that was captured on a display.
@@ -210,7 +216,7 @@ fn to_review(cut: &CutOut) -> impl Iterator<Item = Diagnostic> {
 /// The entry of a cut-out in the manifest.
 ///
 /// # Errors
-/// [`Error::Value`] for a scale that makes the object too short or too long.
+/// [`Error::Photo`] for an object that the scale makes too short or too long.
 fn new_record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<PhotoRecord> {
     let scale = entry.scale()?;
     let measured = MeasuredSize::new(cut, scale, photo);

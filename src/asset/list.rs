@@ -1,7 +1,9 @@
 //! A list of photos, as a person or a spreadsheet writes it.
 
+use super::CONTACT_SHEET;
 use super::body::KnownBody;
 use super::entry::PhotoEntry;
+use super::files;
 use super::manifest::{Manifest, check_each};
 use super::review::Review;
 use super::spreadsheet::{self, SpreadsheetRow};
@@ -9,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::io;
 use crate::matte::CutOutOptions;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
@@ -147,14 +149,12 @@ impl List {
     /// The same with the paths of a list in `folder` relative to the working folder.
     #[doc(hidden)]
     pub fn located_in(mut self, folder: &Path) -> Self {
+        let located = |path: &Path| with_actual_spelling(folder.join(path));
         for photo in &mut self.photos {
-            photo.file = with_actual_spelling(folder.join(&photo.file));
-            photo.screen.locate_in(folder);
-            let located = |path| with_actual_spelling(folder.join(path));
-            photo.captured = photo
-                .captured
-                .take()
-                .map(|captured| captured.located(located));
+            photo.file = located(&photo.file);
+            photo.screen.locate(located);
+            let captured = photo.captured.take();
+            photo.captured = captured.map(|captured| captured.located(|path| located(&path)));
         }
         self
     }
@@ -176,6 +176,30 @@ pub fn check_cut_out_files(photos: &[PhotoEntry]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// No file of an asset folder goes where a picture of these photos lies, under whatever name; their
+/// paths are relative to the working folder.
+///
+/// # Errors
+/// [`Error::File`] for the first picture that would be written over.
+pub fn check_not_written_over(photos: &[PhotoEntry], folder: &Path) -> Result<()> {
+    let pictures = photos.iter().flat_map(PhotoEntry::pictures);
+    let read: BTreeSet<PathBuf> = pictures
+        .filter_map(|path| path.canonicalize().ok())
+        .collect();
+    let written = photos
+        .iter()
+        .flat_map(|photo| files::all_of(&photo.cut_out_file()))
+        .chain([CONTACT_SHEET.to_owned()]);
+    let is_read = |path: &PathBuf| path.canonicalize().is_ok_and(|real| read.contains(&real));
+    match written.map(|file| folder.join(file)).find(is_read) {
+        Some(path) => {
+            let what = "is read and would be written over; expected another output folder";
+            Err(Error::file(path, what))
+        }
+        None => Ok(()),
+    }
 }
 
 /// No review that is there is that of two photos; their paths are relative to the working folder.
@@ -345,6 +369,45 @@ mod tests {
         let told = check_reviews(&photos).unwrap_err().to_string();
         let names = ["photos[1].file", "one.png", "one.jpg", "one.review.json"];
         assert!(names.iter().all(|name| told.contains(name)), "{told}");
+    }
+
+    #[test]
+    fn pictures_are_never_where_a_cut_out_or_the_contact_sheet_goes() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |file: &str| folder.path().join(file);
+        std::fs::create_dir(place("cup")).unwrap();
+        let told = |photo: &str, screen: &str| {
+            std::fs::write(place(photo), "").unwrap();
+            let scale = super::super::Scale::Length(0.2);
+            let entry = PhotoEntry {
+                screen: ScreenSource::Photo(place(screen)),
+                ..PhotoEntry::new(place(photo), "cup", "cup", scale)
+            };
+            // The same folder by another name.
+            check_not_written_over(&[entry], &place("cup/.."))
+        };
+        for (photo, screen) in [
+            ("cup/1.png", "none.png"),
+            ("cup/1.exr", "none.png"),
+            ("contact_sheet.png", "none.png"),
+            ("1.jpg", "cup/1.png"),
+        ] {
+            let told = told(photo, screen).unwrap_err().to_string();
+            assert!(told.contains("is read and would be written over"), "{told}");
+        }
+        told("cup/2.jpg", "cup/1.png").unwrap();
+    }
+
+    #[test]
+    fn a_screen_is_found_in_another_spelling_as_a_photo_is() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("Empty.JPEG"), "").unwrap();
+        let text = "[[photos]]\nfile = \"a.png\"\nasset = \"a\"\nclass = \"c\"\nlength = 0.2\n\
+                    screen = \"empty.jpg\"\n";
+        let list: List = toml::from_str(text).unwrap();
+        let screen = &list.located_in(folder.path()).photos[0].screen;
+        let found = folder.path().join("Empty.JPEG");
+        assert_eq!(screen, &ScreenSource::Photo(found));
     }
 
     #[test]

@@ -61,6 +61,9 @@ pub struct PhotoRecord {
     pub crc32: Option<u32>,
     /// Name of the photo that it was cut from.
     pub source: String,
+    /// CRC-32 of that photo; missing in older manifests.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source_crc32: Option<u32>,
     /// Pixels of the cut-out for a metre.
     pub px_per_metre: f64,
     /// Width and height of the whole cut-out, metres.
@@ -242,7 +245,7 @@ impl Manifest {
     }
 
     /// Adds a photo to an asset, which is made if it is not there; a photo of the same file is
-    /// replaced.
+    /// replaced, with a line in the log where that was another one.
     ///
     /// # Errors
     /// [`Error::Value`] (`class`) when the asset is known as something else.
@@ -297,6 +300,7 @@ impl Manifest {
             return Ok(());
         }
         check_unique("classes", declared.iter().map(String::as_str))?;
+        check_each(declared, "classes", |class| check_class(class))?;
         self.check_order(declared)?;
         self.classes = declared.to_vec();
         Ok(())
@@ -362,10 +366,24 @@ impl Asset<PhotoRecord> {
         self.check_same(asset.role, &asset.class)?;
         (self.thickness, self.mass) = (asset.thickness, asset.mass);
         for photo in asset.photos {
-            self.photos.retain(|old| old.file != photo.file);
-            self.photos.push(photo);
+            self.put(photo);
         }
         Ok(())
+    }
+
+    /// Adds a photo in place of the one of the same file.
+    fn put(&mut self, photo: PhotoRecord) {
+        let mut others = self.photos.iter();
+        if let Some(old) = others.find(|old| old.is_of_another_photo(&photo)) {
+            log::warn!(
+                "{}: replaces the cut-out of another photo, or of {} as it was; another object needs \
+                 another asset name (--name)",
+                old.file,
+                old.source
+            );
+        }
+        self.photos.retain(|old| old.file != photo.file);
+        self.photos.push(photo);
     }
 
     /// Fails for another role or class than its own.
@@ -429,6 +447,14 @@ fn append_new<'a>(classes: &mut Vec<String>, in_use: impl Iterator<Item = &'a st
 }
 
 impl PhotoRecord {
+    /// The files that a library reads for it, relative to the folder.
+    #[doc(hidden)]
+    pub fn files(&self) -> impl Iterator<Item = &str> {
+        let captured = self.captured.as_ref();
+        let flow = captured.and_then(|captured| captured.flow.as_deref());
+        std::iter::once(self.file.as_str()).chain(flow)
+    }
+
     /// A cut-out of full confidence of which nothing else is known: all of it is the object.
     pub fn new(
         file: impl Into<String>,
@@ -440,6 +466,7 @@ impl PhotoRecord {
             file: file.into(),
             crc32: None,
             source: String::new(),
+            source_crc32: None,
             px_per_metre,
             size_m,
             object_m: size_m,
@@ -468,6 +495,12 @@ impl PhotoRecord {
             },
             _ => self,
         }
+    }
+
+    /// The same file was cut from other bytes.
+    fn is_of_another_photo(&self, new: &Self) -> bool {
+        let sources = self.source_crc32.zip(new.source_crc32);
+        self.file == new.file && sources.is_some_and(|(old, new)| old != new)
     }
 
     /// A person should review this cut-out.
@@ -552,18 +585,20 @@ fn is_name_character(c: char) -> bool {
 /// File systems allow 255 bytes with what is put behind.
 const MAX_NAME_BYTES: usize = 120;
 
-/// A name that stands on a line of its own in every format of labels.
+/// A name that stands on a line of its own in every format of labels, and is no other one by spaces
+/// that nobody sees.
 pub(super) fn check_class(name: &str) -> Result<()> {
     if is_class_name(name) {
         return Ok(());
     }
-    let what = format!("\"{}\", expected a name on one line", printable_start(name));
+    let start = printable_start(name);
+    let what = format!("\"{start}\", expected a name on one line without spaces around it");
     Err(Error::value("class", what))
 }
 
 fn is_class_name(name: &str) -> bool {
-    let is_short = !name.trim().is_empty() && name.len() <= MAX_NAME_BYTES;
-    is_short && !name.chars().any(char::is_control)
+    let is_short = !name.is_empty() && name.len() <= MAX_NAME_BYTES;
+    is_short && name.trim() == name && !name.chars().any(char::is_control)
 }
 
 /// The beginning of a name, on one line.
@@ -729,6 +764,11 @@ pub(super) mod tests {
              delete the folder to build it anew"
         );
         assert!(
+            learned(&[], &["can", " cup"], &[])
+                .unwrap_err()
+                .contains("\" cup\", expected a name on one line without spaces around it")
+        );
+        assert!(
             learned(&[], &["can", "can"], &[])
                 .unwrap_err()
                 .contains("is there twice")
@@ -783,7 +823,7 @@ pub(super) mod tests {
             assert!(check_name(name).is_err(), "{name}");
         }
         assert!(check_class("see-through bottle").is_ok());
-        for class in ["", " ", "a\nb", "\u{1b}[31m"] {
+        for class in ["", " ", " cup", "cup ", "a\nb", "\u{1b}[31m"] {
             assert!(
                 check_class(class)
                     .unwrap_err()
@@ -855,6 +895,28 @@ pub(super) mod tests {
         assert_eq!(manifest.assets[1].photos.len(), 1);
         assert_eq!(manifest.assets[1].photos[0].px_per_metre, 120.0);
         assert!(manifest.insert(asset("a", "cap")).is_err());
+    }
+
+    #[test]
+    fn another_photo_of_the_same_name_is_known_by_its_bytes() {
+        let of = |file: &str, source_crc32| PhotoRecord {
+            source_crc32,
+            ..photo(file)
+        };
+        let old = of("a/1.exr", Some(7));
+        assert!(old.is_of_another_photo(&of("a/1.exr", Some(8))));
+        for same in [
+            ("a/1.exr", Some(7)),
+            ("a/2.exr", Some(8)),
+            ("a/1.exr", None),
+        ] {
+            assert!(!old.is_of_another_photo(&of(same.0, same.1)), "{same:?}");
+        }
+        let written = toml::to_string(&old).unwrap();
+        assert_eq!(toml::from_str::<PhotoRecord>(&written).unwrap(), old);
+        let older = written.replace("source_crc32 = 7\n", "");
+        let read: PhotoRecord = toml::from_str(&older).unwrap();
+        assert_eq!(read, of("a/1.exr", None));
     }
 
     #[test]

@@ -59,7 +59,7 @@ pub use folder::add_photo;
 pub use library::{Library, Photo};
 pub use list::List;
 #[doc(hidden)]
-pub use list::{check_cut_out_files, with_actual_spelling};
+pub use list::{check_cut_out_files, check_not_written_over, with_actual_spelling};
 pub use manifest::Asset;
 #[doc(hidden)]
 pub use manifest::{CaptureRecord, Manifest, PhotoRecord};
@@ -79,6 +79,10 @@ pub use texture::Texture;
 
 /// Name of the manifest in an asset folder.
 pub const MANIFEST: &str = "assets.toml";
+
+/// Name of the contact sheet that the program draws in an asset folder.
+#[doc(hidden)]
+pub const CONTACT_SHEET: &str = "contact_sheet.png";
 
 /// Thickness of an asset where none is given, metres: the thin box of the paper's colliders.
 pub(crate) const DEFAULT_THICKNESS: f64 = 0.005;

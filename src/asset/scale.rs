@@ -43,7 +43,8 @@ impl Scale {
     /// photographed on a screen.
     ///
     /// # Errors
-    /// [`Error::Value`], which asks about the unit where another one would make sense.
+    /// [`Error::Photo`], which asks about the unit where another one would make sense: other photos
+    /// of the same scale may be right.
     pub(super) fn check_length(self, length: f64, source: &str) -> Result<()> {
         if OBJECT.contains(length) {
             return Ok(());
@@ -57,9 +58,9 @@ impl Scale {
         };
         let length = number((1e4 * length).round() / 1e4);
         let what = format!(
-            "{value}, makes what is in {source} {length} m long, expected {OBJECT}{question}"
+            "{at}: {value}, makes what is in {source} {length} m long, expected {OBJECT}{question}"
         );
-        Err(Error::value(at, what))
+        Err(Error::Photo { what })
     }
 
     /// The field of an entry that gives it and its value, where that is something else than the

@@ -36,10 +36,10 @@ impl ScreenSource {
         }
     }
 
-    /// With its photo, where it is one, beside the list in this folder.
-    pub(super) fn locate_in(&mut self, folder: &Path) {
+    /// With its photo, where it is one, at the path that its own stands for.
+    pub(super) fn locate(&mut self, located: impl FnOnce(&Path) -> PathBuf) {
         if let Self::Photo(path) = self {
-            *path = folder.join(&path);
+            *path = located(path.as_path());
         }
     }
 

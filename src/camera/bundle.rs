@@ -536,8 +536,10 @@ fn with_fixed_lens(problem: &Problem, ln_focal: f64) -> Problem {
     problem
 }
 
-/// Gives all photos the priors of the lens of the one that knows most of its focal length.
+/// Gives all photos the priors of the lens of the one that knows most of its focal length, and the
+/// principal point as well as any of them knows it.
 fn share_lens(problems: &mut [Problem]) {
+    let principal_sigma = least(problems.iter(), |priors| priors.principal_sigma);
     let sigma = |problem: &&Problem| problem.residuals.priors.ln_focal.sigma;
     let known = problems.iter().min_by(|a, b| sigma(a).total_cmp(&sigma(b)));
     let Some((lens, source)) = known.map(|p| (p.residuals.priors, p.prior_source)) else {
@@ -547,11 +549,20 @@ fn share_lens(problems: &mut [Problem]) {
         problem.prior_source = source;
         problem.residuals.priors = ParameterPriors {
             ln_focal: lens.ln_focal,
-            principal_sigma: lens.principal_sigma,
+            principal_sigma,
             kappa: lens.kappa,
             ..problem.residuals.priors
         };
     }
+}
+
+/// The least of a standard deviation in the photos' priors.
+fn least<'a>(
+    problems: impl Iterator<Item = &'a Problem>,
+    sigma: impl Fn(&ParameterPriors) -> f64,
+) -> f64 {
+    let sigmas = problems.map(|problem| sigma(&problem.residuals.priors));
+    sigmas.fold(f64::INFINITY, f64::min)
 }
 
 /// Priors of the lens, and of each surface's stretch.
@@ -559,8 +570,9 @@ fn shared_priors(problems: &[Problem], surface: &[usize]) -> Option<Vec<Prior>> 
     let mut shared = lens_priors(&problems.first()?.residuals.priors).to_vec();
     let surfaces = surface.iter().max().map_or(0, |last| last + 1);
     shared.extend((0..surfaces).map(|s| {
-        let shown = surface.iter().position(|&x| x == s).unwrap_or(0);
-        Prior::at_zero(problems[shown].residuals.priors.stretch_sigma)
+        let photos = problems.iter().zip(surface).filter(|&(_, &x)| x == s);
+        let shown_by = photos.map(|(problem, _)| problem);
+        Prior::at_zero(least(shown_by, |priors| priors.stretch_sigma))
     }));
     Some(shared)
 }

@@ -64,6 +64,15 @@ pub enum SolveError {
     /// expected.
     #[error("{0}")]
     OutOfBounds(String),
+    /// There are points instead of corners, and not both sides: in words, which are missing.
+    #[error("points alone need surface.width_m and surface.height_m: {0}")]
+    PointsNeedSides(&'static str),
+    /// There are markers instead of corners, and none was looked for.
+    #[error(
+        "surface: corners_px is missing, and the corners of the markers are not among the points: \
+         `petcomp camera markers PHOTO --map LABEL -o LABEL` adds them"
+    )]
+    NoMarkerCorners,
     /// Two corners coincide.
     #[error(
         "surface.corners_px: the {} and the {} corner are {distance_px:.1} px apart, expected at least {limit_px:.1}",
@@ -100,8 +109,11 @@ pub enum SolveError {
     #[error("surface.corners_px: {0}, and the order has to be right")]
     Order(Diagnostic),
     /// Photos that should be of one camera differ in the shape of the picture, or in the principal
-    /// point or k1 that their labels state.
-    #[error("photo {photo} differs from another in shape, principal point or k1: not one camera")]
+    /// point or k1 that their labels state, or one was cropped nobody knows where.
+    #[error(
+        "photo {photo} differs from another in shape, principal point or k1, or one of them was cropped and states no \
+         principal point: not one camera"
+    )]
     DifferentPictures {
         /// Which photo, from 0.
         photo: usize,

@@ -57,8 +57,9 @@ impl OutlierPhoto {
 /// photo that no camera fits when it is alone takes no part, and keeps its own solution.
 ///
 /// # Errors
-/// [`SolveError::DifferentPictures`] where the shapes differ, or what is stated of the lens; the
-/// first photo's error where no photo can be used.
+/// [`SolveError::DifferentPictures`] where the shapes differ, or what is stated of the lens, or
+/// where one of several was cropped nobody knows where; the first photo's error where no photo can
+/// be used.
 pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, SolveError> {
     refuse_different_cameras(labels)?;
     let labels = with_shared_lens(labels);
@@ -317,7 +318,8 @@ impl JointEstimate {
 }
 
 /// Groups of labels that name the same camera and agree in the shape of their pictures and in what
-/// they state of the lens, each in order; unnamed cameras stand alone.
+/// they state of the lens, each in order; unnamed cameras stand alone, and so do pictures that were
+/// cropped nobody knows where ([`Framing::Cropped`] without a principal point).
 pub fn group_by_camera(labels: &[Label]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, label) in labels.iter().enumerate() {
@@ -409,6 +411,9 @@ fn share_principal_point(label: &mut Label, other: &Label) {
 /// Two pictures show the same frame of a camera, at any resolution: in units of the diagonal,
 /// everything that a camera's photos share is then the same.
 fn same_frame(a: &Label, b: &Label) -> bool {
+    if is_unknown_part(a) || is_unknown_part(b) {
+        return false;
+    }
     if is_part(a) || is_part(b) {
         return show_same_part(a, b);
     }
@@ -424,6 +429,11 @@ pub fn have_same_shape(a: [u32; 2], b: [u32; 2]) -> bool {
     let ([aw, ah], [bw, bh]) = (a.map(f64::from), b.map(f64::from));
     // Reduced sizes are rounded to whole pixels.
     (aw * bh - ah * bw).abs() <= aw.max(ah).max(bw).max(bh)
+}
+
+/// Cropped nobody knows where: each photo by hand has its principal point elsewhere.
+fn is_unknown_part(label: &Label) -> bool {
+    label.framing() == Framing::Cropped && label.camera.principal_point_px.is_none()
 }
 
 fn is_part(label: &Label) -> bool {
@@ -623,6 +633,44 @@ mod tests {
             solve_joint(&labels, &SolveOptions::default()),
             Err(SolveError::DifferentPictures { photo: 1 })
         ));
+    }
+
+    #[test]
+    fn a_photo_that_was_cropped_nobody_knows_where_stands_alone() {
+        let (labels, _) = labels(4, 2, [20.0, 30.0]);
+        let groups = |cropped: [bool; 2], principal_px: Option<[f64; 2]>| {
+            let mut labels = labels.clone();
+            for (label, cropped) in labels.iter_mut().zip(cropped) {
+                label.image.cropped = Some(cropped);
+                label.camera.principal_point_px = principal_px;
+            }
+            group_by_camera(&labels).len()
+        };
+        assert_eq!(groups([true, true], None), 2);
+        assert_eq!(groups([true, false], None), 2);
+        assert_eq!(groups([false, true], None), 2);
+        assert_eq!(groups([false, false], None), 1);
+        assert_eq!(groups([true, true], Some([1700.0, 1400.0])), 1);
+    }
+
+    #[test]
+    fn what_the_photos_state_counts_whatever_their_order() {
+        let (mut labels, _) = labels(4, 2, [20.0, 30.0]);
+        labels[0].surface.dimension_sigma_m = Some(0.001);
+        labels[1].image.cropped = None;
+        let sigma_of = |labels: &[Label]| {
+            let joint = solve_joint(labels, &SolveOptions::default()).unwrap();
+            joint.photos[0].as_ref().unwrap().sigma.ln_focal
+        };
+        let alone = solve(&labels[0], &SolveOptions::default()).unwrap();
+        let forwards = sigma_of(&labels);
+        labels.reverse();
+        let backwards = sigma_of(&labels);
+        assert!(
+            (forwards / backwards - 1.0).abs() < 1e-4,
+            "{forwards} {backwards}"
+        );
+        assert!(forwards < 1.02 * alone.sigma.ln_focal, "{forwards}");
     }
 
     #[test]

@@ -46,6 +46,8 @@ pub(crate) struct Problem {
     /// Sides of the rectangle before they are stretched, metres.
     pub(crate) size: [f64; 2],
     pub(crate) stretch_shares: StretchShares,
+    /// Relative standard deviation of all lengths, by that of the sides.
+    pub(crate) scale_sigma: f64,
     k1: Option<f64>,
     pub(crate) residuals: Residuals,
     pub(crate) prior_source: PriorSource,
@@ -62,7 +64,7 @@ impl Problem {
         // In one piece: each step needs what several before it have found.
         check_label(label)?;
         let sides = MeasuredSides::new(label, options)?;
-        let stretch_shares = sides.stretch_shares();
+        let (stretch_shares, scale_sigma) = (sides.stretch_shares(), sides.scale_sigma(label));
         let (corners_px, warnings) = used_corners(label, sides, options)?;
         let units = SolverUnits::for_picture(label);
         let (priors, prior_source) = units.lens_priors(label, framing, &options.priors);
@@ -75,7 +77,7 @@ impl Problem {
             observations: units.observations(label, size, &corners_px, stretch_shares),
             priors: ParameterPriors {
                 stretch_sigma: sides.stretch_sigma(label, &options.priors),
-                ln_height: height_prior(label, &units),
+                ln_height: height_prior(label, &units, scale_sigma),
                 ..priors
             },
             ln_focal_range: units.ln_focal_range(label),
@@ -89,6 +91,7 @@ impl Problem {
             projected,
             size,
             stretch_shares,
+            scale_sigma,
             k1,
             residuals,
             prior_source,
@@ -142,7 +145,7 @@ fn used_corners(
     let labelled = labelled_corners(label);
     let quad_px = labelled
         .or_else(|| sides.predicted_corners(label))
-        .ok_or(SolveError::NoCorners)?;
+        .ok_or_else(|| sides.missing_corners(label))?;
     let sigma_px = corner_sigma_px(label);
     let OrderedCorners {
         corners,
@@ -314,8 +317,9 @@ fn kappa_prior(label: &Label, priors: &Priors) -> Prior {
     Prior::at_zero(stated.unwrap_or(priors.kappa_sigma))
 }
 
-/// Prior of the logarithm of the camera's height above the surface, in the solver's units.
-fn height_prior(label: &Label, units: &SolverUnits) -> Prior {
+/// Prior of the logarithm of the camera's height above the surface, in the solver's units, which are
+/// as far off as the sides.
+fn height_prior(label: &Label, units: &SolverUnits, scale_sigma: f64) -> Prior {
     let Some(height) = label.camera.height_m else {
         return Prior::FLAT;
     };
@@ -325,7 +329,7 @@ fn height_prior(label: &Label, units: &SolverUnits) -> Prior {
         .map_or(STATED_HEIGHT_SIGMA, |s| s / height);
     Prior {
         mean: libm::log(height / units.unit),
-        sigma,
+        sigma: libm::hypot(sigma, scale_sigma),
     }
 }
 

@@ -6,10 +6,13 @@ use super::pinhole::Camera;
 use crate::bounds::{CAMERA, SURFACE, number};
 use crate::error::{Error, Result};
 use crate::io;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// How our label files are named: the photo's name, then this.
 pub(crate) const LABEL_SUFFIX: &str = ".label.json";
+/// What our labels say that they are.
+const OWN_FORMAT: &str = "plane-label";
 /// How camera files are named.
 const CAMERA_SUFFIX: &str = ".camera.json";
 /// Relative noise of a focal length that was recorded together with a digital zoom.
@@ -25,6 +28,8 @@ pub struct LabelledPhoto {
     /// What its files are called: `bg0001` of `bg0001.label.json`, or of another program's
     /// `bg0001.jpg`.
     pub name: String,
+    /// Read from a label of ours, not from another program's.
+    pub(super) is_ours: bool,
 }
 
 impl LabelledPhoto {
@@ -58,9 +63,12 @@ impl LabelledPhoto {
             .is_some_and(|file| file.to_string_lossy().starts_with(&start))
     }
 
-    /// Read from a label file, not from another program's.
-    fn is_ours(&self) -> bool {
-        ends_with(&self.source, LABEL_SUFFIX)
+    /// Both would have one camera file, or are of one photo. Only files that are called labels may
+    /// hold several of that: of another name one is a copy.
+    fn repeats(&self, other: &Self) -> bool {
+        let is_named = |one: &Self| ends_with(&one.source, LABEL_SUFFIX);
+        let is_of_its_photo = self.label.image.file == other.label.image.file;
+        self.name == other.name || is_of_its_photo && !(is_named(self) && is_named(other))
     }
 }
 
@@ -133,44 +141,51 @@ fn imported_labels(annotations: &[Annotation], path: &Path) -> Result<Vec<Labell
         .collect()
 }
 
-/// Reads the labels of a folder in order of name. Files that are of no label format are left out,
-/// and so are other programs' labels of photos that have one of ours.
+/// Reads the labels of a folder in order of name, ours whatever their files are called. Files that
+/// are of no label format are left out, and so are other programs' labels of photos that have one
+/// of ours.
 ///
 /// # Errors
 /// As [`read_labels`]; a folder that cannot be read; a photo that is labelled twice.
 pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<LabelledPhoto>> {
-    let mut found: Vec<LabelledPhoto> = Vec::new();
+    let mut all: Vec<LabelledPhoto> = Vec::new();
     for path in label_paths(folder)? {
-        let Some(labels) = labels_if_any(&path, size)? else {
-            log::info!("{}: no label", path.display());
-            continue;
-        };
-        for labelled in labels {
-            push_new(&mut found, labelled)?;
+        match labels_if_any(&path, size)? {
+            Some(labels) => all.extend(labels),
+            None => log::info!("{}: no label", path.display()),
         }
+    }
+    // Ours first: another program's does not replace it.
+    all.sort_by_key(|labelled| !labelled.is_ours);
+    let mut found = Vec::with_capacity(all.len());
+    for labelled in all {
+        push_new(&mut found, labelled)?;
     }
     found.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(found)
 }
 
-/// Adds a label of a photo that has none yet; leaves it out where one of ours is there.
+/// Adds a label of a photo that has none yet; leaves another program's out where one of ours is
+/// there.
 fn push_new(found: &mut Vec<LabelledPhoto>, labelled: LabelledPhoto) -> Result<()> {
-    match found.iter().find(|other| other.name == labelled.name) {
+    match found.iter().find(|other| labelled.repeats(other)) {
         None => found.push(labelled),
-        Some(ours) if ours.is_ours() && ours.source != labelled.source => {
+        Some(ours) if ours.is_ours && !labelled.is_ours => {
             let source = ours.source.display();
             log::info!("{labelled}: left out, since {source} is there");
         }
         Some(other) => {
-            let name = &labelled.name;
-            let what = format!("labels {name} once more, after {other}: both have one camera file");
+            let photo = stem(Path::new(&labelled.label.image.file));
+            let what = format!(
+                "labels {photo} once more, after {other}, expected one label and one camera file of it"
+            );
             return Err(Error::file(&labelled.source, what));
         }
     }
     Ok(())
 }
 
-/// The files of a folder that may hold labels, ours first: what is read later does not replace it.
+/// The files of a folder that may hold labels, in order of name.
 fn label_paths(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
     let mut paths: Vec<PathBuf> = entries
@@ -178,7 +193,7 @@ fn label_paths(folder: &Path) -> Result<Vec<PathBuf>> {
         .map(|entry| entry.path())
         .filter(|path| may_be_label(path))
         .collect();
-    paths.sort_by_key(|path| (!ends_with(path, LABEL_SUFFIX), path.clone()));
+    paths.sort();
     Ok(paths)
 }
 
@@ -188,34 +203,46 @@ fn ends_with(path: &Path, suffix: &str) -> bool {
 }
 
 fn may_be_label(path: &Path) -> bool {
-    (ends_with(path, ".json") && !ends_with(path, CAMERA_SUFFIX)) || ends_with(path, ".xml")
+    let is_json = ends_with(path, ".json") && !ends_with(path, CAMERA_SUFFIX);
+    (is_json || ends_with(path, ".xml")) && !io::is_apple_double(path)
 }
 
-/// The labels of a file; none where it is not called a label and holds nothing of another program.
+/// The labels of a file; none where it is not called a label and holds none of ours or of another
+/// program.
 ///
 /// # Errors
 /// Labels of another program that are badly formed; as [`read_labels`] for a file that is called a
 /// label.
 fn labels_if_any(path: &Path, size: Option<[f64; 2]>) -> Result<Option<Vec<LabelledPhoto>>> {
-    let is_ours = ends_with(path, LABEL_SUFFIX);
+    let is_called_one = ends_with(path, LABEL_SUFFIX);
     let text = match label_text(path) {
         Ok(text) => text,
-        Err(e) if is_ours => return Err(e),
+        Err(e) if is_called_one => return Err(e),
         Err(_) => return Ok(None),
     };
     let annotations = import::annotations(&text).map_err(|e| e.in_file(path))?;
-    if annotations.is_none() && !is_ours {
+    if annotations.is_none() && !is_called_one && !is_own_label(&text) {
         return Ok(None);
     }
     labels_of(path, &text, annotations, size).map(Some)
 }
 
-/// The text of a label; for a photo instead of one, the error says what to do.
+/// The text is a label of ours, or an array of them.
+fn is_own_label(text: &str) -> bool {
+    // Large files of other programs are not parsed once more.
+    text.contains(OWN_FORMAT)
+        && io::parse_json::<Value>(text)
+            .is_ok_and(|value| value.get(0).unwrap_or(&value)["format"] == OWN_FORMAT)
+}
+
+/// The text of a label, without a byte order mark; for a photo instead of one, the error says what
+/// to do.
 fn label_text(path: &Path) -> Result<String> {
-    io::read_text(path).map_err(|error| match io::read_header(path) {
+    let text = io::read_text(path).map_err(|error| match io::read_header(path) {
         Err(_) => error,
         Ok(_) => photo_instead(path),
-    })
+    })?;
+    Ok(text.trim_start_matches('\u{feff}').to_owned())
 }
 
 /// The error of a photo that was given instead of its label.
@@ -258,6 +285,7 @@ fn own_label(label: Label, name: String, path: &Path) -> Result<LabelledPhoto> {
         label,
         source: path.into(),
         name,
+        is_ours: true,
     })
 }
 
@@ -301,6 +329,7 @@ fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto>
         label,
         source: path.into(),
         name,
+        is_ours: false,
     })
 }
 
@@ -401,7 +430,7 @@ pub(crate) fn equivalent_mm(header: &io::Header) -> Option<f64> {
 ///
 /// # Errors
 /// [`Error::Value`] that names the side.
-pub(crate) fn check_size(label: &Label) -> Result<()> {
+pub fn check_size(label: &Label) -> Result<()> {
     check_side("surface.width_m", label.surface.width_m)?;
     check_side("surface.height_m", label.surface.height_m)
 }
@@ -514,6 +543,59 @@ pub(super) mod tests {
         io::write_json(&path, &labels).unwrap();
         let refusal = read_labels(&path, None).unwrap_err().to_string();
         assert!(refusal.contains("labels 001 once more"), "{refusal}");
+    }
+
+    /// Labels of photos with these names.
+    fn labels_of_photos<const N: usize>(files: [&str; N]) -> [Label; N] {
+        files.map(|file| {
+            let mut label = Label::new([90, 60], [[0.0; 2]; 4], [0.6, 0.4]);
+            label.image.file = file.into();
+            label
+        })
+    }
+
+    #[test]
+    fn two_labels_of_ours_of_one_photo_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let [label] = labels_of_photos(["a.jpg"]);
+        io::write_json(folder.path().join("a.label.json"), &label).unwrap();
+        let list = serde_json::json!([label]);
+        for (older, content) in [
+            ("old.label.json", &list),
+            ("old.json", &list),
+            ("old.json", &list[0]),
+        ] {
+            let path = folder.path().join(older);
+            io::write_json(&path, content).unwrap();
+            let refusal = labels_in(folder.path(), None).unwrap_err().to_string();
+            let names_both = refusal.contains("a.label.json") && refusal.contains(older);
+            assert!(names_both, "{refusal}");
+            std::fs::remove_file(path).unwrap();
+        }
+    }
+
+    #[test]
+    fn labels_of_ours_are_found_whatever_their_file_is_called() {
+        let folder = tempfile::tempdir().unwrap();
+        let list = labels_of_photos(["a.jpg", "b.jpg"]);
+        io::write_json(folder.path().join("labels.json"), &list).unwrap();
+        let [other] = labels_of_photos(["d.jpg"]);
+        io::write_json(folder.path().join("c.json"), &other).unwrap();
+        std::fs::write(folder.path().join("notes.json"), "[\"plane-label\"]").unwrap();
+        std::fs::write(folder.path().join("._c.label.json"), [0, 5, 22, 7]).unwrap();
+        let found = labels_in(folder.path(), None).unwrap();
+        let names: Vec<&str> = found.iter().map(|one| one.name.as_str()).collect();
+        assert_eq!(names, ["a", "b", "c"]);
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_mistake() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.label.json");
+        let [label] = labels_of_photos(["a.jpg"]);
+        let text = serde_json::to_string(&label).unwrap();
+        std::fs::write(&path, format!("\u{feff}{text}")).unwrap();
+        assert_eq!(read_label(&path).unwrap(), label);
     }
 
     #[test]

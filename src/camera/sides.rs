@@ -59,6 +59,20 @@ impl MeasuredSides {
         Some(corner_points(size).map(|c| map.map(c.xy())))
     }
 
+    /// The error of a label that has no corners and from which none can be predicted.
+    pub(crate) fn missing_corners(self, label: &Label) -> SolveError {
+        match self {
+            Self::Width(_) if has_four_points(label) => {
+                SolveError::PointsNeedSides("surface.height_m is missing")
+            }
+            Self::Height(_) if has_four_points(label) => {
+                SolveError::PointsNeedSides("surface.width_m is missing")
+            }
+            _ if label.markers.is_some() && label.points.is_empty() => SolveError::NoMarkerCorners,
+            _ => SolveError::NoCorners,
+        }
+    }
+
     /// A warning, where the points on the surface span much less than it.
     pub(crate) fn span_warning(self, label: &Label) -> Option<Diagnostic> {
         let Self::Both(size) = self else { return None };
@@ -80,18 +94,35 @@ impl MeasuredSides {
 
     /// Standard deviation of the stretch; infinite where only one side is known.
     pub(crate) fn stretch_sigma(self, label: &Label, priors: &Priors) -> f64 {
-        match (self, label.surface.dimension_sigma_m) {
-            (Self::Both([w, h]), Some(sigma)) => libm::hypot(sigma / w, sigma / h),
-            (Self::Both(_), None) => priors.ratio_sigma,
+        match self {
+            Self::Both(size) => stated_ratio_sigma(label, size).unwrap_or(priors.ratio_sigma),
             _ => f64::INFINITY,
+        }
+    }
+
+    /// Relative standard deviation of both sides together, which scales all lengths; 0 where none
+    /// is stated.
+    pub(crate) fn scale_sigma(self, label: &Label) -> f64 {
+        match self {
+            Self::Both(size) => stated_ratio_sigma(label, size).unwrap_or(0.0) / 2.0,
+            _ => 0.0,
         }
     }
 }
 
+/// Relative standard deviation of the ratio of two sides by that of each, which is twice that of
+/// their geometric mean.
+fn stated_ratio_sigma(label: &Label, [w, h]: [f64; 2]) -> Option<f64> {
+    let sigma = label.surface.dimension_sigma_m?;
+    Some(libm::hypot(sigma / w, sigma / h))
+}
+
 /// The error of a label without sides.
 fn unscaled_error(label: &Label) -> SolveError {
-    if has_corners(label) {
+    if label.surface.corners_px.is_some() {
         SolveError::NoScale
+    } else if has_four_points(label) {
+        SolveError::PointsNeedSides("both are missing")
     } else {
         SolveError::Empty
     }
@@ -110,9 +141,9 @@ fn check_sides(width: Option<f64>, height: Option<f64>) -> Result<(), SolveError
     }
 }
 
-/// Corners, or points enough to predict them from.
-fn has_corners(label: &Label) -> bool {
-    label.surface.corners_px.is_some() || label.points.len() >= 4
+/// Points enough to predict corners from.
+fn has_four_points(label: &Label) -> bool {
+    label.points.len() >= 4
 }
 
 /// The points that lie on a surface of this size.

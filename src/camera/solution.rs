@@ -251,13 +251,20 @@ impl Problem {
         Sigma {
             ln_focal: uncertainty.focal.sigma,
             tilt: uncertainty.tilt_sigma(state),
-            center: uncertainty.center_covariance(state) * (self.units.unit * self.units.unit),
+            center: self.center_covariance(minimum, uncertainty),
             corners_px: uncertainty.corner_covariances_px(self, state),
             reference_height,
             height_px: uncertainty.height_sigma_px(self, state, reference_height),
             principal_px: uncertainty.principal_sigma_px(self),
             covariance: uncertainty.covariance,
         }
+    }
+
+    /// Covariance of the camera's place, squared metres: in units of the sides, and of those.
+    fn center_covariance(&self, minimum: &Minimum, uncertainty: &Uncertainty) -> Matrix3<f64> {
+        let in_units = uncertainty.center_covariance(&minimum.state);
+        let by_scale = self.camera(minimum).center().coords * self.scale_sigma;
+        in_units * (self.units.unit * self.units.unit) + by_scale * by_scale.transpose()
     }
 
     fn focal_source(&self, minimum: &Minimum, focal: &FocalShare) -> FocalSource {

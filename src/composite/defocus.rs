@@ -6,8 +6,8 @@
 //! generation", 1981), object by object: what an object hides in part is known by its own coverage,
 //! which samples keep, and its colour there is that of what is seen of it close by. Where the
 //! objects in a pixel are equally far out of focus their soft light simply adds up, as that of any
-//! blur; else the nearer ones hide the others behind them by their soft coverage. Cards beyond the
-//! border spread into the picture, too: they are rendered as far as circles reach.
+//! blur; else the nearer ones hide the others behind them by their soft coverage. Cards and shadows
+//! beyond the border spread into the picture, too: they are rendered as far as circles reach.
 //!
 //! The plate is a photo and has its own depth of field: of it only the shadows are blurred.
 
@@ -41,13 +41,16 @@ const HIDDEN_WEIGHT: f32 = 0.01;
 /// Coverage becomes soft with the light: labels are made of the picture before.
 pub(super) fn defocus(deep: &DeepImage, shot: &Shot, options: &RenderOptions) -> Option<DeepImage> {
     let focus = Focus::new(shot, shot.thin_lens?);
+    let surface = SoftSurface::new(&focus, [deep.width(), deep.height()]);
+    let reach = focus.reach_of(&shot.cards).max(surface.discs.reach());
+    let beyond = (reach > 0).then(|| render_beyond(shot, reach, options));
     let mut objects = Objects::new();
     add_samples(&mut objects, deep, 0);
-    let reach = focus.reach_of(&shot.cards);
-    if reach > 0 {
-        add_samples(&mut objects, &render_beyond(shot, reach, options), reach);
+    if let Some(beyond) = &beyond {
+        add_samples(&mut objects, beyond, reach);
     }
-    Some(focus.of(deep, objects))
+    let shadows = Shadows::new(deep, beyond.as_ref().unwrap_or(deep), reach);
+    Some(focus.of(surface.shadow(&shadows), objects))
 }
 
 /// A lens in front of a shot's camera.
@@ -88,6 +91,23 @@ struct SoftObject {
     reach: isize,
 }
 
+/// How far out of focus the surface is.
+struct SoftSurface {
+    /// Radius of its circle of confusion in each pixel of the picture.
+    radii_px: Image<f64>,
+    discs: Discs,
+}
+
+/// The surface in the picture and in a margin around it.
+struct Shadows {
+    /// Pixels on every side.
+    margin: usize,
+    /// Factors on the plate.
+    factors: Image<LinearRgb>,
+    /// How much is seen of the surface; a little everywhere.
+    seen: Image<f32>,
+}
+
 /// An object in a pixel out of focus.
 struct SoftSample<'a> {
     of: &'a SoftObject,
@@ -111,11 +131,12 @@ impl<'a> Focus<'a> {
         Discs::of_radii(depths.map(|depth| self.radius_px(depth as f32))).reach()
     }
 
-    fn of(&self, deep: &DeepImage, objects: Objects) -> DeepImage {
+    /// The objects out of focus, over a shadow that is.
+    fn of(&self, shadow: Image<LinearRgb>, objects: Objects) -> DeepImage {
         work::add(Kind::Filters, 1);
         let is_tinted = objects.values().flatten().any(PlacedSample::is_tinted);
-        let soft = self.soft_objects(objects, [deep.width(), deep.height()]);
-        let (width, height) = (deep.width(), deep.height());
+        let (width, height) = shadow.size();
+        let soft = self.soft_objects(objects, [width, height]);
         let pixels: Vec<_> = (0..width * height)
             .into_par_iter()
             .map(|i| self.pixel(&soft, [i % width, i / width]))
@@ -126,7 +147,7 @@ impl<'a> Focus<'a> {
             Vec::new()
         };
         let samples = pixels.into_iter().map(without_tints);
-        DeepImage::from_pixels(self.soft_shadow(deep), samples).with_tints(tints)
+        DeepImage::from_pixels(shadow, samples).with_tints(tints)
     }
 
     fn radius_px(&self, depth: f32) -> f64 {
@@ -193,35 +214,92 @@ impl<'a> Focus<'a> {
         (0.5 * beyond).clamp(0.0, 1.0) as f32
     }
 
-    /// The shadows on the surface, each pixel as soft as the surface is there.
-    fn soft_shadow(&self, deep: &DeepImage) -> Image<LinearRgb> {
-        let shadow = deep.shadow();
-        if shadow.pixels().iter().all(|s| *s == LinearRgb::WHITE) {
-            return shadow.clone();
-        }
-        let radii = Image::from_fn(shadow.width(), shadow.height(), |x, y| {
-            self.surface_radius_px(x, y)
-        });
-        let discs = Discs::of_radii(radii.pixels().iter().copied());
-        let near = near_shadows(shadow, discs.reach());
-        let seen = Image::from_fn(shadow.width(), shadow.height(), |x, y| {
-            mean(deep.flat(x, y).transmittance()) + HIDDEN_WEIGHT
-        });
-        Image::from_fn(shadow.width(), shadow.height(), |x, y| {
-            if near[0].contains(&x) && near[1].contains(&y) {
-                mean_shadow(shadow, &seen, [x, y], discs.of_radius(radii[(x, y)]))
-            } else {
-                LinearRgb::WHITE
-            }
-        })
-    }
-
     /// Radius of the circle of confusion of the surface at a pixel; 0 where it is not seen.
     fn surface_radius_px(&self, x: usize, y: usize) -> f64 {
         let px = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
         let ray = self.camera.ray(self.distortion.undistort(px));
         let depth = Plane::surface().intersect(&ray);
         depth.map_or(0.0, |depth| self.radius_px(depth as f32))
+    }
+}
+
+impl SoftSurface {
+    fn new(focus: &Focus<'_>, [width, height]: [usize; 2]) -> Self {
+        let radii_px = Image::from_fn(width, height, |x, y| focus.surface_radius_px(x, y));
+        Self {
+            discs: Discs::of_radii(radii_px.pixels().iter().copied()),
+            radii_px,
+        }
+    }
+
+    /// The shadows on it, each pixel as soft as the surface is there.
+    fn shadow(&self, shadows: &Shadows) -> Image<LinearRgb> {
+        let (width, height) = self.radii_px.size();
+        let Some([columns, rows]) = shadows.near(self.discs.reach(), [width, height]) else {
+            return Image::filled(width, height, LinearRgb::WHITE);
+        };
+        Image::from_fn(width, height, |x, y| {
+            if columns.contains(&x) && rows.contains(&y) {
+                shadows.mean([x, y], self.discs.of_radius(self.radii_px[(x, y)]))
+            } else {
+                LinearRgb::WHITE
+            }
+        })
+    }
+}
+
+impl Shadows {
+    /// Of a picture, and of one with a margin around it for what is there; without any, itself.
+    fn new(deep: &DeepImage, wide: &DeepImage, margin: usize) -> Self {
+        let inside = [deep.width(), deep.height()].map(|side| margin..margin + side);
+        let place = |x: usize, y: usize| {
+            if inside[0].contains(&x) && inside[1].contains(&y) {
+                (deep, x - margin, y - margin)
+            } else {
+                (wide, x, y)
+            }
+        };
+        let (width, height) = (wide.width(), wide.height());
+        Self {
+            margin,
+            factors: Image::from_fn(width, height, |x, y| {
+                let (deep, x, y) = place(x, y);
+                deep.shadow()[(x, y)]
+            }),
+            seen: Image::from_fn(width, height, |x, y| {
+                let (deep, x, y) = place(x, y);
+                mean(deep.flat(x, y).transmittance()) + HIDDEN_WEIGHT
+            }),
+        }
+    }
+
+    /// Columns and rows of a picture of `size` that shadows are in, or closer to than `reach`; none
+    /// without shadows.
+    fn near(&self, reach: usize, size: [usize; 2]) -> Option<[Range<usize>; 2]> {
+        let factors = self.factors.pixels().iter().enumerate();
+        let dark = factors.filter(|(_, factor)| **factor != LinearRgb::WHITE);
+        let width = self.factors.width();
+        let places: Vec<_> = dark.map(|(i, _)| [i % width, i / width]).collect();
+        let range = |axis: usize| {
+            let columns = places.iter().map(|at| at[axis] as isize);
+            let in_picture = columns.map(|column| column - self.margin as isize);
+            around(in_picture, reach, size[axis])
+        };
+        (!places.is_empty()).then(|| [0, 1].map(range))
+    }
+
+    /// The mean factor on the plate over a disc around a pixel of the picture, by what is seen of
+    /// the surface. The margin holds all of the disc.
+    fn mean(&self, at: [usize; 2], disc: &Disc) -> LinearRgb {
+        let [x, y] = at.map(|i| i + self.margin);
+        let (mut sum, mut total) = (LinearRgb::BLACK, 0.0);
+        for (dx, dy, weight) in disc.taps() {
+            let tap = (x.wrapping_add_signed(*dx), y.wrapping_add_signed(*dy));
+            let weight = weight * self.seen[tap];
+            sum = sum.add_scaled(weight, self.factors[tap]);
+            total += weight;
+        }
+        sum.scale(1.0 / total)
     }
 }
 
@@ -417,39 +495,6 @@ fn mixed(a: LinearRgb, b: LinearRgb, share: f32) -> LinearRgb {
 
 fn mean(color: LinearRgb) -> f32 {
     (color.r + color.g + color.b) / 3.0
-}
-
-/// Columns and rows that shadows are in, or closer to than `reach`.
-fn near_shadows(shadow: &Image<LinearRgb>, reach: usize) -> [Range<usize>; 2] {
-    let (width, height) = (shadow.width(), shadow.height());
-    let dark = (0..width * height).filter(|i| shadow.pixels()[*i] != LinearRgb::WHITE);
-    let places: Vec<_> = dark.map(|i| [i % width, i / width]).collect();
-    [(0, width), (1, height)].map(|(axis, size)| {
-        let columns = places.iter().map(|at| at[axis] as isize);
-        around(columns, reach, size)
-    })
-}
-
-/// The mean factor on the plate over a disc, by what is seen of the surface.
-fn mean_shadow(
-    shadow: &Image<LinearRgb>,
-    seen: &Image<f32>,
-    at: [usize; 2],
-    disc: &Disc,
-) -> LinearRgb {
-    let (mut sum, mut total) = (LinearRgb::BLACK, 0.0);
-    for (dx, dy, weight) in disc.taps() {
-        let (x, y) = (at[0] as isize + dx, at[1] as isize + dy);
-        let inside =
-            x >= 0 && y >= 0 && x < shadow.width() as isize && y < shadow.height() as isize;
-        if inside {
-            let (x, y) = (x as usize, y as usize);
-            let weight = weight * seen[(x, y)];
-            sum = sum.add_scaled(weight, shadow[(x, y)]);
-            total += weight;
-        }
-    }
-    sum.scale(1.0 / total)
 }
 
 #[cfg(test)]

@@ -140,6 +140,14 @@ impl BackgroundPhoto {
         }
     }
 
+    /// All that it is read from: its label and camera, the photo and its mask.
+    pub(crate) fn files(&self) -> impl Iterator<Item = PathBuf> {
+        let camera = format!("{}.camera.json", self.background.name);
+        let camera = self.label.with_file_name(camera);
+        let files = [self.label.clone(), camera, self.photo.clone()];
+        files.into_iter().chain(self.front.clone())
+    }
+
     /// The part of the photo that pictures show.
     fn part(&self) -> f64 {
         let kept = [self.kept.width as f64, self.kept.height as f64];

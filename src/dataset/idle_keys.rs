@@ -1,20 +1,73 @@
 //! Keys of a recipe that change nothing.
 
-use crate::dataset::Pipeline;
+use crate::dataset::{
+    Coco, CocoMask, Format, LabelConfig, Layers, Mot, Pipeline, Voc, WebDataset, Yolo, YoloTask,
+};
 use crate::scene::{Background, Recipe, Wall};
 
 /// Most names in a message.
 const MAX_SHOWN_NAMES: usize = 5;
 
 impl Pipeline {
+    /// What the recipe says that changes nothing in the dataset, and why.
+    #[doc(hidden)]
+    pub fn idle_keys(&self) -> Vec<String> {
+        let mut idle = idle_labels(&self.config().labels);
+        idle.extend(self.idle_light_direction());
+        idle
+    }
+
     /// Why the recipe's `scene.light_direction` leaves light where it is drawn, and in which places;
     /// none where it does not.
-    #[doc(hidden)]
-    pub fn idle_light_direction(&self) -> Option<String> {
+    fn idle_light_direction(&self) -> Option<String> {
         let recipe = &self.config().scene;
         let places = recipe.narrowed().viewpoints.slice_of(self.places());
         idle_light_direction(recipe, places.iter().map(|place| &place.background))
     }
+}
+
+/// Settings of layouts that are not written, and of polygons that no layout has.
+fn idle_labels(labels: &LabelConfig) -> Vec<String> {
+    let formats = serde_json::json!(labels.formats);
+    let tables = [
+        (Format::Yolo, labels.yolo != Yolo::default()),
+        (Format::Coco, labels.coco != Coco::default()),
+        (Format::Voc, labels.voc != Voc::default()),
+        (Format::Mot, labels.mot != Mot::default()),
+        (
+            Format::WebDataset,
+            labels.webdataset != WebDataset::default(),
+        ),
+        (Format::Layers, labels.layers != Layers::default()),
+    ];
+    let idle = tables
+        .into_iter()
+        .filter(|(format, is_set)| *is_set && !labels.formats.contains(format));
+    let mut told: Vec<String> = idle
+        .map(|(format, _)| {
+            let name = serde_json::json!(format);
+            let table = name.as_str().unwrap_or_default();
+            format!(
+                "labels.{table}: changes nothing, as {name} is not in labels.formats: {formats}"
+            )
+        })
+        .collect();
+    if labels.simplify > 0.0 && !has_polygons(labels) {
+        told.push(format!(
+            "labels.simplify: {}, but no layout of labels.formats: {formats} has polygons, expected \
+             labels.yolo.task = \"segment\" or labels.coco.masks = \"polygon\"",
+            labels.simplify
+        ));
+    }
+    told
+}
+
+fn has_polygons(labels: &LabelConfig) -> bool {
+    labels.formats.iter().any(|format| match format {
+        Format::Yolo => labels.yolo.task == YoloTask::Segment,
+        Format::Coco => labels.coco.masks == CocoMask::Polygon,
+        Format::Voc | Format::Mot | Format::Layers | Format::WebDataset => false,
+    })
 }
 
 fn idle_light_direction<'a>(
@@ -82,6 +135,23 @@ mod tests {
                 focal_px: Some(55.0),
             },
         }
+    }
+
+    #[test]
+    fn settings_of_layouts_that_are_not_written_are_named() {
+        let told = |recipe: &str| idle_labels(&toml::from_str(recipe).unwrap());
+        assert_eq!(
+            told("formats = ['yolo']\ncoco = { masks = 'polygon' }\nlayers = { cards = true }"),
+            [
+                r#"labels.coco: changes nothing, as "coco" is not in labels.formats: ["yolo"]"#,
+                r#"labels.layers: changes nothing, as "layers" is not in labels.formats: ["yolo"]"#,
+            ]
+        );
+        let polygons = "formats = ['coco']\nsimplify = 1\ncoco = { masks = 'polygon' }";
+        assert_eq!(told(polygons), [""; 0]);
+        assert_eq!(told("coco = { masks = 'rle' }"), [""; 0]);
+        let simplified = told("simplify = 1");
+        assert!(simplified[0].starts_with("labels.simplify: 1, but no layout of labels.formats: "));
     }
 
     #[test]

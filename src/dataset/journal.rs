@@ -217,6 +217,16 @@ pub(crate) fn lines_of(folder: &Path) -> Result<Vec<JournalLine>> {
     Ok(by_number(read))
 }
 
+/// The files of the samples that a folder's journal lists.
+///
+/// # Errors
+/// [`Error::File`] for a folder without a journal.
+pub fn listed_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let lines = undamaged(numbered_lines(folder)?);
+    let files = lines.flat_map(|line| line.written().files);
+    Ok(files.map(|file| folder.join(file)).collect())
+}
+
 /// Lines by their place in the file, from 1: what each says, or what is wrong with it.
 pub(crate) type NumberedLines = Vec<(usize, std::result::Result<JournalLine, String>)>;
 

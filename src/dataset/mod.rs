@@ -101,7 +101,7 @@ pub use inputs::Inputs;
 #[cfg(feature = "fuzzing")]
 pub(crate) use journal::read_lines as journal_lines;
 #[doc(hidden)]
-pub use journal::repair;
+pub use journal::{listed_files, repair};
 pub use layers::Layers;
 pub use merge::merge;
 #[doc(hidden)]

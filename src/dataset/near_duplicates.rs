@@ -26,8 +26,12 @@ pub struct NearDuplicate {
 /// scene that nobody touched differ by noise, which the small copies average to below one code; an
 /// object of 1 % of the picture and a tenth of the full scale of contrast, moved, changes it by 3.
 /// Fainter ones do not, so images whose label files say that they show other things are not the
-/// same, however little they differ.
+/// same, unless they differ by less than saving one again costs.
 pub const NEAR_DUPLICATE_RMS: f64 = 2.0;
+
+/// Saving a picture again costs less than this, in 8-bit grey values: images nearer than that are
+/// one, whatever two people have labelled in it.
+const SAVED_AGAIN_RMS: f64 = 0.3;
 
 /// Boxes around the same thing, drawn twice, share more than this of their union.
 const MIN_OVERLAP: f64 = 0.5;
@@ -83,6 +87,11 @@ impl Look {
         })
     }
 
+    /// It has a label file without rows.
+    fn is_empty(&self) -> bool {
+        self.boxes.as_ref().is_some_and(Vec::is_empty)
+    }
+
     /// The place of the nearest in a list of those that may show the same, the first of those as
     /// near, and how far it is.
     fn nearest_within(&self, all: &[Self], codes: f64) -> Option<(usize, f64)> {
@@ -90,7 +99,7 @@ impl Look {
         let mut nearest = None;
         for (i, other) in all.iter().enumerate() {
             let error = self.thumbnail.squared_error_below(limit, &other.thumbnail);
-            if let Some(error) = error.filter(|_| self.may_show_the_same(other)) {
+            if let Some(error) = error.filter(|&error| self.may_show_the_same(other, error)) {
                 (nearest, limit) = (Some(i), error);
             }
         }
@@ -99,8 +108,19 @@ impl Look {
         Some((place, distance)).filter(|_| distance < codes)
     }
 
+    /// Whether another whose small copy has this squared error may show the same. Empty scenes of a
+    /// place look the same and are not.
+    fn may_show_the_same(&self, other: &Self, squared_error: u64) -> bool {
+        let is_copy = squared_error < self.thumbnail.squared_error_limit(SAVED_AGAIN_RMS);
+        match [self.is_empty(), other.is_empty()] {
+            [true, true] => false,
+            [false, false] => is_copy || self.may_be_labelled_like(other),
+            _ => is_copy,
+        }
+    }
+
     /// Whether the labels are alike, or those of one are unknown.
-    fn may_show_the_same(&self, other: &Self) -> bool {
+    fn may_be_labelled_like(&self, other: &Self) -> bool {
         match (&self.boxes, &other.boxes) {
             (Some(own), Some(others)) => are_alike(own, others),
             _ => true,
@@ -220,20 +240,54 @@ mod tests {
             (vec!["0 0.2"], true),
         ] {
             let other = labelled(&rows.join("\n"));
-            assert_eq!(own.may_show_the_same(&other), alike, "{rows:?}");
-            assert_eq!(other.may_show_the_same(&own), alike, "{rows:?}");
+            assert_eq!(own.may_be_labelled_like(&other), alike, "{rows:?}");
+            assert_eq!(other.may_be_labelled_like(&own), alike, "{rows:?}");
         }
     }
 
+    /// A grey picture, a share of whose small copy is brighter by one code.
+    fn brighter(share: f64, labels: &str) -> Look {
+        let count = THUMBNAIL_PX[0] * THUMBNAIL_PX[1];
+        let codes = (0..count).map(|i| 100 + u8::from((i as f64) < share * count as f64));
+        Look {
+            thumbnail: Thumbnail(codes.collect()),
+            boxes: boxes_in(labels),
+        }
+    }
+
+    const LEFT: &str = "0 0.2 0.5 0.2 0.2";
+    const RIGHT: &str = "0 0.8 0.5 0.2 0.2";
+    const UNKNOWN: &str = "0 0.2";
+
     #[test]
     fn a_farther_one_with_like_labels_is_nearest() {
-        let (own, moved) = (labelled("0 0.2 0.5 0.2 0.2"), labelled("0 0.8 0.5 0.2 0.2"));
-        let noisy = Look {
-            boxes: own.boxes.clone(),
-            ..scene(0, 0.1)
-        };
-        let found = own.nearest_within(&[moved, noisy], f64::INFINITY);
-        assert_eq!(found.map(|(place, _)| place), Some(1));
+        let (moved, farther) = (brighter(0.25, RIGHT), brighter(1.0, LEFT));
+        let found = brighter(0.0, LEFT).nearest_within(&[moved, farther], f64::INFINITY);
+        assert_eq!(found, Some((1, 1.0)));
+    }
+
+    #[test]
+    fn a_picture_that_was_saved_again_is_the_same_whatever_its_labels_say() {
+        // A quarter of a code and half a code.
+        let (copy, noise) = (0.0625, 0.25);
+        for (share, [own, other], same) in [
+            (0.0, [LEFT, RIGHT], true),
+            (copy, [LEFT, RIGHT], true),
+            (noise, [LEFT, RIGHT], false),
+            (noise, [LEFT, LEFT], true),
+            (copy, [LEFT, ""], true),
+            (noise, [LEFT, ""], false),
+            (0.0, ["", ""], false),
+            (copy, [UNKNOWN, ""], true),
+            (noise, [UNKNOWN, ""], false),
+            (noise, [UNKNOWN, LEFT], true),
+        ] {
+            let (own, other) = (brighter(0.0, own), brighter(share, other));
+            for [a, b] in [[&own, &other], [&other, &own]] {
+                let found = a.nearest_within(std::slice::from_ref(b), NEAR_DUPLICATE_RMS);
+                assert_eq!(found.is_some(), same, "{share} {own:?} {other:?}");
+            }
+        }
     }
 
     #[test]

@@ -4,11 +4,10 @@ use crate::dataset::YoloSet;
 use crate::dataset::listing::{record_of, sidecar_of};
 use crate::dataset::near_duplicates::{NearDuplicate, near_pairs};
 use crate::error::{Error, Result};
-use crate::io;
 use crate::scene::{Draws, Scene};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// How images are partitioned.
@@ -95,14 +94,15 @@ impl YoloSet {
 
     /// What leaks from training to validation; images are near when they differ by less than
     /// `max_codes` (root mean square of 8-bit grey values of a small copy) and their label files,
-    /// where both have one, say the same. Images whose label file has no rows are near to none.
+    /// where both have one, say the same or they differ by no more than a picture that was saved
+    /// again. Two images whose label files have no rows are never near.
     ///
     /// # Errors
     /// An image or a sidecar that cannot be read.
     pub fn leakage(&self, max_codes: f64) -> Result<Leakage> {
         Ok(Leakage {
             groups: self.leaked_groups()?,
-            near_duplicates: near_pairs(&showing(&self.train), &showing(&self.val), max_codes)?,
+            near_duplicates: near_pairs(&self.train, &self.val, max_codes)?,
         })
     }
 
@@ -124,16 +124,6 @@ impl YoloSet {
         let val = distinct_groups(&self.val, group)?;
         Ok([val.len(), val.intersection(&train).count()])
     }
-}
-
-/// The images without those whose label file has no rows: empty scenes of a place look the same.
-fn showing(images: &[PathBuf]) -> Vec<PathBuf> {
-    let showing = images.iter().filter(|image| !is_empty(image));
-    showing.cloned().collect()
-}
-
-fn is_empty(image: &Path) -> bool {
-    io::read_text(YoloSet::label_of(image)).is_ok_and(|rows| rows.trim().is_empty())
 }
 
 fn distinct_groups(images: &[PathBuf], group: Group) -> Result<BTreeSet<String>> {
@@ -235,6 +225,7 @@ fn unknown_group(name: &str) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
 
     fn listing(n: usize) -> YoloSet {
         YoloSet {

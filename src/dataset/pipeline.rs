@@ -1,7 +1,7 @@
 //! The pipeline: recipe and number in, labelled picture out.
 
 use crate::allowance::Allowance;
-use crate::asset::{Library, Panorama};
+use crate::asset::{Library, MANIFEST, Manifest, Panorama};
 use crate::bounds::LEAST_OBJECT_PX;
 use crate::composite::Exposed;
 use crate::dataset::background_photo::{BackgroundOptions, BackgroundPhoto};
@@ -212,6 +212,25 @@ impl Pipeline {
     /// The assets.
     pub fn library(&self) -> &Library {
         &self.library
+    }
+
+    /// The files that pictures of a scene may be made from: the assets' manifest and cut-outs, the
+    /// photos of the place with what lies beside them, the environment maps.
+    ///
+    /// # Errors
+    /// Those of [`Manifest::read`].
+    #[doc(hidden)]
+    pub fn input_files(&self, scene: &Scene) -> Result<Vec<PathBuf>> {
+        let DatasetConfig { assets, folder, .. } = &self.config;
+        let manifest = Manifest::read(assets)?;
+        let photos = manifest.assets.iter().flat_map(|asset| &asset.photos);
+        let cut_outs = photos.flat_map(|photo| photo.files());
+        let places = self.places.iter().flat_map(BackgroundPhoto::files);
+        let listed = self.surroundings.files().map(|(_, path)| path);
+        let named = scene.environment.iter().map(|map| folder.join(&map.file));
+        let files = cut_outs.map(|file| assets.join(file));
+        let files = files.chain([assets.join(MANIFEST)]).chain(places);
+        Ok(files.chain(listed).chain(named).collect())
     }
 
     /// A dataset of `count` pictures to be made in `folder` with the config's formats.

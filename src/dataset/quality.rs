@@ -7,6 +7,7 @@
 
 use crate::dataset::{DatasetConfig, Pictures};
 use crate::error::{Error, Result};
+use crate::io::Override;
 use crate::matte::{CutOutOptions, SegmentOptions};
 use crate::plot::Table;
 use crate::quality::Quality;
@@ -61,6 +62,27 @@ impl Quality {
         config.scene.settle = self.settle(config.scene.settle);
         config.pictures = self.pictures(config.pictures);
         config
+    }
+
+    /// The values of a recipe that [`config`](Self::config) replaces, for other replaced values to
+    /// follow and go before them.
+    pub fn overrides(self) -> Vec<Override> {
+        let (render, settle) = (self.render(), self.settle(SettleOptions::default()));
+        let values = [
+            format!("render.subsamples={}", render.subsamples),
+            format!("render.light_samples={}", render.light_samples),
+            format!("render.ambient_samples={}", render.ambient_samples),
+            format!("render.cell_px={}", render.cell_px),
+            format!("render.refraction={}", render.refraction),
+            format!("scene.settle.step={}", settle.step),
+            format!("scene.settle.iterations={}", settle.iterations),
+            format!("scene.settle.ccd={}", settle.ccd),
+        ];
+        let exr = (self == Self::Reference).then(|| "pictures.exr=true".to_owned());
+        let values = values.into_iter().chain(exr);
+        values
+            .map(|value| value.parse().expect("a key and a value"))
+            .collect()
     }
 
     /// The setting of each stage: a row a setting, a column a quality.
@@ -202,6 +224,22 @@ mod tests {
             (config.scene.objects, config.labels, config.pictures)
         );
         assert_eq!(draft.render, Quality::Draft.render());
+    }
+
+    #[test]
+    fn its_overrides_give_its_config_and_those_behind_them_stay() {
+        let odd = "render = { subsamples = 7, refraction = false }\nscene.settle.ccd = 3";
+        let read = |overrides: &[Override]| {
+            DatasetConfig::parse(odd, "recipe.toml".as_ref(), overrides).unwrap()
+        };
+        for quality in Quality::ALL {
+            let mut overrides = quality.overrides();
+            let mut expected = quality.config(read(&[]));
+            assert_eq!(read(&overrides), expected);
+            overrides.push("render.subsamples=5".parse().unwrap());
+            expected.render.subsamples = 5;
+            assert_eq!(read(&overrides), expected);
+        }
     }
 
     #[test]

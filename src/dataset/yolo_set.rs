@@ -80,14 +80,27 @@ impl YoloSet {
     /// # Errors
     /// [`Error::File`] for a `data.yaml` that cannot be read or does not name the classes.
     pub fn class_names_of(labels: &Path) -> Result<Vec<String>> {
-        let labels = whole_path(labels)?;
-        let above = labels.ancestors().skip(1).take(2);
-        let mut paths = above.map(|folder| folder.join("data.yaml"));
-        let Some(path) = paths.find(|path| path.is_file()) else {
+        let Some(path) = yaml_above(labels)? else {
             return Ok(Vec::new());
         };
         let names = DataYaml::read_names(&io::read_text(&path)?);
         names.map_err(|(line, what)| yaml_problem(&path, line, &what))
+    }
+
+    /// Whether the labels of a folder (`labels/val`, `labels`) are boxes or outlines, as far as a
+    /// `data.yaml` above it tells.
+    ///
+    /// # Errors
+    /// [`Error::File`] for one that tells of keypoints.
+    pub fn check_labels(labels: &Path) -> Result<()> {
+        let Some(path) = yaml_above(labels)? else {
+            return Ok(());
+        };
+        let text = io::read_text(&path).unwrap_or_default();
+        match DataYaml::keypoint_problem(&text) {
+            Some((line, what)) => Err(yaml_problem(&path, line, &what)),
+            None => Ok(()),
+        }
     }
 
     fn part(&self, part: Part) -> &[PathBuf] {
@@ -155,6 +168,14 @@ impl YoloSet {
             .map(|place| place.display().to_string())
             .collect()
     }
+}
+
+/// The `data.yaml` of the set that a folder of labels belongs to, if there is one.
+fn yaml_above(labels: &Path) -> Result<Option<PathBuf>> {
+    let labels = whole_path(labels)?;
+    let above = labels.ancestors().skip(1).take(2);
+    let mut paths = above.map(|folder| folder.join("data.yaml"));
+    Ok(paths.find(|path| path.is_file()))
 }
 
 /// The `data.yaml` of a folder, as trainers would take it.
@@ -273,6 +294,10 @@ mod tests {
                 "train: images/train\nval: images/val\nnc: 2\nnames: [cap]\n",
                 "nc: 2, but",
             ),
+            (
+                "train: images/train\nval: images/val\nnames: [cap]\nkpt_shape: [4, 3]\n",
+                "line 4: kpt_shape: labels with keypoints, expected boxes",
+            ),
             ("path: [", "not YAML"),
         ] {
             let told = YoloSet::read(folder(yaml).path()).unwrap_err().to_string();
@@ -287,6 +312,10 @@ mod tests {
         assert_eq!(names("labels/val").unwrap(), ["cap"]);
         assert_eq!(names("labels").unwrap(), ["cap"]);
         assert!(names("a/labels/val").unwrap().is_empty());
+        let check = || YoloSet::check_labels(&set.path().join("labels/val"));
+        assert!(check().is_ok());
+        std::fs::write(set.path().join("data.yaml"), "kpt_shape: [4, 3]\n").unwrap();
+        assert!(check().unwrap_err().to_string().contains("keypoints"));
         std::fs::write(set.path().join("data.yaml"), "nc: 2\nnames: [cap]\n").unwrap();
         let told = names("labels").unwrap_err().to_string();
         assert!(

@@ -20,6 +20,12 @@ pub(crate) struct DataYaml {
     names: Vec<String>,
 }
 
+/// Most classes that are numbered where `nc` alone tells of them.
+const MAX_NUMBERED_CLASSES: usize = 10_000;
+
+/// What is wrong with a set whose labels have keypoints.
+const KEYPOINTS: &str = "kpt_shape: labels with keypoints, expected boxes (class cx cy w h) or outlines and no kpt_shape";
+
 /// A line, where it is known, and what is wrong there.
 type Problem = (Option<usize>, String);
 
@@ -44,7 +50,8 @@ impl DataYaml {
             .map_or_else(|| folder.to_path_buf(), |path| folder.join(path))
     }
 
-    /// Number of classes that have a name, whatever `nc` claims; none without names.
+    /// Number of classes that have a name, if only a numbered one, whatever `nc` claims; none
+    /// without names.
     pub(crate) fn class_count(&self) -> Option<usize> {
         Some(self.names.len()).filter(|&n| n > 0)
     }
@@ -97,6 +104,12 @@ impl DataYaml {
         }
     }
 
+    /// What is wrong with a set whose labels have keypoints; none with any other.
+    pub(crate) fn keypoint_problem(text: &str) -> Option<Problem> {
+        let (_, problems) = Self::read_given(text);
+        problems.into_iter().find(|(_, what)| what == KEYPOINTS)
+    }
+
     /// What is there, and what is wrong with it.
     fn read_given(text: &str) -> (Self, Vec<Problem>) {
         let (mut yaml, mut problems) = (Self::default(), Vec::new());
@@ -106,7 +119,17 @@ impl DataYaml {
             }
         });
         problems.extend(read.err());
+        yaml.number_classes();
         (yaml, problems)
+    }
+
+    /// Names as Ultralytics gives them where `nc` alone tells of the classes.
+    fn number_classes(&mut self) {
+        let count = self.nc.filter(|&nc| nc <= MAX_NUMBERED_CLASSES);
+        if self.names.is_empty() {
+            let numbers = 0..count.unwrap_or(0);
+            self.names = numbers.map(|i| format!("class_{i}")).collect();
+        }
     }
 
     fn set(&mut self, key: &str, value: Value) -> Result<(), Problem> {
@@ -114,9 +137,12 @@ impl DataYaml {
             "path" => self.path = value.texts(key)?.pop(),
             "train" => self.train = value.texts(key)?,
             "val" => self.val = value.texts(key)?,
+            // As Ultralytics renames it.
+            "validation" if self.val.is_empty() => self.val = value.texts(key)?,
             "test" => self.test = value.texts(key)?,
             "nc" => self.nc = Some(value.count(key)?),
             "names" => return self.set_names(value),
+            "kpt_shape" if !matches!(value, Value::Null) => return Err((None, KEYPOINTS.into())),
             _ => {}
         }
         Ok(())
@@ -461,6 +487,34 @@ mod tests {
             (problems, yaml.names),
             (vec![], vec!["cap".into(), "la, bel".into()])
         );
+    }
+
+    #[test]
+    fn what_ultralytics_adds_is_added() {
+        let (yaml, problems) = DataYaml::read("train: a\nvalidation: b\nnc: 2\n");
+        assert_eq!(problems, []);
+        assert_eq!(
+            (yaml.val, yaml.names),
+            (
+                vec!["b".into()],
+                ["class_0", "class_1"].map(String::from).to_vec()
+            )
+        );
+        for text in ["validation: a\nval: b\n", "val: b\nvalidation: a\n"] {
+            assert_eq!(DataYaml::read(text).0.val, ["b"]);
+        }
+        let (yaml, problems) = DataYaml::read("train: a\nval: b\nnc: 999999999999\n");
+        assert_eq!((yaml.names.len(), problems.len()), (0, 1));
+    }
+
+    #[test]
+    fn keypoints_are_named() {
+        let text = "train: a\nval: b\nnames: [cap]\nkpt_shape: [4, 2]\n";
+        let (_, problems) = DataYaml::read(text);
+        assert_eq!(problems.len(), 1);
+        assert_eq!(problems[0], (Some(4), KEYPOINTS.into()));
+        assert_eq!(DataYaml::keypoint_problem(text).as_ref(), problems.first());
+        assert!(DataYaml::keypoint_problem("names: 3\nkpt_shape:\n").is_none());
     }
 
     #[test]

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::io;
 use serde::Deserialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 
 #[derive(Deserialize)]
@@ -105,8 +105,9 @@ impl CocoTruth {
         let images = document.image_places()?;
         let categories = document.category_places()?;
         let records = document.images_at(images.values());
+        let names = sheet_names(&records).into_iter();
         Ok(Self {
-            sheets: records.iter().map(|image| image.to_sheet()).collect(),
+            sheets: names.map(|name| EvalImage::new(name, Vec::new())).collect(),
             classes: document.category_names(categories.values()),
             files: records.iter().map(|image| image.file()).collect(),
             images: images.keys().copied().zip(0..).collect(),
@@ -268,17 +269,43 @@ impl ImageRecord {
         (width >= 1.0 && height >= 1.0).then_some([width, height])
     }
 
-    fn to_sheet(&self) -> EvalImage {
-        EvalImage::new(self.name(), Vec::new())
-    }
-
     /// The file's name without folder and extension; the id of an image without a file.
-    fn name(&self) -> String {
+    fn stem(&self) -> String {
         match Path::new(self.listed_name()).file_stem() {
             Some(stem) => stem.to_string_lossy().into_owned(),
             None => self.id.to_string(),
         }
     }
+
+    /// The same with its folder and extension.
+    fn whole_path(&self) -> String {
+        match self.listed_name() {
+            "" => self.id.to_string(),
+            name => name.to_owned(),
+        }
+    }
+
+    /// The same with its folder.
+    fn path(&self) -> String {
+        let folder = Path::new(self.listed_name()).parent();
+        let path = folder.unwrap_or(Path::new("")).join(self.stem());
+        path.to_string_lossy().into_owned()
+    }
+}
+
+/// What the images are called: by their files' names, with folders and extensions where those alone
+/// tell them apart.
+fn sheet_names(records: &[&ImageRecord]) -> Vec<String> {
+    let named = |name: fn(&ImageRecord) -> String| -> Vec<String> {
+        records.iter().map(|image| name(image)).collect()
+    };
+    let ways = [named(ImageRecord::stem), named(ImageRecord::path)];
+    let told_apart = ways.into_iter().find(|names| are_distinct(names));
+    told_apart.unwrap_or_else(|| named(ImageRecord::whole_path))
+}
+
+fn are_distinct(names: &[String]) -> bool {
+    names.iter().collect::<BTreeSet<_>>().len() == names.len()
 }
 
 fn corners([x, y, w, h]: [f64; 4]) -> Result<BBox> {
@@ -382,6 +409,26 @@ mod tests {
         let b = truth.sheets[1].truth[0];
         assert_eq!((b.class, b.area, b.crowd, b.bbox.x1), (1, 6.5, true, 4.0));
         assert_eq!(truth.sheets[0].truth[0].area, 4.0);
+    }
+
+    #[test]
+    fn images_are_called_by_as_much_of_their_paths_as_tells_them_apart() {
+        let names = |files: [&str; 2]| {
+            let [first, second] = files;
+            let text = TRUTH.replace("b/x.png", second).replace("a.png", first);
+            let truth = CocoTruth::new(&io::parse_json(&text).unwrap()).unwrap();
+            truth.sheets.into_iter().map(|sheet| sheet.image).collect()
+        };
+        let named: [Vec<String>; 3] = [
+            ["cam0/1.png", "cam1/2.png"],
+            ["cam0/1.png", "cam1/1.png"],
+            ["1.png", "1.jpg"],
+        ]
+        .map(names);
+        assert_eq!(
+            named,
+            [["1", "2"], ["cam0/1", "cam1/1"], ["1.png", "1.jpg"]]
+        );
     }
 
     #[test]

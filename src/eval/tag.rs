@@ -19,13 +19,13 @@ pub struct Tags {
 /// Reads a CSV, as spreadsheets write it, whose first column is the image and whose others are
 /// factors; its first line names them.
 ///
-/// An image is called as its sheet is, or by its file, in a folder or without one. An empty cell
-/// says nothing.
+/// An image is called as its sheet is, or by its file, in a folder or without one where the file's
+/// name is that of one image alone. An empty cell says nothing.
 ///
 /// # Errors
 /// [`Error::File`] for a file that cannot be read; [`Error::Field`] for one without a line of
-/// names, a line of another length, an image that is listed twice, or one without any image
-/// that a sheet is of.
+/// names, a line of another length, an image that is listed twice, a name of several images, or one
+/// without any image that a sheet is of.
 pub fn read_tags(path: &Path, sheets: &[EvalImage]) -> Result<Tags> {
     let bytes = io::read_bytes(path)?;
     parse(&bytes, sheets).map_err(|e| e.in_file(path))
@@ -36,17 +36,16 @@ fn parse(bytes: &[u8], sheets: &[EvalImage]) -> Result<Tags> {
     let mut reader = csv_reader(&text);
     let mut tags = Tags::with_titles(reader.headers().map_err(|e| csv_error(&e))?)?;
     let mut unknown = Vec::new();
-    let images = sheets.iter().map(|sheet| sheet.image.as_str()).collect();
+    let images = Images::new(sheets);
     for row in reader.records() {
         let row = row.map_err(|e| csv_error(&e))?;
         if row.iter().all(str::is_empty) {
             continue;
         }
-        match image_called(&row[0], &images) {
-            Ok(image) => tags
-                .add(image, &row)
-                .map_err(|e| in_line(e, line_of(&row)))?,
-            Err(e) => unknown.push(in_line(e, line_of(&row))),
+        let here = |e| in_line(e, line_of(&row));
+        match images.called(&row[0]).map_err(here)? {
+            Some(image) => tags.add(image, &row).map_err(here)?,
+            None => unknown.push(here(images.missing(&row[0]))),
         }
     }
     pass_over(unknown, tags.levels.is_empty())?;
@@ -76,14 +75,64 @@ fn pass_over(unknown: Vec<Error>, are_all: bool) -> Result<()> {
     Ok(())
 }
 
-/// The image that a name in a table means.
-fn image_called<'a>(name: &str, images: &BTreeSet<&'a str>) -> Result<&'a str> {
-    let file = name.rsplit('/').next().unwrap_or_default();
-    let names = [name, file, without_extension(file)];
-    let image = names.into_iter().find_map(|name| images.get(name));
-    image
-        .copied()
-        .ok_or_else(|| Error::value("document", no_image(name, images.len())))
+/// The images of the truth.
+struct Images<'a> {
+    names: BTreeSet<&'a str>,
+    /// Those in folders, by the name alone.
+    in_folders: BTreeMap<&'a str, Vec<&'a str>>,
+}
+
+impl<'a> Images<'a> {
+    fn new(sheets: &'a [EvalImage]) -> Self {
+        let names: BTreeSet<&str> = sheets.iter().map(|sheet| sheet.image.as_str()).collect();
+        let mut in_folders: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        for &name in &names {
+            if let Some((_, file)) = name.rsplit_once('/') {
+                in_folders.entry(file).or_default().push(name);
+            }
+        }
+        Self { names, in_folders }
+    }
+
+    /// The image that a name in a table means.
+    fn called(&self, name: &str) -> Result<Option<&'a str>> {
+        // With as many of its folders as the truth has.
+        let image = paths_below(name).find_map(|path| self.named(path));
+        match image {
+            Some(image) => Ok(Some(image)),
+            None => self.of_file(name),
+        }
+    }
+
+    fn named(&self, path: &str) -> Option<&'a str> {
+        let name = self.names.get(path);
+        name.or_else(|| self.names.get(without_extension(path)))
+            .copied()
+    }
+
+    /// The one image of this file's name.
+    fn of_file(&self, name: &str) -> Result<Option<&'a str>> {
+        let images = self.in_folders.get(name);
+        let images = images.or_else(|| self.in_folders.get(without_extension(name)));
+        match images.map(Vec::as_slice) {
+            None | Some(&[]) => Ok(None),
+            Some(&[image]) => Ok(Some(image)),
+            Some(&[first, second, ..]) => {
+                let what =
+                    format!("image \"{name}\" may be {first} or {second}, expected its folder too");
+                Err(Error::value("document", what))
+            }
+        }
+    }
+
+    fn missing(&self, name: &str) -> Error {
+        Error::value("document", no_image(name, self.names.len()))
+    }
+}
+
+/// The path, and what is left of it without its first folder, its first two and so on.
+fn paths_below(path: &str) -> impl Iterator<Item = &str> {
+    std::iter::successors(Some(path), |path| Some(path.split_once('/')?.1))
 }
 
 /// Of an image's file; any other name stays, whatever dots are in it.
@@ -173,6 +222,21 @@ mod tests {
         assert_eq!(
             images.map(|image| tags.of(image, 0)),
             [Some("dim"), Some("bright")]
+        );
+    }
+
+    #[test]
+    fn folders_tell_images_of_one_name_apart() {
+        let images = ["cam0/1", "cam1/1", "cam1/2"];
+        let text = "image,light\nset/cam0/1.png,dim\ncam1/1.png,bright\n2.png,dark\n";
+        let tags = tags_of(text, &images).unwrap();
+        assert_eq!(
+            images.map(|image| tags.of(image, 0)),
+            [Some("dim"), Some("bright"), Some("dark")]
+        );
+        assert_eq!(
+            tags_of("image,light\n1.png,dim\n", &images).unwrap_err(),
+            "line 2: image \"1.png\" may be cam0/1 or cam1/1, expected its folder too"
         );
     }
 

@@ -104,8 +104,8 @@ pub use codec::jpeg::{Chroma, through_jpeg};
 pub(crate) use document::parse_toml;
 #[doc(hidden)]
 pub use document::{
-    Override, from_overrides, has_extension, read_json, read_text, read_toml, write_json,
-    write_text, write_toml,
+    Override, from_json, from_overrides, has_extension, read_json, read_text, read_toml,
+    write_json, write_text, write_toml,
 };
 pub(crate) use document::{parse_json, parse_toml_with, read_json_data};
 pub use document::{read_document, write_document};
@@ -113,7 +113,9 @@ pub use document::{read_document, write_document};
 pub use format::Format;
 #[doc(hidden)]
 pub use fs::{Checksum, absolute, below, copy, create_folder, inside, relative};
-pub(crate) use fs::{files_below, natural_key, refuse_links, with_last_step, write_through};
+pub(crate) use fs::{
+    files_below, is_apple_double, natural_key, refuse_links, with_last_step, write_through,
+};
 pub use header::Header;
 #[doc(hidden)]
 pub use header::Window;

@@ -8,7 +8,7 @@ use super::arrays::channel_pairs;
 use super::check::{
     check_coverage, check_length, check_photo, check_positive, check_share, check_value, refused,
 };
-use super::film::{covered, view};
+use super::film::{ColorUncertainty, covered, view};
 use super::plate::ScreenPlate;
 use super::prepared::check_finite_photo;
 use super::register::{self, Registered};
@@ -89,7 +89,8 @@ pub struct Triangulated {
 /// photos' values over the screens'. A channel in which the screens are alike (red, on green and
 /// blue) leaves T open there. The determined ones give the dye of PET, and by how much a pixel is
 /// such plastic and by how much bare; what little the screens differ in the open channel corrects
-/// the dye over the whole object, and the pixel, by the variances.
+/// the dye over the whole object, and the pixel, by the variances. Where dyes of another colour
+/// explain the determined channels as well, what they differ by is added to the uncertainty.
 ///
 /// Photos are aligned first. Between two screens grey film changes only along the difference of
 /// their colours; the light across it is the same in both photos, and shows how far they lie apart.
@@ -125,7 +126,7 @@ pub fn triangulate(
     let shift_px: Vec<[f64; 2]> = aligned.iter().map(|photo| photo.shift_px).collect();
     Ok(Triangulated {
         residual: residual(&aligned, &solved, inside),
-        diagnostics: diagnostics(&shift_px, determined),
+        diagnostics: diagnostics(&shift_px, determined, inferred.largest_spread()),
         determined,
         shift_px,
         ..composed(&solved, inside)
@@ -170,9 +171,12 @@ fn view_transmittance(
     view(&measured, flat, inside).zip_map(inside, covered)
 }
 
-fn diagnostics(shift_px: &[[f64; 2]], determined: [bool; 3]) -> Vec<Diagnostic> {
-    let moved = moved_photos(shift_px);
-    moved.chain(open_channels(determined)).collect()
+fn diagnostics(shift_px: &[[f64; 2]], determined: [bool; 3], spread: f32) -> Vec<Diagnostic> {
+    let is_uncertain = spread > ColorUncertainty::NEEDS_REVIEW.tint;
+    let moved = moved_photos(shift_px).chain(open_channels(determined));
+    moved
+        .chain(is_uncertain.then(|| tint_uncertain(spread)))
+        .collect()
 }
 
 fn moved_photos(shift_px: &[[f64; 2]]) -> impl Iterator<Item = Diagnostic> {
@@ -490,6 +494,16 @@ fn similar_screens(channel: &str) -> Diagnostic {
         Code::SimilarScreens,
         format_args!(
             "the screens are too similar in {channel}: its transmittance is inferred from the other channels"
+        ),
+    )
+}
+
+/// Dyes that explain the photos as well let through `off` more or less.
+fn tint_uncertain(off: f32) -> Diagnostic {
+    Diagnostic::warning(
+        Code::TintUncertain,
+        format_args!(
+            "plastic of another dye and thickness explains the photos as well: its tint is uncertain by +- {off:.2}; photograph it on a third screen colour"
         ),
     )
 }

@@ -77,8 +77,7 @@ pub(crate) fn render_unhidden(shot: &Shot, options: &RenderOptions) -> DeepImage
 }
 
 /// What is up to `margin` pixels beyond the picture's border: a deep picture with so many more on
-/// every side, which need not be whole within them. No card bends light in it, and its shadows are
-/// without interreflection.
+/// every side, which need not be whole within them. No card bends light in it.
 pub(crate) fn render_beyond(shot: &Shot, margin: usize, options: &RenderOptions) -> DeepImage {
     let options = options.clamped().for_image(shot.camera.image);
     let wide = Shot {
@@ -86,10 +85,11 @@ pub(crate) fn render_beyond(shot: &Shot, margin: usize, options: &RenderOptions)
         ..shot.clone()
     };
     let finished = retouched(&wide, &options);
+    let bounces = Bounces::new(&finished);
     let stack = SeenStack::new(&finished, &options, &mut Stopwatch::start());
     let [x, y] = stack.image.map(|side| margin..side - margin);
     let picture = PixelBlock { x, y };
-    stack.render(|tile| !tile.is_within(&picture))
+    bounces.brighten(stack.render(|tile| !tile.is_within(&picture)))
 }
 
 /// All that a picture is put together from, seen through the shot's lens.

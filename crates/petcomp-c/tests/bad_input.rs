@@ -201,6 +201,32 @@ fn corners_that_no_camera_can_have_seen_are_refused() {
 }
 
 #[test]
+fn a_rectangle_in_millimetres_is_refused() {
+    let corners = [236.0, 239.0, 1020.0, 216.0, 1009.0, 701.0, 276.0, 739.0];
+    let mut camera = bytemuck::Zeroable::zeroed();
+    for (size, told) in [
+        ([560.0, 370.0], "surface.width_m: 560"),
+        ([45.0, 30.0], "surface: the camera would be"),
+    ] {
+        // SAFETY: arrays of the right length.
+        let status = unsafe {
+            petcomp_camera_solve(
+                corners.as_ptr(),
+                size.as_ptr(),
+                [1280, 853].as_ptr(),
+                0.0,
+                &mut camera,
+                null_mut(),
+                0,
+                null_mut(),
+            )
+        };
+        assert_eq!(status, Status::Value, "{}", message());
+        assert!(message().starts_with(told), "{}", message());
+    }
+}
+
+#[test]
 fn a_report_that_does_not_fit_says_how_long_it_is() {
     let corners = [236.0, 239.0, 1020.0, 216.0, 1009.0, 701.0, 276.0, 739.0];
     let solve = |camera: &mut CameraModel, report: &mut [c_char], length: &mut usize| {

@@ -2,16 +2,18 @@
 
 use crate::batch::FileBatch;
 use crate::diagnostics::{located, report_diagnostics};
+use crate::distinct_files::check_distinct;
 use crate::documents::stem_of;
 use crate::exit::NeedsReview;
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
 use crate::print::{self, counted};
 use crate::values::{check_companion, parse_corners, parse_metres};
-use petcomp::asset::{self, Asset, Built, Library, Manifest};
+use petcomp::asset::{self, Asset, Built, CONTACT_SHEET, Library, MANIFEST, Manifest};
 use petcomp::asset::{CaptureEntry, Photo, PhotoEntry, PhotoRecord, Role, Scale, ScreenSource};
 use petcomp::matte::{CutOutOptions, MatteMethod};
 use petcomp::{Error, Quality, io};
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -68,14 +70,14 @@ pub(crate) struct AddPhotoArgs {
     name: Option<String>,
     /// Name of its class; one that the folder does not have is added behind those that it has. A
     /// distractor needs none
-    #[arg(long, required_unless_present = "role")]
+    #[arg(long, required_unless_present = "role", value_parser = trimmed)]
     class: Option<String>,
     /// object (to be found), or distractor: falls, hides others and casts shadows, but has no label
     #[arg(long, default_value_t)]
     role: Role,
     /// Names of all classes in order: a label's number is the place in this list, and no other
     /// class is taken
-    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = trimmed)]
     classes: Vec<String>,
     /// What it was photographed on: auto, a colour R,G,B (scene-linear), or a photo of the empty
     /// screen
@@ -177,15 +179,22 @@ pub(crate) fn run(command: &AssetCommand, global: &GlobalArgs) -> anyhow::Result
         AssetCommand::Add(args) => add_photos(args, global),
         AssetCommand::List { folder } => list_photos(folder),
         AssetCommand::Check { folder, strict } => check_folder(folder, *strict),
-        AssetCommand::Sheet { folder, output } => {
-            let sheet = asset::contact_sheet(&Library::open(folder)?);
-            Ok(io::write(output, &sheet)?)
-        }
+        AssetCommand::Sheet { folder, output } => draw_sheet(folder, output),
     }
 }
 
-/// Name of the contact sheet in an asset folder.
-const SHEET: &str = "contact_sheet.png";
+/// A name without the spaces that may stand behind a comma.
+fn trimmed(name: &str) -> Result<String, Infallible> {
+    Ok(name.trim().to_owned())
+}
+
+fn draw_sheet(folder: &Path, output: &Path) -> anyhow::Result<()> {
+    let library = Library::open(folder)?;
+    let read = records_of(&library).flat_map(PhotoRecord::files);
+    let read = read.chain([MANIFEST]).map(|file| folder.join(file));
+    check_distinct(read, [output])?;
+    Ok(io::write(output, &asset::contact_sheet(&library))?)
+}
 
 fn check_folder(folder: &Path, strict: bool) -> anyhow::Result<()> {
     let library = Library::open(folder)?;
@@ -244,12 +253,16 @@ pub(crate) fn build_library(
 ) -> anyhow::Result<Built> {
     let progress = global.start_progress("cut-outs");
     let report = |done: usize, total: usize| progress.update(done as u64, total as u64);
-    let built = asset::build(list, folder, &report, &AtomicBool::new(false))?;
+    let before = Manifest::read(folder).ok();
+    let built = asset::build(list, folder, &report, &AtomicBool::new(false));
     drop(progress);
+    let built = built.inspect_err(|_| refresh_sheet(folder, before.as_ref(), global))?;
     report_built(&built, folder, global);
     let library = &built.library;
     show_classes(&library.classes, "`classes = [...]` in the list", global);
-    write_sheet(folder, library, global)?;
+    if folder.join(MANIFEST).exists() {
+        write_sheet(folder, library, global)?;
+    }
     Ok(built)
 }
 
@@ -267,7 +280,9 @@ fn report_built(built: &Built, folder: &Path, global: &GlobalArgs) {
     if !built.unlisted.is_empty() {
         global.print_status(describe_unlisted(&built.unlisted));
     }
-    global.print_status(describe_lengths(&built.lengths));
+    if !built.lengths.is_empty() {
+        global.print_status(describe_lengths(&built.lengths));
+    }
 }
 
 /// Cut-outs that are named; more of them are another list's.
@@ -298,19 +313,37 @@ fn describe_lengths(metres: &[[f64; 2]]) -> String {
 
 /// Writes the contact sheet of a folder.
 fn write_sheet(folder: &Path, library: &Library, global: &GlobalArgs) -> anyhow::Result<()> {
-    let path = folder.join(SHEET);
+    let path = folder.join(CONTACT_SHEET);
     io::write(&path, &asset::contact_sheet(library))?;
     global.print_look_at(&path);
     Ok(())
 }
 
+/// Draws the contact sheet of a folder whose manifest is another than before, though photos failed:
+/// earlier cut-outs of them may be gone.
+fn refresh_sheet(folder: &Path, before: Option<&Manifest>, global: &GlobalArgs) {
+    if Manifest::read(folder).ok().as_ref() == before {
+        return;
+    }
+    let library = Library::open(folder).map_err(anyhow::Error::from);
+    let drawn = library.and_then(|library| write_sheet(folder, &library, global));
+    if let Err(error) = drawn {
+        log::warn!("{error:#}");
+    }
+}
+
 fn add_photos(args: &AddPhotoArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     args.check_companions()?;
-    let (added, batch) = args.add_each(global)?;
-    if !added.is_empty() {
-        let library = Library::open_with(&args.output, added)?;
+    let folder = &args.output;
+    let before = Manifest::read(folder).ok();
+    let refresh = || refresh_sheet(folder, before.as_ref(), global);
+    let (added, batch) = args.add_each(global).inspect_err(|_| refresh())?;
+    if added.is_empty() {
+        refresh();
+    } else {
+        let library = Library::open_with(folder, added)?;
         show_classes(&library.classes, "--classes", global);
-        write_sheet(&args.output, &library, global)?;
+        write_sheet(folder, &library, global)?;
     }
     batch.finish()
 }
@@ -351,6 +384,7 @@ impl AddPhotoArgs {
         let options = self.quality.cut_out(CutOutOptions::default());
         let entries = self.entries();
         asset::check_cut_out_files(&entries)?;
+        asset::check_not_written_over(&entries, &self.output)?;
         let (mut added, mut batch) = (Vec::new(), FileBatch::default());
         for entry in &entries {
             match self.add_photo(entry, &options, global) {

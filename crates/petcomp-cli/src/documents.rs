@@ -1,5 +1,6 @@
 //! Recipes, scenes and options: the documents that several commands read.
 
+use crate::distinct_files::check_distinct;
 use petcomp::dataset::{DatasetConfig, Pipeline};
 use petcomp::io::{self, Override};
 use petcomp::{Quality, Result, Scene};
@@ -25,7 +26,13 @@ pub(crate) struct RecipeArgs {
 impl RecipeArgs {
     /// Reads the recipe.
     pub(crate) fn read_config(&self) -> anyhow::Result<DatasetConfig> {
-        Ok(DatasetConfig::read(&self.path, &self.overrides)?)
+        self.read_config_at(None)
+    }
+
+    /// Reads the recipe, everything computed as finely as is asked for.
+    pub(crate) fn read_config_at(&self, quality: Option<Quality>) -> anyhow::Result<DatasetConfig> {
+        let overrides = overrides_at(quality, &self.overrides);
+        Ok(DatasetConfig::read(&self.path, &overrides)?)
     }
 
     /// Reads the recipe, one more of its values replaced.
@@ -65,21 +72,33 @@ impl SceneArgs {
         Ok(io::read_document(&self.path)?)
     }
 
-    /// The recipe's config or, without a recipe, that which the scene brings.
-    pub(crate) fn config_for(&self, scene: &Scene) -> anyhow::Result<DatasetConfig> {
-        Ok(match &self.recipe {
-            Some(recipe) => DatasetConfig::read(recipe, &self.overrides)?,
-            None => DatasetConfig::for_scene(scene, &self.path, &self.overrides)?,
-        })
+    /// Opens what the scene is made from, of which no target may be a part.
+    pub(crate) fn open_pipeline<'a>(
+        &self,
+        scene: &Scene,
+        quality: Option<Quality>,
+        targets: impl Iterator<Item = &'a PathBuf>,
+    ) -> anyhow::Result<Pipeline> {
+        let pipeline = Pipeline::open_for(self.config_for(scene, quality)?, scene)?;
+        check_distinct(pipeline.input_files(scene)?, targets)?;
+        Ok(pipeline)
+    }
+
+    /// The recipe's config or, without a recipe, that which the scene brings; everything computed as
+    /// finely as is asked for.
+    fn config_for(&self, scene: &Scene, quality: Option<Quality>) -> Result<DatasetConfig> {
+        let overrides = overrides_at(quality, &self.overrides);
+        match &self.recipe {
+            Some(recipe) => DatasetConfig::read(recipe, &overrides),
+            None => DatasetConfig::for_scene(scene, &self.path, &overrides),
+        }
     }
 }
 
-/// The config, with everything computed as finely as is asked for.
-pub(crate) fn at_quality(quality: Option<Quality>, config: DatasetConfig) -> DatasetConfig {
-    match quality {
-        Some(quality) => quality.config(config),
-        None => config,
-    }
+/// What a quality replaces, then what is replaced by name, which goes before it.
+fn overrides_at(quality: Option<Quality>, named: &[Override]) -> Vec<Override> {
+    let overrides = quality.map_or_else(Vec::new, Quality::overrides);
+    overrides.into_iter().chain(named.iter().cloned()).collect()
 }
 
 /// The file's name without its extension.

@@ -1,5 +1,6 @@
 //! `petcomp eval`: detections against the truth.
 
+use crate::distinct_files::check_distinct;
 use crate::documents::stem_of;
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
@@ -11,7 +12,7 @@ use petcomp::eval::{
     ConfusionOptions, EvalImage, Tags, read_coco_results, read_coco_truth, read_tags,
     read_yolo_detections, read_yolo_truth,
 };
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct EvalArgs {
@@ -57,6 +58,7 @@ fn parse_confidence(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(args: &EvalArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let mut options = args.report_options();
+    args.check_inputs_stay()?;
     let runs = args.read_runs(&mut options)?;
     options.tags = args.tags_of(&runs)?;
     let metrics = args.measure(&runs, &options)?;
@@ -101,6 +103,26 @@ impl EvalArgs {
         }
     }
 
+    /// Predictions of the runs.
+    fn predictions(&self) -> &[PathBuf] {
+        let split = self.paths.split_last();
+        split.map(|(_, runs)| runs).unwrap_or_default()
+    }
+
+    /// Fails where a file of the evaluation would replace one that it is made from.
+    fn check_inputs_stay(&self) -> anyhow::Result<()> {
+        let Some(folder) = &self.output else {
+            return Ok(());
+        };
+        let runs = run_names(self.predictions());
+        let runs: Vec<&str> = runs.iter().map(String::as_str).collect();
+        let written = page::file_names(&runs).into_iter();
+        check_distinct(
+            self.paths.iter().chain(&self.tags),
+            written.map(|name| folder.join(name)),
+        )
+    }
+
     /// Tags of the images of the truth, which is the same for all runs.
     fn tags_of(&self, runs: &[Run]) -> petcomp::Result<Tags> {
         match (&self.tags, runs) {
@@ -119,13 +141,15 @@ impl EvalArgs {
 
     /// All runs; the options get the names of classes and the pictures of the truth.
     fn read_runs(&self, options: &mut EvalReportOptions) -> anyhow::Result<Vec<Run>> {
-        let Some((truth, predictions)) = self.paths.split_last() else {
+        let Some(truth) = self.paths.last() else {
             anyhow::bail!("expected PREDICTIONS TRUTH");
         };
-        let mut runs = Vec::new();
-        for path in predictions {
+        if !is_coco(truth) {
+            YoloSet::check_labels(truth)?;
+        }
+        let (predictions, mut runs) = (self.predictions(), Vec::new());
+        for (path, name) in predictions.iter().zip(run_names(predictions)) {
             let sheets = self.read_predictions(path, truth, options)?;
-            let name = run_name(path);
             runs.push(Run { name, sheets });
         }
         if options.classes.is_empty() && !is_coco(truth) {
@@ -198,6 +222,45 @@ fn run_name(path: &Path) -> String {
     }
 }
 
+/// Names of the runs, with as many of the folders above as tell them apart; numbered where none do.
+fn run_names(paths: &[PathBuf]) -> Vec<String> {
+    let runs: Vec<Vec<String>> = paths.iter().map(|path| run_steps(path)).collect();
+    let names = (1..).zip(&runs);
+    names
+        .map(|(i, steps)| match own_ending(steps, &runs) {
+            Some(name) => name,
+            None => format!("{}-{i}", run_name(&paths[i - 1])),
+        })
+        .collect()
+}
+
+/// The folders above a run, and its name.
+fn run_steps(path: &Path) -> Vec<String> {
+    let run = if path.ends_with("labels") {
+        path.parent()
+    } else {
+        Some(path)
+    };
+    let above = run.and_then(Path::parent).unwrap_or(Path::new(""));
+    let above = above.components();
+    let above = above.filter(|c| matches!(c, Component::Normal(_) | Component::ParentDir));
+    let above = above.map(|folder| folder.as_os_str().to_string_lossy().into_owned());
+    above.chain([run_name(path)]).collect()
+}
+
+/// The shortest ending of a path that no other run's has, or all of it where it is only part of
+/// another's; none where another has the same steps.
+fn own_ending(steps: &[String], runs: &[Vec<String>]) -> Option<String> {
+    let twins = runs.iter().filter(|run| run.as_slice() == steps);
+    if twins.count() > 1 {
+        return None;
+    }
+    let count = |ending: &[String]| runs.iter().filter(|run| run.ends_with(ending)).count();
+    let mut endings = (0..steps.len()).rev().map(|first| &steps[first..]);
+    let own = endings.find(|ending| count(ending) == 1);
+    Some(own.unwrap_or(steps).join("/"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -216,5 +279,17 @@ mod tests {
         assert_eq!(name("runs/r1.v2/labels/"), "r1.v2");
         assert_eq!(name("labels"), "labels");
         assert_eq!(name("found/coco.json"), "coco");
+    }
+
+    #[test]
+    fn runs_of_one_name_are_told_apart_by_their_folders_or_numbers() {
+        let names = |paths: &[&str]| run_names(&Vec::from_iter(paths.iter().map(PathBuf::from)));
+        assert_eq!(
+            names(&["exp1/p.json", "exp2/p.json", "exp2/q.json"]),
+            ["exp1/p", "exp2/p", "q"]
+        );
+        assert_eq!(names(&["a/r/labels", "b/r/labels/"]), ["a/r", "b/r"]);
+        assert_eq!(names(&["p.json", "exp/p.json"]), ["p", "exp/p"]);
+        assert_eq!(names(&["p.json", "./p.json"]), ["p-1", "p-2"]);
     }
 }

@@ -27,7 +27,7 @@ pub(crate) struct LabelArgs {
 pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     check_distinct(args.scene.files(), args.targets())?;
     let scene = args.scene.read_scene()?;
-    let pipeline = Pipeline::open_for(args.scene.config_for(&scene)?, &scene)?;
+    let pipeline = args.scene.open_pipeline(&scene, None, args.targets())?;
     let labels = args.label(&pipeline, scene);
     let labels = labels.map_err(|e| e.in_file(&args.scene.path))?;
     io::write_json(&args.output, &labels)?;

@@ -1,11 +1,11 @@
 //! `petcomp render`: scene -> picture.
 
 use crate::distinct_files::check_distinct;
-use crate::documents::{SceneArgs, at_quality};
+use crate::documents::SceneArgs;
 use crate::global::GlobalArgs;
 use anyhow::bail;
 use petcomp::composite::{self, Aov};
-use petcomp::dataset::{DatasetConfig, Pipeline};
+use petcomp::dataset::DatasetConfig;
 use petcomp::io::WriteOptions;
 use petcomp::io::exr::write_parts;
 use petcomp::{DeepImage, Image, LinearRgb, PremulRgba, Quality, Scene, Shot, io};
@@ -38,7 +38,9 @@ pub(crate) fn run(args: &RenderArgs, global: &GlobalArgs) -> anyhow::Result<()> 
     args.check_output()?;
     check_distinct(args.scene.files(), args.targets())?;
     let scene = args.scene.read_scene()?;
-    let pipeline = Pipeline::open_for(args.config_for(&scene)?, &scene)?;
+    let pipeline = args
+        .scene
+        .open_pipeline(&scene, args.quality, args.targets())?;
     let (scene, shot) = pipeline
         .resolve(scene)
         .map_err(|e| e.in_file(&args.scene.path))?;
@@ -67,10 +69,6 @@ impl RenderArgs {
     fn targets(&self) -> impl Iterator<Item = &PathBuf> {
         let extras = self.preview.iter().chain(&self.resolved);
         extras.chain([&self.output])
-    }
-
-    fn config_for(&self, scene: &Scene) -> anyhow::Result<DatasetConfig> {
-        Ok(at_quality(self.quality, self.scene.config_for(scene)?))
     }
 
     fn write_frame(

@@ -71,6 +71,7 @@ fn draw_scene(args: &DrawArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     check_distinct([&args.recipe.path], [&args.output])?;
     let pipeline = args.recipe.open_pipeline()?;
     let scene = pipeline.draw(args.seed, args.index)?;
+    check_distinct(pipeline.input_files(&scene)?, [&args.output])?;
     let scene = pipeline.config().with_files(scene, &args.output)?;
     io::write_document(&args.output, &scene)?;
     let (objects, plate) = (scene.objects.len(), &scene.plate);

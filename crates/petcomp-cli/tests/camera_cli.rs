@@ -464,6 +464,40 @@ fn the_corners_of_a_marker_are_added_to_a_label() {
 }
 
 #[test]
+fn corners_that_are_given_stand_in_for_markers_that_are_not_found() {
+    let desk = Desk::with_recipe();
+    let mut like = desk.photo("a", IMAGE);
+    like["markers"] =
+        json!({ "family": "DICT_4X4_50", "size_m": 0.06, "map": { "0": [0.1, 0.0, 0.0] } });
+    desk.label("a", &like);
+    desk.photo("b", IMAGE);
+    let init = ["camera", "init", "bg/b.png", "--like", "bg/a.label.json"];
+    let refusal = desk.refused(&init);
+    assert!(
+        refusal.contains("none of them was found") && refusal.contains("--corners"),
+        "{refusal}"
+    );
+    let corners = ["--corners", "100,100 500,100 500,400 100,400"];
+    let [said, warned] = desk.ok(&[&init[..], &corners].concat());
+    assert!(said.contains("corners as given"), "{said}");
+    assert!(warned.contains("none of them was found"), "{warned}");
+    assert!(desk.path("bg/b.label.json").is_file());
+}
+
+#[test]
+fn no_camera_and_no_overlay_takes_the_place_of_the_photo() {
+    let desk = Desk::with_recipe();
+    for (photo, output) in [("a", "bg/a.png"), ("b.overlay", "bg/b.camera.json")] {
+        desk.label("a", &desk.photo(photo, IMAGE));
+        let path = desk.path(format!("bg/{photo}.png"));
+        let before = std::fs::read(&path).unwrap();
+        let told = desk.refused(&["camera", "solve", "bg/a.label.json", "-o", output]);
+        assert!(told.contains("is read and would be written over"), "{told}");
+        assert_eq!(std::fs::read(&path).unwrap(), before);
+    }
+}
+
+#[test]
 fn a_label_comes_from_nothing() {
     let desk = Desk::with_recipe();
     let label = desk.photo("a", IMAGE);

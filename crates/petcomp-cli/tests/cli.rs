@@ -336,6 +336,115 @@ fn a_bad_photo_does_not_stop_those_that_are_added_with_it() {
     assert_eq!(told.matches("mass: -1").count(), 1, "{told}");
 }
 
+/// Adds a photo of a ring of 0.2 m to a folder, and returns what it said of it.
+fn add_ring(desk: &Desk, photo: &str, folder: &str) -> String {
+    let add = ["asset", "add", photo, "--class", "ring", "--length", "0.2"];
+    let done = desk.run(&[&add[..], &["-o", folder]].concat());
+    let said = text(&done.stderr);
+    assert!(done.status.success(), "{said}");
+    said
+}
+
+#[test]
+fn a_photo_that_its_cut_out_would_replace_is_refused() {
+    let desk = Desk::new();
+    write_slab(&desk.path("slab/slab.png"));
+    let before = std::fs::read(desk.path("slab/slab.png")).expect("a photo");
+    let add = ["asset", "add", "slab/slab.png", "--class", "ring"];
+    let told = desk.refused(&[&add[..], &["--length", "0.2", "-o", "."]].concat());
+    assert!(
+        told.contains("slab.png: is read and would be written over"),
+        "{told}"
+    );
+    let after = std::fs::read(desk.path("slab/slab.png")).expect("a photo");
+    assert_eq!(after, before);
+    add_ring(&desk, "slab/slab.png", "assets");
+    for taken in ["assets/slab/slab.exr", "assets/assets.toml"] {
+        let told = desk.refused(&["asset", "sheet", "assets", "-o", taken]);
+        assert!(told.contains("is read and would be written over"), "{told}");
+    }
+}
+
+#[test]
+fn another_photo_of_the_same_name_replaces_a_cut_out_with_a_warning() {
+    let desk = Desk::new();
+    write_slab(&desk.path("x/slab.png"));
+    let other = petcomp::Image::from_fn(120, 80, |x, y| {
+        match (30..70).contains(&x) && (25..55).contains(&y) {
+            true => petcomp::LinearRgb::new(0.6, 0.05, 0.05),
+            false => petcomp::LinearRgb::new(0.04, 0.4, 0.08),
+        }
+    });
+    std::fs::create_dir(desk.path("y")).expect("a folder");
+    petcomp::io::write(desk.path("y/slab.png"), &other).expect("a picture");
+    let warning = "slab/slab.exr: replaces the cut-out of another photo";
+    for (photo, is_told) in [("x", false), ("x", false), ("y", true)] {
+        let said = add_ring(&desk, &format!("{photo}/slab.png"), "assets");
+        assert_eq!(said.contains(warning), is_told, "{said}");
+    }
+}
+
+#[test]
+fn spaces_around_the_names_of_classes_are_none_of_them() {
+    let desk = Desk::new();
+    write_slab(&desk.path("slab.png"));
+    let add = [
+        "asset", "add", "slab.png", "--length", "0.2", "-o", "assets",
+    ];
+    let said = desk.ok(&[&add[..], &["--classes", "ring, cup", "--class", " cup"]].concat());
+    assert!(said.contains("classes 0 ring, 1 cup;"), "{said}");
+}
+
+#[test]
+fn a_scale_that_is_wrong_for_one_photo_does_not_stop_the_others() {
+    let desk = Desk::new();
+    write_slab(&desk.path("one.png"));
+    let small = petcomp::Image::from_fn(120, 80, |x, y| {
+        match (50..62).contains(&x) && (30..40).contains(&y) {
+            true => petcomp::LinearRgb::new(0.6, 0.05, 0.05),
+            false => petcomp::LinearRgb::new(0.04, 0.4, 0.08),
+        }
+    });
+    petcomp::io::write(desk.path("small.png"), &small).expect("a picture");
+    let line = "asset add small.png one.png --class ring --scale 3000 -o assets";
+    let done = desk.run(&words(line));
+    let told = text(&done.stderr);
+    assert_eq!(done.status.code(), Some(2), "{told}");
+    assert!(
+        told.contains("failed: no cut-out: px_per_metre: 3000, makes what is in small.png"),
+        "{told}"
+    );
+    assert!(desk.path("assets/small/one.exr").exists());
+}
+
+#[test]
+fn a_list_whose_only_photo_a_person_rejected_leaves_an_empty_sheet() {
+    let desk = Desk::new();
+    write_slab(&desk.path("one.png"));
+    desk.write("photos.csv", "file,asset,class,length\none.png,a,cap,0.3\n");
+    let build = ["asset", "build", "photos.csv", "-o", "built"];
+    let height = || {
+        let sheet = petcomp::io::read_header(desk.path("built/contact_sheet.png"));
+        sheet.expect("a sheet").height
+    };
+    desk.ok(&build);
+    let full = height();
+    desk.write(
+        "one.review.json",
+        r#"{"format": "cut-out-review", "version": 1, "size_px": [120, 80], "verdict": "rejected"}"#,
+    );
+    desk.ok(&build);
+    assert!(height() < full && !desk.path("built/a/one.exr").exists());
+    // What gives no cut-out is no more on the sheet either.
+    std::fs::remove_file(desk.path("one.review.json")).expect("a review");
+    desk.ok(&build);
+    let screen = petcomp::LinearRgb::new(0.04, 0.4, 0.08);
+    let empty = petcomp::Image::filled(120, 80, screen);
+    petcomp::io::write(desk.path("one.png"), &empty).expect("a picture");
+    assert!(!desk.run(&build).status.success());
+    assert!(height() < full && !desk.path("built/a/one.png").exists());
+}
+
 #[test]
 fn an_asset_of_two_classes_or_roles_is_refused_before_any_work() {
     let desk = Desk::new();
@@ -715,6 +824,15 @@ fn no_command_writes_over_what_it_reads() {
     desk.write("b/val.txt", "3.png\n");
     desk.write("recipe.toml", "");
     desk.write("s.toml", "");
+    write_unsplit_set(&desk, "c", 1, "[cap]");
+    desk.write("c/images/train/000000.png", "");
+    desk.write("c/dataset.json", "{}");
+    let files = r#"[{"path":"images/train/000000.png","bytes":0,"crc32":0}]"#;
+    let counts = r#""classes":[],"obstructed":0,"knotted":0,"retries":0"#;
+    let line = format!(r#"{{"k":0,"part":"train",{counts},"files":{files}}}"#);
+    desk.write("c/index.jsonl", line + "\n");
+    desk.write("metrics.json", "{}");
+    desk.write("res/factors.csv", "image,light\n");
     let files = [
         "a.png",
         "a.label.json",
@@ -723,6 +841,12 @@ fn no_command_writes_over_what_it_reads() {
         "b/val.txt",
         "recipe.toml",
         "s.toml",
+        "c/data.yaml",
+        "c/images/0.png",
+        "c/images/train/000000.png",
+        "c/index.jsonl",
+        "metrics.json",
+        "res/factors.csv",
     ];
     let content = || files.map(|name| std::fs::read(desk.path(name)).ok());
     let before = content();
@@ -746,8 +870,48 @@ fn no_command_writes_over_what_it_reads() {
         &["dataset", "subset", "set", "--head", "0.5", "-o", "set"],
         &["dataset", "split", "a", "-o", "b"],
         &["dataset", "subset", "a", "--head", "0.5", "-o", "b"],
+        &words("dataset batches --real c --synthetic c -o c/data.yaml")[..],
+        &words("dataset batches --real c --synthetic c -o ./c/images/0.png")[..],
+        &words("dataset report c -o c/data.yaml")[..],
+        &words("dataset sheet c -o ./c/index.jsonl")[..],
+        &words("dataset sheet c -o c/images/train/000000.png")[..],
+        &words("eval p.json metrics.json -o .")[..],
+        &words("eval p.json t.json --tags res/factors.csv -o res")[..],
     ] {
         let told = desk.refused(words);
+        assert!(told.contains("is read and would be written over"), "{told}");
+    }
+    assert!(content() == before);
+}
+
+#[test]
+fn no_picture_of_a_scene_goes_over_what_it_is_made_from() {
+    let desk = Desk::new();
+    demo(&desk);
+    for name in ["bg0003.jpg", "bg0003.label.json"] {
+        let file = std::fs::read(samples().join("backgrounds").join(name));
+        desk.write(Path::new("places").join(name), file.expect("a sample"));
+    }
+    let draw = |scene| {
+        let args = words("scene draw demo/recipe.toml --set backgrounds=\"../places\" -o");
+        [&args[..], &[scene]].concat()
+    };
+    desk.ok(&draw("s.json"));
+    let content = || -> Vec<_> {
+        let files = desk.files().into_iter();
+        files.map(|file| std::fs::read(file).ok()).collect()
+    };
+    let before = content();
+    for args in [
+        words("render s.json -o places/bg0003.jpg"),
+        words("render s.json -o f.png --preview places/bg0003.jpg"),
+        words("render s.json -o f.png --resolved places/bg0003.label.json"),
+        words("render s.json -o demo/assets/b0001/b0001_0.exr"),
+        words("label s.json -o l.json --overlay places/bg0003.jpg"),
+        words("label s.json -o demo/assets/assets.toml"),
+        draw("places/bg0003.label.json"),
+    ] {
+        let told = desk.refused(&args);
         assert!(told.contains("is read and would be written over"), "{told}");
     }
     assert!(content() == before);
@@ -794,13 +958,25 @@ fn a_frame_that_cannot_be_keyed_does_not_stop_the_others() {
 }
 
 #[test]
-fn cut_outs_of_jpegs_are_exr() {
+fn keyed_frames_are_exr_where_their_own_format_would_lose_bits() {
     let desk = Desk::new();
     std::fs::create_dir(desk.path("shot")).expect("a folder");
-    let frames = ["shot/0.jpg", "shot/1.jpeg"];
+    let frames = [
+        "shot/0.jpg",
+        "shot/1.jpeg",
+        "shot/2.png",
+        "shot/3.png",
+        "shot/4.tif",
+    ];
     for frame in frames {
         write_green_ramp(&desk.path(frame), 0.5);
     }
+    let green = petcomp::Image::filled(24, 4, petcomp::LinearRgb::new(0.02, 0.6, 0.05));
+    let deep = petcomp::io::WriteOptions {
+        bits: Some(petcomp::io::Bits::Sixteen),
+        ..petcomp::io::WriteOptions::default()
+    };
+    petcomp::io::write_with(desk.path("shot/3.png"), &green, &deep).expect("a picture");
     let more = [
         "-o",
         "cut",
@@ -810,8 +986,10 @@ fn cut_outs_of_jpegs_are_exr() {
         "0.02,0.6,0.05",
     ];
     desk.ok(&[&["matte", "key"][..], &frames, &more].concat());
-    for file in ["cut/0.exr", "cut/1.exr", "mattes/0.jpg", "mattes/1.jpeg"] {
-        assert!(desk.path(file).exists(), "{file}");
+    for name in ["0.exr", "1.exr", "2.png", "3.exr", "4.tif"] {
+        for folder in ["cut", "mattes"] {
+            assert!(desk.path(folder).join(name).exists(), "{folder}/{name}");
+        }
     }
 }
 
@@ -972,6 +1150,13 @@ fn every_step_of_a_search_is_a_picture() {
         assert_eq!(step[corner].0, 1.0 - inside, "{name}");
     }
     assert_eq!(read("_core.png")[corner].0, 0.0);
+    let files = desk.files().into_iter();
+    let mut steps = files.filter(|file| file.to_string_lossy().ends_with("_hull.png"));
+    let step = steps.next().expect("a step");
+    write_slab(&step);
+    let photo = step.to_str().expect("letters");
+    let told = desk.refused(&["matte", "segment", photo, "-o", "steps"]);
+    assert!(told.contains("is read and would be written over"), "{told}");
 }
 
 /// Folded film that mirrors light, in an ellipse: what it reflects, and what it lets through.
@@ -1565,7 +1750,10 @@ fn one_word_says_how_finely_every_stage_works() {
         usual == made(&["--quality", "normal"], "normal"),
         "normal is what there is without a word"
     );
-    assert!(usual != made(&["--quality", "draft"], "draft"));
+    let draft = made(&["--quality", "draft"], "draft");
+    assert!(usual != draft);
+    let finer = ["--set", "render.subsamples=2", "--quality", "draft"];
+    assert!(draft != made(&finer, "finer"), "what is set goes first");
     let told = desk.refused(&words(
         "dataset generate demo/recipe.toml -n 1 -o x --quality fast",
     ));
@@ -1661,7 +1849,8 @@ fn an_object_on_a_display_is_measured() {
         desk.write("photo_00_black.review.json", review);
         let built = desk.run(&["asset", "build", "photos.toml", "-o", "built"]);
         let told = text(&built.stderr);
-        assert!(!built.status.success() && told.contains(expected), "{told}");
+        assert!(told.contains(expected), "{told}");
+        assert_eq!(built.status.success(), said.contains("rejected"), "{told}");
     }
 }
 

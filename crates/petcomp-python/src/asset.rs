@@ -40,6 +40,8 @@ fn built_json(built: &Built) -> Result<String> {
         "photos": built.photos,
         "lengths": built.lengths,
         "refused": built.refused,
+        "rejected": built.rejected,
+        "unlisted": built.unlisted,
         "needs_review": built.needs_review,
         "classes": built.library.classes,
         "assets": built.library.assets.iter().map(|asset| &asset.name).collect::<Vec<_>>(),

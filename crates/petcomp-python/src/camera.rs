@@ -163,13 +163,18 @@ pub(crate) fn solve_camera(py: Python<'_>, label: &str, force: bool) -> PyResult
 }
 
 fn solved(label: &Label, force: bool) -> Result<(petcomp::Camera, String)> {
+    if !force {
+        camera::check_size(label)?;
+    }
     let solution = camera::solve(label, &Default::default()).map_err(Error::from)?;
-    let solution = if force {
-        solution
-    } else {
-        solution.fitting().map_err(Error::from)?
-    };
+    let solution = if force { solution } else { accepted(solution)? };
     Ok((solution.camera, text(&record(label, &solution))?))
+}
+
+/// A solution that fits its label, whose camera can see objects on the surface.
+fn accepted(solution: Solution) -> Result<Solution> {
+    camera::check_distance(&solution.camera)?;
+    solution.fitting().map_err(Error::from)
 }
 
 fn record(label: &Label, solution: &Solution) -> serde_json::Value {

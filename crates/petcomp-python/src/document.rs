@@ -1,12 +1,14 @@
 //! Documents that cross the border as JSON.
 
-use petcomp::{Error, Result};
+use petcomp::{Error, Result, io};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// A document of Python's `json`, which writes numbers that are none as words: those are refused here.
 pub(crate) fn parse<T: DeserializeOwned>(name: &str, text: &str) -> Result<T> {
-    serde_json::from_str(text).map_err(|e| Error::value(name, without_place(&e)))
+    let values = serde_json::from_str(text);
+    let values = values.map_err(|e| Error::value(name, without_place(&e)))?;
+    io::from_json(name, values)
 }
 
 /// Where in the JSON it is means nothing to who wrote a dict.

@@ -140,6 +140,19 @@ impl DatasetLayout {
         })
     }
 
+    /// Refuses a sample of which nothing would tell the labels: an archive takes them from what
+    /// other writers write, and a [`Sidecar`] only tells of samples with a scene.
+    fn told(&self, sample: dataset::Sample, k: u64) -> Result<dataset::Sample> {
+        if sample.provenance.is_some() || self.labels.archives().is_none() {
+            return Ok(sample);
+        }
+        let what = format!(
+            "webdataset alone, which holds no labels of sample {k}, for it has no scene, \
+             expected \"yolo\", \"coco\" or \"voc\" as well"
+        );
+        Err(Error::value("labels.formats", what))
+    }
+
     fn writers(&self) -> Vec<Arc<dyn Writer>> {
         let mut writers: Vec<Arc<dyn Writer>> =
             vec![Arc::new(self.pictures.clone()), Arc::new(Sidecar)];
@@ -164,7 +177,8 @@ pub(crate) fn generate_with(
     let mut beside = |py: Python<'_>| steps.deliver(py, progress.as_ref());
     let made = work::run_beside(py, Stop::of_caller(), &mut beside, move |stop| {
         let plan = layout.plan(&classes, target)?;
-        own.generate(&plan, |k| keep.sample(&make, &classes, k), stop)
+        let sample = |k| layout.told(keep.sample(&make, &classes, k)?, k);
+        own.generate(&plan, sample, stop)
     });
     raised.or_else(made)
 }

@@ -75,15 +75,26 @@ def test_sizes_that_do_not_fit_are_named():
     ("options", "says"),
     [
         ({"clip_black": 2.0}, "key.clip_black: 2, expected 0 to 1"),
-        ({"clip_blak": 0.1}, "unknown field `clip_blak`"),
+        ({"clip_blak": 0.1}, 'options: unknown key "clip_blak", did you mean "clip_black"?'),
         ({"profile": "blender-9"}, "unknown variant `blender-9`"),
-        ({"blur_pre": -1}, "invalid value: integer `-1`"),
+        ({"blur_pre": -1}, "options.blur_pre: invalid value: integer `-1`"),
         ({"clip_black": math.nan}, "options.clip_black: nan, expected a finite number"),
     ],
 )
 def test_a_wrong_option_is_named(options, says):
-    with pytest.raises(ValueError, match=says.replace("(", r"\(")):
+    with pytest.raises(ValueError, match=re.escape(says)):
         key(PHOTO, **options)
+
+
+def test_a_wrong_value_in_a_document_is_named_with_its_place():
+    scene = {**SCENE, "lights": [{**SCENE["lights"][0], "power": "x"}]}
+    for make, document, says in (
+        (petcomp.Scene.from_dict, scene, "scene.lights[0].power: invalid type: string"),
+        (petcomp.Scene.from_dict, {**SCENE, "lihgts": []}, 'scene: unknown key "lihgts", did you mean "lights"?'),
+        (petcomp.Camera.from_dict, {}, "camera: missing key"),
+    ):
+        with pytest.raises(errors.InvalidValueError, match="^" + re.escape(says)):
+            make(document)
 
 
 def test_every_kind_of_error_has_its_class(tmp_path):
@@ -158,7 +169,7 @@ def test_a_shot_that_cannot_be_is_refused():
         (petcomp.Shot(camera).with_card(petcomp.Card(1, film, (0.2, 0.1), position=(0, 0, math.nan))), "position"),
         (good.with_plate(np.zeros((5, 5, 3), np.float32)), "plate: 5 x 5 pixels"),
         (good.with_light({"position": [0, 0, 1], "size": [1, 1], "power": -1}), r"lights\[0\].power"),
-        (good.with_light({"position": [0, 0, 1], "size": [1, 1]}), "missing field `power`"),
+        (good.with_light({"position": [0, 0, 1], "size": [1, 1]}), r'shot.lights\[0\]: missing key "power"'),
         (petcomp.Shot(camera, exposure=math.nan), "exposure: nan"),
         (petcomp.Shot(camera, options={"subsamples": 10**6}), "render.subsamples"),
     ]
@@ -190,6 +201,28 @@ def test_cameras_that_cannot_be_are_refused():
     ):
         with pytest.raises((ValueError, TypeError, errors.CameraError)):
             make()
+
+
+def test_a_rectangle_in_millimetres_is_no_rectangle_in_metres():
+    corners = [[236, 239], [1020, 216], [1009, 701], [276, 739]]
+    for unit, says in ((1000, "^surface.width_m: 560"), (80, "the camera would be .* m away")):
+        with pytest.raises(errors.InvalidValueError, match=says):
+            petcomp.Camera.from_rectangle(corners, [0.56 * unit, 0.37 * unit], [1280, 853])
+
+
+def test_what_a_function_would_not_hear_is_refused(tmp_path):
+    sample = petcomp.Sample.from_masks(np.zeros((4, 4, 3), np.uint8), [np.ones((4, 4), bool)], [0], ["a"])
+    for arguments, says in (
+        ({"set": {"scene.objects": 3}}, "set, quality: act on recipes alone"),
+        ({"quality": "draft"}, "set, quality: act on recipes alone"),
+        ({"labels": {"min_visible": 0.5}}, "labels.min_visible: acts when labels are made"),
+        ({"labels": {"alpha_threshold": 0.5}}, "labels.alpha_threshold: acts when labels are made"),
+        ({"labels": {"formats": ["webdataset"]}}, "labels.formats: webdataset alone"),
+    ):
+        with pytest.raises(errors.InvalidValueError, match=says):
+            petcomp.generate(lambda k: sample, 1, tmp_path / "set", classes=["a"], **arguments)
+    both = {"formats": ["voc", "webdataset"]}
+    assert petcomp.generate(lambda k: sample, 1, tmp_path / "both", classes=["a"], labels=both).labelled == 1
 
 
 def test_samples_that_cannot_be_are_refused():

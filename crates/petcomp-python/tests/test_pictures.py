@@ -121,6 +121,11 @@ def test_assets_are_built_as_by_the_program(world, tmp_path):
     ours, theirs = tmp_path / "assets/assets.toml", world / "assets/assets.toml"
     assert ours.read_text() == theirs.read_text()
     assert petcomp.asset.list_folder(tmp_path / "assets")["classes"] == ["bottle"]
+    assert built.unlisted == [] and built.rejected == 0
+    head, first, *_ = (world / "photos.csv").read_text().splitlines()
+    (tmp_path / "one.csv").write_text(f"{head}\n{first}\n")
+    (left,) = petcomp.asset.build(tmp_path / "one.csv", tmp_path / "assets").unlisted
+    assert left.startswith("bottle1/")
 
 
 def test_a_rectangle_gives_its_camera():
@@ -212,6 +217,7 @@ def test_evaluation_in_memory_is_that_of_files(tmp_path, program):
     assert (tmp_path / "page/eval.html").exists()
     memory = petcomp.evaluate(found, truth)
     assert abs(memory.map - files.map) < 1e-3 and 0 < memory.map < 1
+    assert petcomp.evaluate(found, truth, rounds=39).interval is None
     assert memory.interval[0] <= memory.map <= memory.interval[1] and len(memory.by_class) == 2
 
 

@@ -44,6 +44,19 @@ def test_samples_are_the_programs_files(recipe, tmp_path, program):
         assert target.keys() == {"boxes", "labels", "image_id", "area", "iscrowd"} and target["image_id"] == k
 
 
+def test_what_is_to_be_ignored_is_not_taught():
+    from petcomp.torch import to_tensors
+
+    film = torch.ones(4, 4, 4).numpy()
+    cards = tuple(petcomp.Card(i, film, (0.2, 0.1), position=(0, 0, 0.05 * i)) for i in (1, 2))
+    camera = petcomp.Camera.looking_down(1.0, 80.0, [64, 48])
+    sample = petcomp.render(petcomp.Shot(camera, cards=cards, labels={"obstructed": "ignore"}))
+    assert sample.ignored.tolist() == [True, False]
+    target = to_tensors(sample)[1]
+    assert target["boxes"].tolist() == sample.boxes[1:].tolist()
+    assert target["labels"].tolist() == [1] and target["iscrowd"].tolist() == [0] and len(target["area"]) == 1
+
+
 def test_any_index_any_order(recipe):
     data = dataset(recipe, transform=digest)
     assert len(data) == COUNT and data[-1] == data[COUNT - 1]

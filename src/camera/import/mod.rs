@@ -47,7 +47,6 @@ pub(crate) enum ShapeKind {
 /// # Errors
 /// [`Error::Value`] for a file of one of the programs that does not hold what theirs do.
 pub(crate) fn annotations(text: &str) -> Result<Option<Vec<Annotation>>> {
-    let text = text.trim_start_matches('\u{feff}');
     if is_xml(text) {
         return cvat::annotations(text);
     }

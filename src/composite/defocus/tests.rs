@@ -2,6 +2,8 @@ use super::*;
 use crate::composite::frame;
 use crate::geom::{Point3, Pose, Quad, Vector3};
 use crate::pixel::PremulRgba;
+use crate::scene::{AreaLight, LightShape};
+use std::sync::Arc;
 
 /// Thirty millimetres at f/2, in focus half a metre away.
 const LENS: ThinLens = ThinLens {
@@ -148,6 +150,29 @@ fn card(id: u32, [x, y]: [f64; 2], [width, height]: [f64; 2], turn_deg: f64) -> 
     Card::new(ObjectId(id), quad, film)
 }
 
+/// A plate of a camera's size.
+fn white_plate(camera: &Camera) -> Arc<Image<LinearRgb>> {
+    let [width, height] = camera.image.map(|side| side as usize);
+    Arc::new(Image::filled(width, height, LinearRgb::WHITE))
+}
+
+/// The picture of a shot, which is the same in one that shows 40 pixels more on every side.
+fn middle_of_a_larger_picture(small: Shot, options: &RenderOptions) -> Image<PremulRgba> {
+    let camera = small.camera.widened(40);
+    let large = Shot {
+        plate: small.plate.as_ref().map(|_| white_plate(&camera)),
+        camera,
+        ..small.clone()
+    };
+    let [found, whole] = [small, large].map(|shot| crate::composite::picture(&shot, options));
+    for (x, y) in (0..48).flat_map(|y| (0..64).map(move |x| (x, y))) {
+        let (found, whole) = (found[(x, y)], whole[(x + 40, y + 40)]);
+        let off = (found.a - whole.a).abs().max((found.r - whole.r).abs());
+        assert!(off < 1e-3, "{x} {y}: {found:?} {whole:?}");
+    }
+    found
+}
+
 #[test]
 fn what_is_beyond_the_border_spreads_into_the_picture() {
     // The picture shows 64 mm x 48 mm at that height. Circles of 6 pixels.
@@ -163,19 +188,39 @@ fn what_is_beyond_the_border_spreads_into_the_picture() {
     ];
     let plain = shot(Some(lens)).with_ambient(LinearRgb::WHITE);
     let small = cards.into_iter().fold(plain, Shot::with_card);
-    let large = Shot {
-        camera: small.camera.widened(40),
-        ..small.clone()
-    };
-    let [found, whole] =
-        [small, large].map(|shot| crate::composite::picture(&shot, &RenderOptions::default()));
-    for (x, y) in (0..48).flat_map(|y| (0..64).map(move |x| (x, y))) {
-        let (found, whole) = (found[(x, y)], whole[(x + 40, y + 40)]);
-        let off = (found.a - whole.a).abs().max((found.r - whole.r).abs());
-        assert!(off < 1e-3, "{x} {y}: {found:?} {whole:?}");
-    }
+    let found = middle_of_a_larger_picture(small, &RenderOptions::default());
     let beyond = found[(63, 28)].a;
     assert!(beyond > 0.05, "{beyond}");
+}
+
+#[test]
+fn shadows_beyond_the_border_spread_into_the_picture() {
+    // The picture shows 80 mm x 60 mm of the surface, with circles of 6 pixels. Cards are in focus.
+    let lens = ThinLens {
+        aperture_m: 0.06,
+        focus_m: 0.4,
+    };
+    let lamp = AreaLight {
+        shape: LightShape::Rectangle,
+        position: [0.0, 0.0, 1.0],
+        target: [0.0; 3],
+        size: [0.01; 2],
+        power: 10.0,
+        color: LinearRgb::WHITE,
+    };
+    let plain = shot(Some(lens)).with_light(lamp);
+    let small = plain
+        .with_card(card(1, [-51.0, 0.0], [30.0, 30.0], 0.0)) // its shadow ends at the left border
+        .with_card(card(2, [0.0, -24.0], [100.0, 10.0], 3.0)); // its shadow lies on the lower one
+    let plate = white_plate(&small.camera);
+    // The irradiance of both pictures is sampled at the same places.
+    let options = RenderOptions {
+        cell_px: 0.5,
+        ..RenderOptions::default()
+    };
+    let found = middle_of_a_larger_picture(small.with_plate(plate), &options);
+    let beyond = found[(0, 24)].r;
+    assert!(beyond < 0.9, "{beyond}");
 }
 
 #[test]

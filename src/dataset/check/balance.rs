@@ -74,7 +74,7 @@ impl Checked {
     fn parts_without_label(&self, class: usize) -> impl Iterator<Item = Diagnostic> {
         let parts = Part::ALL.into_iter();
         parts
-            .filter(move |&part| self.count(class, part) == 0)
+            .filter(move |&part| self.empty_part != Some(part) && self.count(class, part) == 0)
             .map(move |part| self.no_label_in(part, class))
     }
 

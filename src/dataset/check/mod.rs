@@ -39,6 +39,8 @@ pub struct Checked {
     pub classes: Vec<String>,
     /// Whether there are to be labels for YOLO; where petcomp wrote none, no image was looked at.
     pub has_yolo: bool,
+    /// The part that has no images because the dataset was made to have none there.
+    pub empty_part: Option<Part>,
 }
 
 /// A row of a label file.
@@ -56,11 +58,11 @@ pub struct CheckedBox {
 /// only warn.
 ///
 /// * `data.yaml` has `train`, `val` and names, as many as `nc` says, and its folders and lists exist
-///   and have images;
-/// * every image decodes to its end and has sides of at least 10 pixels; no two that show something
-///   have the same bytes;
+///   and have images, unless the dataset was made with all of them in the other part;
+/// * every image decodes to its end and has sides of at least 10 pixels; no two have the same bytes,
+///   unless both show nothing;
 /// * no image for validation looks like one for training ([`NEAR_DUPLICATE_RMS`]) that shows the
-///   same by its label file, unless it shows nothing;
+///   same by its label file, or is one that was saved again, unless both show nothing;
 /// * every image has a label file and every label file an image;
 /// * rows have 5 columns (or, in files of outlines, 7 or more, an odd number), an integer class
 ///   below `nc`, shares in 0..1, sides above 0, and no duplicate in the same file;
@@ -81,6 +83,7 @@ pub fn check(folder: &Path) -> Result<Checked> {
     let mut checker = Checker {
         folder,
         findings: Vec::new(),
+        may_be_empty: part_without_share(folder),
     };
     let has_yolo = !is_for_others(folder)?;
     let yaml = match has_yolo {
@@ -95,10 +98,22 @@ pub fn check(folder: &Path) -> Result<Checked> {
     #[cfg(feature = "settle")]
     checker.findings.extend(unsupported::find(folder));
     checker.findings.sort_by(Finding::cmp_by_place);
+    let has_images = |part: &Part| images.iter().any(|image| image.part == *part);
     Ok(Checked {
         has_yolo,
+        empty_part: checker.may_be_empty.filter(|part| !has_images(part)),
         ..Checked::new(checker.findings, &images, &yaml)
     })
+}
+
+/// The part that a dataset of petcomp's was made to have no images in.
+fn part_without_share(folder: &Path) -> Option<Part> {
+    let identity = folder::identity(folder).ok().flatten()?;
+    match identity["split"]["val_percent"].as_u64()? {
+        0 => Some(Part::Val),
+        100 => Some(Part::Train),
+        _ => None,
+    }
 }
 
 /// Whether petcomp made the dataset, and no YOLO labels in it.
@@ -150,6 +165,8 @@ impl Checked {
 struct Checker<'a> {
     folder: &'a Path,
     findings: Vec<Finding>,
+    /// A part that needs no images.
+    may_be_empty: Option<Part>,
 }
 
 fn boxes_of(image: &CheckedImage) -> impl Iterator<Item = CheckedBox> {
@@ -215,7 +232,7 @@ impl Checker<'_> {
         let mut images = Vec::new();
         for part in Part::ALL {
             for place in self.places(yaml, part) {
-                let found = self.list_images_in(&place);
+                let found = self.list_images_in(&place, part);
                 images.extend(found.into_iter().map(|path| (part, path)));
             }
         }
@@ -230,9 +247,9 @@ impl Checker<'_> {
     }
 
     /// As paths from the dataset's folder; an image that a list names may lie elsewhere.
-    fn list_images_in(&mut self, place: &Path) -> Vec<PathBuf> {
+    fn list_images_in(&mut self, place: &Path, part: Part) -> Vec<PathBuf> {
         let found = images_in(place).unwrap_or_default();
-        if found.is_empty() {
+        if found.is_empty() && self.may_be_empty != Some(part) {
             let place = io::relative(place, self.folder);
             self.add(place, Code::NoImages, "no images, expected at least one");
         }
@@ -243,11 +260,11 @@ impl Checker<'_> {
     /// Images with the bytes of another; images of an empty scene may well be the same.
     fn find_duplicates(&mut self, images: &[CheckedImage]) {
         let mut known: BTreeMap<(u64, u32), &CheckedImage> = BTreeMap::new();
-        for image in images.iter().filter(|image| !image.is_empty) {
+        for image in images {
             let twin = image
                 .checksum
                 .and_then(|checksum| known.insert(checksum, image));
-            if let Some(twin) = twin {
+            if let Some(twin) = twin.filter(|twin| !(image.is_empty && twin.is_empty)) {
                 let (code, message) = twin_message(image, twin);
                 self.add(&image.path, code, message);
             }
@@ -356,11 +373,11 @@ fn twin_message(image: &CheckedImage, twin: &CheckedImage) -> (Code, String) {
     (Code::DuplicateImage, message)
 }
 
-/// The images of a part that show something and can be read, and what they are compared by.
+/// The images of a part that can be read, and what they are compared by.
 fn looks(images: &[CheckedImage], part: Part) -> (Vec<&CheckedImage>, Vec<Look>) {
     images
         .iter()
-        .filter(|image| image.part == part && !image.is_empty)
+        .filter(|image| image.part == part)
         .filter_map(|image| Some((image, image.look()?)))
         .unzip()
 }

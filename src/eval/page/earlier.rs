@@ -25,8 +25,13 @@ pub(super) fn remove_metrics(folder: &Path, kept: &[String]) -> Result<()> {
 /// Whether an evaluation wrote a file, by its name and by what it holds.
 fn are_metrics(name: &str, path: &Path) -> bool {
     let run = numbered_run(name);
-    let is_ours = |metrics: Metrics| run.is_none_or(|run| run == metrics.run);
+    let is_ours = |metrics: Metrics| run.is_none_or(|run| run == file_part(&metrics.run));
     (name == METRICS || run.is_some()) && io::read_json(path).is_ok_and(is_ours)
+}
+
+/// A run's name in that of a file.
+pub(super) fn file_part(run: &str) -> String {
+    run.replace(['/', '\\'], "_")
 }
 
 /// The run of one of several files of metrics: of `2-NAME.json`.

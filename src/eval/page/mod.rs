@@ -20,7 +20,7 @@ use std::path::Path;
 /// What one training found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// Its name: the folder or file of its predictions.
+    /// Its name: the folder or file of its predictions, with folders above it where need be.
     pub name: String,
     /// Images with truth and detections.
     pub sheets: Vec<EvalImage>,
@@ -185,22 +185,42 @@ fn add_classes(
 /// `metrics.json` of one run, or `1-NAME.json` and so on of several, and none of an earlier
 /// evaluation.
 fn write_metrics(folder: &Path, all: &[Metrics]) -> Result<()> {
-    let names = metrics_names(all);
+    let runs: Vec<&str> = all.iter().map(|metrics| metrics.run.as_str()).collect();
+    let names = metrics_names(&runs);
     for (name, metrics) in names.iter().zip(all) {
         io::write_json(folder.join(name), metrics)?;
     }
     earlier::remove_metrics(folder, &names)
 }
 
-fn metrics_names(all: &[Metrics]) -> Vec<String> {
-    match all {
+fn metrics_names(runs: &[&str]) -> Vec<String> {
+    match runs {
         [_] => vec![earlier::METRICS.into()],
         _ => (1..)
-            .zip(all)
-            .map(|(i, metrics)| format!("{i}-{}.json", metrics.run))
+            .zip(runs)
+            .map(|(i, run)| format!("{i}-{}.json", earlier::file_part(run)))
             .collect(),
     }
 }
+
+/// Names of the files that [`write`] may make in its folder for runs of these names.
+pub fn file_names(runs: &[&str]) -> Vec<String> {
+    let names = FILES.into_iter().map(String::from);
+    names.chain(metrics_names(runs)).collect()
+}
+
+/// What there is of each evaluation, beside the metrics.
+const FILES: [&str; 9] = [
+    "scores.csv",
+    "classes.csv",
+    "factors.csv",
+    "confusion.csv",
+    "mistakes.csv",
+    "precision_recall.svg",
+    "f1.svg",
+    "confusion.svg",
+    "eval.html",
+];
 
 /// Writes a table that is not empty, and adds what is shown of it to the page; an empty one takes
 /// that of an earlier evaluation away.
@@ -593,6 +613,12 @@ mod tests {
             ..Default::default()
         };
         write(folder.path(), &[run("best", 0.9)], &options).unwrap();
+        let files = std::fs::read_dir(folder.path()).unwrap().flatten();
+        let names = file_names(&["best"]);
+        assert!(files.map(|file| file.file_name()).all(|file| {
+            let file = file.to_string_lossy();
+            names.iter().any(|name| *name == file)
+        }));
         let metrics: Metrics = io::read_json(folder.path().join("metrics.json")).unwrap();
         assert_eq!((metrics.images, metrics.yolov5.classes[0].truths), (2, 2));
         let page = io::read_text(folder.path().join("eval.html")).unwrap();
@@ -615,10 +641,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         let there = |names: &[&str]| names.iter().filter(|name| at(name).exists()).count();
-        let (runs, untagged) = ([run("p", 0.9), run("q", 0.8)], EvalReportOptions::default());
+        let (runs, untagged) = (
+            [run("p", 0.9), run("x/q", 0.8)],
+            EvalReportOptions::default(),
+        );
         let tagged = with_tags("image,light\na,dim\n", &runs[0]);
         write(folder.path(), &runs, &tagged).unwrap();
-        let numbered = ["1-p.json", "2-q.json", "factors.csv"];
+        let numbered = ["1-p.json", "2-x_q.json", "factors.csv"];
         assert_eq!(there(&numbered), 3);
         std::fs::copy(at("1-p.json"), at("1-best.json")).unwrap();
         std::fs::write(at("3-notes.json"), "{}").unwrap();

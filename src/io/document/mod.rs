@@ -99,6 +99,18 @@ fn from_value<T: DeserializeOwned>(value: toml::Value, outer: &str) -> Result<T>
     })
 }
 
+/// A document from JSON values in memory, as a whole called `name`.
+///
+/// # Errors
+/// [`Error::Value`] for a value that does not fit, by its path below `name`, with the key that was
+/// probably meant where one is unknown.
+pub fn from_json<T: DeserializeOwned>(name: &str, value: serde_json::Value) -> Result<T> {
+    serde_path_to_error::deserialize(value).map_err(|e| {
+        let at = format!("{name}.{}", e.path());
+        json_mistake(e.inner(), at.trim_end_matches(['.', '?']).into())
+    })
+}
+
 /// Reads a document whose extension shows whether it is JSON (`.json`) or TOML (any other).
 ///
 /// # Errors
@@ -498,6 +510,23 @@ mod tests {
         assert_eq!(
             read_json_data::<Vec<u8>>(&path).unwrap().len(),
             (8 << 20) + 1
+        );
+    }
+
+    #[test]
+    fn values_in_memory_are_named_below_their_document() {
+        let told = |value| {
+            from_json::<Recipe>("recipe", value)
+                .unwrap_err()
+                .to_string()
+        };
+        assert_eq!(
+            told(serde_json::json!({"seed": 1, "objects": {"cuont": 3}})),
+            "recipe.objects: unknown key \"cuont\", did you mean \"count\"?"
+        );
+        assert_eq!(
+            told(serde_json::json!({"seed": 1})),
+            "recipe: missing key \"objects\""
         );
     }
 

@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// The files of a kind below a folder, in natural order of path (`2.png` before `10.png`); each
-/// folder once, as links may lead in circles.
+/// The files of a kind below a folder, in natural order of path (`2.png` before `10.png`), without
+/// those that macOS puts beside others; each folder once, as links may lead in circles.
 ///
 /// # Errors
 /// A folder that cannot be listed, or one with which there are more files than `most`.
@@ -21,7 +21,8 @@ pub(crate) fn files_below(
         if seen.insert(folder.canonicalize().map_err(|e| Error::file(&folder, e))?) {
             let (folders, found) = folders_and_files(&folder)?;
             open.extend(folders.into_iter().filter(|folder| !is_hidden(folder)));
-            files.extend(found.into_iter().filter(|path| is_wanted(path)));
+            let found = found.into_iter().filter(|path| !is_apple_double(path));
+            files.extend(found.filter(|path| is_wanted(path)));
         }
         check_file_count(files.len(), most, &folder)?;
     }
@@ -33,6 +34,12 @@ pub(crate) fn files_below(
 fn is_hidden(folder: &Path) -> bool {
     let name = folder.file_name().unwrap_or_default();
     name.as_encoded_bytes().starts_with(b".")
+}
+
+/// `._a.png` beside `a.png`: what macOS knows of a file, where the disk has no place for it.
+pub(crate) fn is_apple_double(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default();
+    name.as_encoded_bytes().starts_with(b"._")
 }
 
 /// What is in a folder, in order of name: of two names of a folder always the same one counts.
@@ -54,6 +61,16 @@ fn check_file_count(count: usize, most: usize, folder: &Path) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn files_of_macos_beside_others_are_passed_over() {
+        let dir = tempfile::tempdir().unwrap();
+        let [image, note] = ["a.png", "._a.png"].map(|name| dir.path().join(name));
+        std::fs::write(&image, "").unwrap();
+        std::fs::write(note, "").unwrap();
+        let found = files_below(dir.path(), |_| true, usize::MAX).unwrap();
+        assert_eq!(found, [image]);
+    }
 
     #[test]
     fn files_are_in_order_of_their_numbers() {

@@ -14,7 +14,7 @@ pub use checksum::{Checksum, copy};
 pub use sanitize_path::{below, inside};
 
 pub(crate) use atomic::{Syncing, sync_file_system, with_last_step, write_bytes, write_through};
-pub(crate) use listing::files_below;
+pub(crate) use listing::{files_below, is_apple_double};
 pub(crate) use natural_order::natural_key;
 pub(crate) use open::{open_regular, read_regular, read_to_end, reason};
 pub(crate) use own_file::{open_own, refuse_foreign};

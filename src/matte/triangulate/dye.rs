@@ -1,11 +1,12 @@
 //! The plastic of an object whose transmittance is known in some channels: what it is in the
 //! others.
 
-use super::lines::{PixelLines, opaque_pixels};
+use super::lines::{FlatPlastic, PixelLines, opaque_pixels};
 use crate::image::Image;
 use crate::matte::film::tint;
 use crate::pixel::Coverage;
 use crate::quantile::median;
+use std::iter;
 
 /// Pixels that are sampled.
 const DYE_SAMPLES: usize = 400;
@@ -16,28 +17,72 @@ const SCATTER_SIGMA: f32 = 0.04;
 const DYE_HANDICAP: f32 = 0.4;
 /// Weight of thickness: the misfit of plastic that is twice as see-through as it should be.
 const THICKNESS_WEIGHT: f32 = 1.0;
+/// From this difference of what they let through on, two dyes are not amounts of one.
+const MIN_SPREAD: f32 = 0.2;
 
-/// Transmittance per channel of flat plastic with the dye, or none, that explains the determined
-/// channels best: by the median over the clearer half of the object of how far a pixel is from that
-/// plastic times any factor.
+/// Flat plastic with the dye, or none, that explains the determined channels best: by the median
+/// over the clearer half of the object of how far a pixel is from that plastic times any factor.
 pub(super) fn fit(
     pixels: &Image<PixelLines>,
     inside: &Image<Coverage>,
     determined: [bool; 3],
-) -> [f32; 3] {
+) -> FlatPlastic {
     let samples = DyeSamples {
         pixels: clearer_half(pixels, inside, determined),
         determined,
     };
-    let clear = [tint::CLEAR_TRANSMITTANCE; 3];
-    let mut best = (samples.misfit(clear, 0.0), clear);
-    for flat in tint::dyed() {
-        let misfit = samples.misfit(flat, DYE_HANDICAP);
-        if misfit < best.0 {
-            best = (misfit, flat);
-        }
+    let clear = samples.tried([tint::CLEAR_TRANSMITTANCE; 3], 0.0);
+    let dyed = tint::dyed().map(|flat| samples.tried(flat, DYE_HANDICAP));
+    let tried: Vec<TriedDye> = iter::once(clear).chain(dyed).collect();
+    let better = |a: &&TriedDye, b: &&TriedDye| a.total().total_cmp(&b.total());
+    let best = tried.iter().min_by(better).unwrap_or(&clear);
+    FlatPlastic {
+        transmittance: best.flat,
+        spread: best.spread(&tried),
     }
-    best.1
+}
+
+/// A dye, and how it explains the object.
+#[derive(Clone, Copy)]
+struct TriedDye {
+    flat: [f32; 3],
+    /// Median misfit of plastic of any thickness in standard deviations squared.
+    misfit: f32,
+    /// Times that the object is as see-through as flat plastic.
+    thickness: f32,
+    handicap: f32,
+}
+
+impl TriedDye {
+    /// Misfit, and what its thickness and a handicap add.
+    fn total(&self) -> f32 {
+        self.misfit + THICKNESS_WEIGHT * (self.thickness - 1.0).powi(2) + self.handicap
+    }
+
+    /// How far dyes that explain the object as well in another thickness differ from flat plastic
+    /// of this one: brown plastic of one wall and green of two let as much green and blue through.
+    fn spread(&self, tried: &[Self]) -> [f32; 3] {
+        let misfits = tried.iter().map(|dye| dye.misfit);
+        let least = misfits.fold(f32::INFINITY, f32::min);
+        let alike = tried
+            .iter()
+            .filter(|dye| dye.misfit <= least + DYE_HANDICAP);
+        let off = alike.fold([0.0_f32; 3], |off, dye| {
+            [0, 1, 2].map(|c| off[c].max((dye.seen(c) - self.seen(c)).abs()))
+        });
+        off.map(|off| {
+            if off < MIN_SPREAD {
+                0.0
+            } else {
+                off / self.thickness
+            }
+        })
+    }
+
+    /// What the object lets through in a channel.
+    fn seen(&self, channel: usize) -> f32 {
+        (self.thickness * self.flat[channel]).min(1.0)
+    }
 }
 
 /// Some pixels of the object that are at least as clear as its median one: plastic, if it has any.
@@ -73,14 +118,15 @@ struct DyeSamples {
 }
 
 impl DyeSamples {
-    /// Median misfit of plastic in standard deviations squared, and what its thickness and a
-    /// handicap add.
-    fn misfit(&self, flat: [f32; 3], handicap: f32) -> f32 {
+    fn tried(&self, flat: [f32; 3], handicap: f32) -> TriedDye {
         let fits = self.pixels.iter().map(|pixel| self.explained(pixel, flat));
         let (misfits, factors): (Vec<f32>, Vec<f32>) = fits.unzip();
-        let thickness = median(factors.into_iter(), f32::total_cmp).unwrap_or(1.0);
-        let misfit = median(misfits.into_iter(), f32::total_cmp).unwrap_or(0.0);
-        misfit + THICKNESS_WEIGHT * (thickness - 1.0).powi(2) + handicap
+        TriedDye {
+            flat,
+            misfit: median(misfits.into_iter(), f32::total_cmp).unwrap_or(0.0),
+            thickness: median(factors.into_iter(), f32::total_cmp).unwrap_or(1.0),
+            handicap,
+        }
     }
 
     /// Times that a pixel is as see-through as flat plastic.

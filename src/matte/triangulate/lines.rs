@@ -105,12 +105,25 @@ impl PixelFilm {
     }
 }
 
+/// Plastic where it lies flat.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FlatPlastic {
+    /// Its transmittance.
+    pub(super) transmittance: [f32; 3],
+    /// How far that of other plastic may differ which lets as much through in the determined
+    /// channels.
+    pub(super) spread: [f32; 3],
+}
+
 /// How the channels that the screens leave open follow from the others: a pixel is plastic in some
 /// share, and bare in some.
 pub(super) struct Inferred {
     determined: [bool; 3],
     /// Transmittance of the plastic where it lies flat.
     plastic: [f32; 3],
+    /// How far that may be off in open channels, since other plastic explains the determined ones as
+    /// well.
+    spread: [f32; 3],
 }
 
 impl Inferred {
@@ -120,29 +133,43 @@ impl Inferred {
         pixels: &Image<PixelLines>,
         inside: &Image<Coverage>,
         determined: [bool; 3],
-        plastic: [f32; 3],
+        plastic: FlatPlastic,
     ) -> Self {
         let prior = Self {
             determined,
-            plastic,
+            plastic: plastic.transmittance,
+            spread: plastic.spread,
         };
-        let plastic = std::array::from_fn(|c| prior.scaled_channel(pixels, inside, c));
-        Self { plastic, ..prior }
+        let scaled = [0, 1, 2].map(|c| prior.scaled_channel(pixels, inside, c));
+        Self {
+            plastic: scaled.map(|(plastic, _)| plastic),
+            spread: scaled.map(|(_, spread)| spread),
+            ..prior
+        }
     }
 
-    /// Flat plastic in a channel, scaled where that is open.
+    /// How far flat plastic may be off in its least certain channel, since other plastic explains
+    /// the object as well.
+    pub(super) fn largest_spread(&self) -> f32 {
+        self.spread.into_iter().fold(0.0, f32::max)
+    }
+
+    /// Flat plastic in a channel, scaled where that is open, and what is left of its spread.
     fn scaled_channel(
         &self,
         pixels: &Image<PixelLines>,
         inside: &Image<Coverage>,
         channel: usize,
-    ) -> f32 {
+    ) -> (f32, f32) {
         let plastic = self.plastic[channel];
         if self.determined[channel] {
-            plastic
-        } else {
-            scaled_plastic(plastic, self.gain(pixels, inside, channel))
+            return (plastic, 0.0);
         }
+        let gain = self.gain(pixels, inside, channel);
+        (
+            scaled_plastic(plastic, gain),
+            self.spread[channel] * kept_prior(gain.1),
+        )
     }
 
     /// By what the plastic of an open channel must be multiplied by its own lines, and the variance
@@ -199,7 +226,8 @@ impl Inferred {
             if self.determined[c] {
                 (slope.clamp(0.0, 1.0), sigma)
             } else {
-                mixed(slope, sigma, share * self.plastic[c] + bare)
+                let inferred = share * self.plastic[c] + bare;
+                mixed((slope, sigma), inferred, share * self.spread[c])
             }
         });
         PixelFilm::new(pixel, channels)
@@ -272,6 +300,12 @@ fn scaled_plastic(plastic: f32, (gain, variance): (f32, f32)) -> f32 {
     (plastic * (variance + gain * dye) / (variance + dye)).clamp(0.0, 1.0)
 }
 
+/// The share that the dye keeps in the plastic of an open channel whose lines have a variance.
+fn kept_prior(variance: f32) -> f32 {
+    let dye = DYE_SIGMA * DYE_SIGMA;
+    1.0 - dye / (variance + dye)
+}
+
 fn median_lever(levers: Vec<f32>) -> f32 {
     median(levers.into_iter(), f32::total_cmp)
         .unwrap_or(UNKNOWN_SIGMA)
@@ -279,15 +313,16 @@ fn median_lever(levers: Vec<f32>) -> f32 {
 }
 
 /// A measured transmittance and one inferred from other channels, mixed by their variances, and the
-/// deviation of that.
+/// deviation of that, with the part of it by which the inferred one may be off.
 #[inline(always)]
-fn mixed(slope: f32, sigma: f32, inferred: f32) -> (f32, f32) {
+fn mixed((slope, sigma): (f32, f32), inferred: f32, off: f32) -> (f32, f32) {
     let (measured, prior) = (
         1.0 / (sigma * sigma),
         1.0 / (INFERRED_SIGMA * INFERRED_SIGMA),
     );
     let value = (slope * measured + inferred * prior) / (measured + prior);
-    (value.clamp(0.0, 1.0), (measured + prior).sqrt().recip())
+    let deviation = (measured + prior).sqrt().recip() + off * prior / (measured + prior);
+    (value.clamp(0.0, 1.0), deviation)
 }
 
 /// The pixels that lie more inside than outside.

@@ -94,6 +94,53 @@ fn three_screens_determine_every_channel() {
     assert!(found.residual < 0.005, "{}", found.residual);
 }
 
+/// Brown film on even screens, without noise, and its mean error of red inside.
+fn brown_film(screens: &[LinearRgb]) -> (Triangulated, f32) {
+    let mask = inside();
+    let film_at = |x: usize, y: usize| {
+        let (f, t) = truth(x as f64, y as f64);
+        let fold = t.r / 0.25;
+        match mask[(x, y)].0 > 0.5 {
+            true => (f, LinearRgb::new(0.75, 0.55, 0.3).scale(fold)),
+            false => (f, t),
+        }
+    };
+    let on = |screen: &LinearRgb| {
+        Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+            let (f, t) = film_at(x, y);
+            f + t * *screen
+        })
+    };
+    let photos: Vec<_> = screens.iter().map(on).collect();
+    let plates = screens.iter().map(|&k| ScreenPlate::even(k, SIZE));
+    let plates: Vec<_> = plates.collect();
+    let shots: Vec<_> = photos.iter().zip(&plates).collect();
+    let found = triangulate(&shots, &mask, &TriangulateOptions::default()).unwrap();
+    let red = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        (found.transmittance[(x, y)].r - film_at(x, y).1.r).abs()
+    });
+    let error = mean_inside(&red);
+    (found, error)
+}
+
+fn mean_inside(values: &Image<f32>) -> f32 {
+    let mask = inside();
+    let inside: Vec<f32> = lines::covered_pixels(values, &mask).copied().collect();
+    inside.iter().sum::<f32>() / inside.len() as f32
+}
+
+#[test]
+fn a_dye_that_two_screens_cannot_tell_from_another_is_uncertain() {
+    let is_tint = |d: &Diagnostic| d.code == Code::TintUncertain;
+    let (two, error) = brown_film(&[GREEN, BLUE]);
+    let unsure = mean_inside(&two.uncertainty);
+    assert!(unsure > error, "off by {error}, uncertainty {unsure}");
+    assert!(two.diagnostics.iter().any(is_tint), "{:?}", two.diagnostics);
+    let (three, error) = brown_film(&[GREEN, BLUE, RED]);
+    assert!(error < 0.02, "{error}");
+    assert!(!three.diagnostics.iter().any(is_tint));
+}
+
 #[test]
 fn a_soft_rim_is_covered_once() {
     let mask = Image::from_fn(SIZE.0, SIZE.1, |x, y| {

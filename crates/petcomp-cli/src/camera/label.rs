@@ -5,7 +5,7 @@ use crate::documents::stem_of;
 use crate::global::GlobalArgs;
 use crate::values::{parse_corners, parse_metres};
 use petcomp::camera::{self, Label};
-use petcomp::{Image, LinearRgb, io};
+use petcomp::{Error, Image, LinearRgb, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -87,12 +87,25 @@ impl InitLabelArgs {
         Ok(label)
     }
 
-    /// The label with the corners of the markers that it has.
+    /// The label with the corners of the markers that it has; where its own corners are given it
+    /// does without those.
     fn with_markers(&self, label: Label) -> petcomp::Result<Label> {
-        match label.markers {
-            Some(_) => with_markers_of(label, &self.photo, &self.photo),
-            None => Ok(label),
+        if label.markers.is_none() {
+            return Ok(label);
         }
+        let photo: Image<LinearRgb> = io::read(&self.photo)?;
+        match camera::with_markers(label.clone(), &photo) {
+            Err(why) if self.corners.is_some() => {
+                log::warn!("{}: {why}", self.photo.display());
+                Ok(label)
+            }
+            found => found.map_err(|why| self.needs_corners(&why)),
+        }
+    }
+
+    fn needs_corners(&self, why: &Error) -> Error {
+        let what = format!("{why}; --corners says where the rectangle is instead");
+        Error::file(&self.photo, what)
     }
 
     /// Where the corners come from, for a photo in which so many corners of markers were found.
@@ -110,7 +123,9 @@ impl InitLabelArgs {
 pub(super) fn add_markers(args: &MarkersArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     // The map may be the label to write: it gets its markers.
     check_distinct([&args.photo], [&args.output])?;
-    let label = with_markers_of(args.known_label()?, &args.photo, &args.map)?;
+    let label = args.known_label()?;
+    let photo: Image<LinearRgb> = io::read(&args.photo)?;
+    let label = camera::with_markers(label, &photo).map_err(|e| e.in_file(&args.map))?;
     io::write_json(&args.output, &label)?;
     let found = marker_corners(&label);
     global.print_written(&args.output, format_args!("{found} marker corners"));
@@ -138,11 +153,4 @@ fn is_same_file(a: &Path, b: &Path) -> bool {
 fn marker_corners(label: &Label) -> usize {
     let points = label.points.iter();
     points.filter(|point| point.is_marker_corner()).count()
-}
-
-/// The label with the corners of the photo's markers; an error names the file that is to be
-/// changed.
-fn with_markers_of(label: Label, photo: &Path, blamed: &Path) -> petcomp::Result<Label> {
-    let photo: Image<LinearRgb> = io::read(photo)?;
-    camera::with_markers(label, &photo).map_err(|e| e.in_file(blamed))
 }

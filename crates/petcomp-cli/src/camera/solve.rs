@@ -74,12 +74,15 @@ impl LabelFileArgs {
 }
 
 impl SolveArgs {
-    /// One file can hold one camera only, and not a label too.
+    /// One file can hold one camera only, and not a label or a photo too.
     fn check_output(&self) -> anyhow::Result<()> {
         if let Some(output) = &self.output {
             check_distinct(&self.labels.labels, [output])?;
-            let count = self.labels.read_all()?.len();
+            let labels = self.labels.read_all()?;
+            let count = labels.len();
             anyhow::ensure!(count == 1, "-o: {count} labels, expected one");
+            let photos = labels.iter().filter_map(LabelledPhoto::photo);
+            check_distinct(photos, [output, &overlay_beside(output)])?;
         }
         Ok(())
     }

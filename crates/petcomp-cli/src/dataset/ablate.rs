@@ -11,6 +11,7 @@ use petcomp::Error;
 use petcomp::dataset::{DatasetConfig, Pipeline};
 use petcomp::io::{self, Override};
 use petcomp::scene::Draws;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -89,6 +90,7 @@ impl AblateArgs {
                 .map(|(ablation, config)| (ablation.name.into(), config))
                 .collect());
         }
+        check_folders(&self.switches)?;
         let switched = self.switches.iter().map(|switch| {
             let config = self.recipe.read_config_with(switch)?;
             Ok((folder_name(switch), config))
@@ -109,24 +111,37 @@ impl AblateArgs {
     }
 }
 
+/// Fails where two switches would have one folder.
+fn check_folders(switches: &[Override]) -> petcomp::Result<()> {
+    let mut known = BTreeMap::new();
+    for switch in switches {
+        if let Some(first) = known.insert(folder_name(switch), switch) {
+            let what = format!("{switch}, whose folder would be that of {first}, expected another");
+            return Err(Error::value("--switch", what));
+        }
+    }
+    Ok(())
+}
+
 /// Most bytes of a switch in its folder's name, of which file systems take 255.
 const MAX_NAME: usize = 100;
 
-/// The switch without what file names cannot have everywhere; a long one ends in its hash.
+/// The switch without what file names cannot have everywhere; one that is long, or has other
+/// letters, ends in its hash.
 fn folder_name(switch: &Override) -> String {
     let switch = switch.to_string();
-    let name = plain_name(&switch);
-    if name.len() <= MAX_NAME {
+    let short = switch.replace(", ", ",").replace('"', "");
+    let name = plain_name(&short);
+    if name == short && name.len() <= MAX_NAME {
         return name;
     }
     let hash = Draws::new(0, 0).bits(&switch);
-    format!("{}-{hash:016x}", &name[..MAX_NAME])
+    format!("{}-{hash:016x}", &name[..name.len().min(MAX_NAME)])
 }
 
 /// In ASCII.
 fn plain_name(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "._-=,[]".contains(c);
-    let text = text.replace([' ', '"'], "");
     text.chars()
         .map(|c| if is_plain(c) { c } else { '_' })
         .collect()
@@ -144,7 +159,19 @@ mod tests {
             name("scene.finish.noise=\"match_plate\""),
             "scene.finish.noise=match_plate"
         );
-        assert_eq!(name("assets=../b"), "assets=.._b");
+    }
+
+    #[test]
+    fn switches_of_other_letters_have_folders_of_their_own() {
+        let switch = |value: &str| -> Override { format!("a=\"{value}\"").parse().unwrap() };
+        let switches = ["x/b", "x#b", "x b", "xb", "xé", "xö"].map(switch);
+        assert!(check_folders(&switches).is_ok());
+        assert!(folder_name(&switches[0]).starts_with("a=x_b-"));
+        let alike = ["a=1".parse().unwrap(), switch("1")];
+        assert_eq!(
+            check_folders(&alike).unwrap_err().to_string(),
+            "--switch: a=\"1\", whose folder would be that of a=1, expected another"
+        );
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::{
     LongRunConsent, generate_supervised, print_counts, print_trainer_inputs, write_contact_sheet,
 };
-use crate::documents::{RecipeArgs, at_quality};
+use crate::documents::RecipeArgs;
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
 use crate::output::Output;
@@ -95,7 +95,7 @@ impl GenerateArgs {
 
     /// The recipe as the flags change it, in pictures of its own size.
     fn whole_config(&self) -> anyhow::Result<DatasetConfig> {
-        Ok(at_quality(self.quality, self.recipe.read_config()?))
+        self.recipe.read_config_at(self.quality)
     }
 
     /// The same for the pictures that are asked for.

@@ -1,11 +1,12 @@
 //! `petcomp dataset check`, `report` and `sheet`: what is in a dataset.
 
 use crate::diagnostics::located;
+use crate::distinct_files::check_distinct;
 use crate::exit::NeedsReview;
 use crate::global::GlobalArgs;
 use crate::print::{self, counted};
 use petcomp::dataset::page::DatasetReportOptions;
-use petcomp::dataset::{self, Checked, contact_sheet_of};
+use petcomp::dataset::{self, Checked, JOURNAL, contact_sheet_of};
 use petcomp::io;
 use std::path::{Path, PathBuf};
 
@@ -114,8 +115,23 @@ fn page_folder(page: &Path) -> &Path {
     folder.unwrap_or(Path::new("."))
 }
 
+/// Fails where a file of the dataset would be written over.
+fn check_dataset_stays(folder: &Path, output: &Path) -> anyhow::Result<()> {
+    // A file that is not there yet is none of the dataset's.
+    let Ok(real) = output.canonicalize() else {
+        return Ok(());
+    };
+    let own = ["data.yaml", "dataset.json", JOURNAL].map(|file| folder.join(file));
+    // What is wrong with the journal is said when it is read for the page or the sheet.
+    let listed = dataset::listed_files(folder).unwrap_or_default();
+    let listed = listed.into_iter();
+    let alike = listed.filter(|file| file.file_name() == real.file_name());
+    check_distinct(own.into_iter().chain(alike), [output])
+}
+
 fn write_report(args: &ReportArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let output = args.page_path();
+    check_dataset_stays(&args.folder, &output)?;
     let page = dataset::page::page(&args.folder, &args.options_for(&output))?;
     io::write_text(&output, &page.document())?;
     global.print_look_at(&output);
@@ -152,6 +168,7 @@ pub(crate) fn write_contact_sheet(
 }
 
 fn write_sheet(args: &SheetArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    check_dataset_stays(&args.folder, &args.output)?;
     write_contact_sheet(&args.folder, args.most, &args.output)?;
     global.print_status(args.output.display());
     Ok(())

@@ -30,7 +30,7 @@ pub(crate) fn generate_supervised(
     consent: &LongRunConsent,
     global: &GlobalArgs,
 ) -> anyhow::Result<DatasetCounts> {
-    if let Some(idle) = pipeline.idle_light_direction() {
+    for idle in pipeline.idle_keys() {
         log::warn!("{idle}");
     }
     let display = global.start_progress("pictures");

@@ -1,5 +1,6 @@
 //! What trainings need of a dataset: batches, anchors, the kit for PyTorch.
 
+use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
 use crate::print;
@@ -105,6 +106,7 @@ pub(super) fn run(command: &TrainingCommand, global: &GlobalArgs) -> anyhow::Res
 
 fn plan_batches(args: &BatchesArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let sets = MixedSets::open(&args.sets)?;
+    args.check_sets_stay(&sets)?;
     let options = BatchOptions {
         size: args.sets.batch,
         seed: args.seed,
@@ -114,6 +116,24 @@ fn plan_batches(args: &BatchesArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let (batches, weights) = (lines.len(), sets.describe_weights());
     global.print_written(&args.output, format_args!("{batches} batches; {weights}"));
     Ok(())
+}
+
+impl BatchesArgs {
+    /// Fails where a file of the sets would be written over.
+    fn check_sets_stay(&self, sets: &MixedSets) -> anyhow::Result<()> {
+        // A file that is not there yet is none of theirs, which may have very many.
+        if !self.output.exists() {
+            return Ok(());
+        }
+        let folders = [&self.sets.real, &self.sets.synthetic].into_iter();
+        let choosing = folders.map(|folder| YoloSet::choosing_files(folder));
+        let mut files = choosing.collect::<petcomp::Result<Vec<_>>>()?.concat();
+        for image in [&sets.real, &sets.synthetic].map(YoloSet::series).concat() {
+            files.push(YoloSet::label_of(&image));
+            files.push(image);
+        }
+        check_distinct(files, [&self.output])
+    }
 }
 
 /// Two datasets that are trained on together.

@@ -24,8 +24,8 @@ pub(crate) struct KeyArgs {
     #[arg(required = true, value_name = "PICTURE")]
     frames: Vec<PathBuf>,
     /// Where the premultiplied cut-out goes, an EXR with 32-bit floats; of several frames, the
-    /// folder where each gets its own name (.exr for a JPEG, which has no alpha), as --matte and
-    /// --edges are then
+    /// folder where each gets its own name, as --matte and --edges are then: with the ending .exr,
+    /// but for .png of 8 bits and .tif of 16, which keep theirs
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Where the matte goes
@@ -95,11 +95,11 @@ impl KeyArgs {
         let name = frame
             .file_name()
             .context(format!("{}: no file", frame.display()))?;
-        let files = self.files_of(frame, |folder| folder.join(name));
-        Ok(FrameFiles {
-            cutout: with_alpha(files.cutout),
-            ..files
-        })
+        let name = match keeps_all(frame) {
+            true => PathBuf::from(name),
+            false => Path::new(name).with_extension("exr"),
+        };
+        Ok(self.files_of(frame, |folder| folder.join(&name)))
     }
 
     fn create_folders(&self) -> petcomp::Result<()> {
@@ -120,16 +120,14 @@ impl KeyArgs {
     }
 }
 
-/// The file itself, or an EXR in place of a JPEG.
-fn with_alpha(file: PathBuf) -> PathBuf {
-    let ending = file.extension().unwrap_or_default();
-    let is_jpeg = ["jpg", "jpeg"]
-        .iter()
-        .any(|e| ending.eq_ignore_ascii_case(e));
-    match is_jpeg {
-        true => file.with_extension("exr"),
-        false => file,
-    }
+/// Bits of a sample that are kept in a file of an ending with alpha.
+const KEPT_BITS: [(&str, u32); 4] = [("exr", 32), ("tif", 16), ("tiff", 16), ("png", 8)];
+
+/// A file of the frame's ending keeps all bits of its samples.
+fn keeps_all(frame: &Path) -> bool {
+    let mut known = KEPT_BITS.iter();
+    let known = known.find(|(ending, _)| io::has_extension(frame, ending));
+    known.is_some_and(|(_, kept)| io::read_header(frame).is_ok_and(|header| header.bits <= *kept))
 }
 
 /// A frame, and where what is made of it goes.

@@ -1,6 +1,7 @@
 //! `petcomp matte segment`: every step of the search as a picture.
 
 use crate::diagnostics::report_diagnostics;
+use crate::distinct_files::check_distinct;
 use crate::documents::read_options;
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
@@ -24,24 +25,28 @@ pub(crate) fn run(args: &SegmentArgs, global: &GlobalArgs) -> anyhow::Result<()>
     let options: SegmentOptions = read_options(args.options.as_deref())?;
     let photo: Image<LinearRgb> = io::read(&args.photo)?;
     let found = segment(&photo, &options).map_err(|e| e.in_file(&args.photo))?;
-    io::create_folder(&args.output)?;
-    report_diagnostics(args.photo.display(), &found.diagnostics);
     let mut pictures = search_pictures(&found);
     pictures.extend(keyer_mattes(&photo, &found));
-    write_numbered(&pictures, &args.output, global)
-}
-
-fn write_numbered(
-    pictures: &[NamedPicture],
-    folder: &Path,
-    global: &GlobalArgs,
-) -> anyhow::Result<()> {
-    for (i, (name, picture)) in pictures.iter().enumerate() {
-        let path = folder.join(format!("{i}_{name}.png"));
-        io::write(&path, picture)?;
+    let numbered = numbered(pictures, &args.output);
+    let inputs = args.options.iter().chain([&args.photo]);
+    check_distinct(inputs, numbered.iter().map(|(path, _)| path))?;
+    io::create_folder(&args.output)?;
+    report_diagnostics(args.photo.display(), &found.diagnostics);
+    for (path, picture) in &numbered {
+        io::write(path, picture)?;
         global.print_status(path.display());
     }
     Ok(())
+}
+
+/// Where each picture goes.
+fn numbered(pictures: Vec<NamedPicture>, folder: &Path) -> Vec<(PathBuf, Image<f32>)> {
+    let pictures = pictures.into_iter().enumerate();
+    let placed = pictures.map(|(i, (name, picture))| {
+        let path = folder.join(format!("{i}_{name}.png"));
+        (path, picture)
+    });
+    placed.collect()
 }
 
 type NamedPicture = (&'static str, Image<f32>);

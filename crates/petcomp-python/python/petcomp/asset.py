@@ -23,6 +23,10 @@ class Built:
     lengths: list[tuple[float, float]]
     #: Photos that gave no cut-out, and why.
     refused: list[str]
+    #: How many of these a person rejected.
+    rejected: int
+    #: Cut-outs that the folder has of photos that are not in the list.
+    unlisted: list[str]
     #: Records of cut-outs that a person should review.
     needs_review: list[dict[str, Any]]
     #: Names of the classes, in order.

@@ -85,7 +85,8 @@ class Camera:
         world's plane ``z = 0``, centred, ``+x`` along its width. What a person should look at is logged
         as warnings (``logging``, logger ``petcomp``).
 
-        Raises ``CameraError`` where no camera can have seen it.
+        Raises ``CameraError`` where no camera can have seen it, ``InvalidValueError`` for a size that is
+        not in metres.
         """
         label: dict[str, Any] = {
             "format": "plane-label",
@@ -240,7 +241,8 @@ class Solution:
 def solve(label: Mapping[str, Any], force: bool = False) -> Solution:
     """The camera of a label: plain data as ``NAME.label.json`` has it.
 
-    With ``force`` a camera that does not fit its label is returned, too. Raises ``CameraError``.
+    With ``force`` a camera that does not fit its label, or is too far away to see objects, is returned,
+    too. Raises ``CameraError``, and ``InvalidValueError`` for a size that is not in metres.
     """
     camera, text = _petcomp.solve_camera(dumped("label", label), force)
     record = loaded(text)

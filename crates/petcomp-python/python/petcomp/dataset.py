@@ -86,7 +86,8 @@ def generate(
     dataset generate``, to the byte. Or a pipeline. Or a function that returns sample ``k``: it is called
     from several threads, in no fixed order, and must depend on nothing but ``k``; ``classes`` are then
     needed, beginning with those of its samples, and ``labels``, ``pictures`` and ``split`` are the tables of
-    a recipe.
+    a recipe, but for what acts when labels are made: ``overlap_iou``, ``min_visible``, ``max_truncation``,
+    ``amodal`` and, but for layers, ``alpha_threshold`` belong to the recipe or the ``Shot`` of the samples.
 
     ``only`` makes image ``only`` alone, ``shard=(i, n)`` every ``n``-th from the ``i``-th (1 to ``n``), in a
     folder of its own below. ``progress`` is called in the calling thread, at the start and after each
@@ -99,6 +100,7 @@ def generate(
     target = path_of("folder", folder), _number("count", count)
     part = None if only is None else _number("only", only), shares
     if callable(source) and not isinstance(source, (Mapping, Pipeline)):
+        _check_acts(set, quality, labels)
         tables = {"labels": labels, "pictures": pictures, "split": split}
         layout = [dumped(name, table or {}) for name, table in tables.items()]
         number = _number("seed", seed or 0)
@@ -108,6 +110,25 @@ def generate(
     pipeline = _opened(source, seed, set, quality)
     number = pipeline.seed if seed is None else _number("seed", seed)
     return _counts(_petcomp.generate_from(pipeline._native, (*target, number, *part), report))
+
+
+#: Keys of the table ``labels`` that act when labels are made.
+_OF_MAKING = ("overlap_iou", "min_visible", "max_truncation", "alpha_threshold", "amodal")
+
+
+def _check_acts(set: Any, quality: Any, labels: Any) -> None:
+    """Refuses what would change nothing, for the function makes its samples without it."""
+    if set or quality:
+        raise InvalidValueError("set, quality: act on recipes alone, expected none with a function")
+    if not isinstance(labels, Mapping):
+        return
+    formats = labels.get("formats")
+    has_layers = isinstance(formats, (list, tuple)) and "layers" in formats
+    for key in labels:
+        # Layers are made when they are written.
+        if key in _OF_MAKING and not (has_layers and key == "alpha_threshold"):
+            what = "acts when labels are made, expected in the recipe or the Shot of the samples"
+            raise InvalidValueError(f"labels.{key}: {what}")
 
 
 def _with(make: Any, classes: Sequence[str] | None, layout: list[str], target: Any, report: Any) -> str:

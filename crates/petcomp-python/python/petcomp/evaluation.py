@@ -17,12 +17,16 @@ from .pipeline import _number
 
 __all__ = ["Metrics", "evaluate"]
 
+#: Of fewer rounds less than one is to be expected beyond either end of an interval.
+_LEAST_ROUNDS = 40
+
 
 class Metrics:
     """Scores of a detector: what ``petcomp eval`` writes as ``metrics.json``."""
 
-    def __init__(self, document: dict[str, Any], classes: list[str]) -> None:
+    def __init__(self, document: dict[str, Any], classes: list[str], rounds: int = 200) -> None:
         self._document = document
+        self._rounds = rounds
         #: Names of the classes, in order; empty where they are not known.
         self.classes = classes
 
@@ -32,8 +36,10 @@ class Metrics:
         return float(self._document["map"]["value"])
 
     @property
-    def interval(self) -> tuple[float, float]:
-        """Range of ``map`` by bootstrap over images."""
+    def interval(self) -> tuple[float, float] | None:
+        """Range of ``map`` by bootstrap over images; None of fewer than 40 rounds."""
+        if self._rounds < _LEAST_ROUNDS:
+            return None
         record = self._document["map"]
         return float(record["low"]), float(record["high"])
 
@@ -75,7 +81,8 @@ def evaluate(
     YOLO labels without images beside them, ``output`` is a folder for the whole report. Or both are
     lists, one mapping for each image: ``boxes`` (n x 4: left, top, right, bottom, pixels) and ``classes``
     (n), of predictions ``scores`` (n), and of the truth, where some are neither to be found nor missed,
-    ``ignored`` (n, as of a ``Sample``). ``rounds`` of the bootstrap: 0 to 100000.
+    ``ignored`` (n, as of a ``Sample``). ``rounds`` of the bootstrap: 0 to 100000; fewer than
+    40 give no interval.
     """
     question = class_names(classes), _number("rounds", rounds), _number("seed", seed)
     if isinstance(predictions, (str, os.PathLike)) and isinstance(truth, (str, os.PathLike)):
@@ -89,7 +96,7 @@ def evaluate(
             raise InvalidValueError("size, output: are for files, expected none for boxes in memory")
         text = _petcomp.evaluate_boxes(sheets, question)
     record = loaded(text)
-    return Metrics(record["metrics"], record["classes"])
+    return Metrics(record["metrics"], record["classes"], question[1])
 
 
 def _sheets(predictions: Any, truth: Any) -> list[Any]:

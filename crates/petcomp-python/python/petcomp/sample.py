@@ -42,8 +42,8 @@ class Sample:
         """A picture from anywhere, to be written as a dataset.
 
         ``image``: height x width x 3 or 4, float32 (scene-linear, premultiplied) or uint8 (sRGB).
-        ``masks``: one for each object, height x width, bool or float32. ``object_classes``: its class, a
-        place in ``classes``.
+        ``masks``: one for each object, height x width, bool or float32 (a pixel belongs to the object where
+        it is above 0.5). ``object_classes``: its class, a place in ``classes``.
         """
         numbers = [_class_number(number) for number in object_classes]
         return cls(_petcomp.Sample.from_masks(image, list(masks), numbers, class_names(classes)))

@@ -20,16 +20,18 @@ def to_tensors(sample: Sample) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
 
     The picture: 3 x height x width, float32, 0 to 1, sRGB. The target: ``boxes`` (n x 4, float32: left,
     top, right, bottom, pixels), ``labels`` (n, int64: class + 1, for 0 is the background), ``area``
-    (n, float32) and ``iscrowd`` (n, int64). ``Dataset`` adds ``image_id``, which a sample alone does not know.
+    (n, float32) and ``iscrowd`` (n, int64, all 0: these detectors would learn a crowd as an object, so what is
+    to be ignored is left out). ``Dataset`` adds ``image_id``, which a sample alone does not know.
     """
     picture = torch.from_numpy(sample.image).permute(2, 0, 1).to(torch.float32) / 255
-    boxes = torch.from_numpy(sample.boxes).to(torch.float32)
+    keep = ~sample.ignored
+    boxes = torch.from_numpy(sample.boxes[keep]).to(torch.float32)
     sides = boxes[:, 2:] - boxes[:, :2]
     target = {
         "boxes": boxes,
-        "labels": torch.from_numpy(sample.classes) + 1,
+        "labels": torch.from_numpy(sample.classes[keep]) + 1,
         "area": sides[:, 0] * sides[:, 1],
-        "iscrowd": torch.from_numpy(sample.ignored).to(torch.int64),
+        "iscrowd": torch.zeros(len(boxes), dtype=torch.int64),
     }
     return picture, target
 
