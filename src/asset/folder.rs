@@ -62,7 +62,7 @@ pub fn add_photo(
     let outcome = writer.write(entry);
     let _alone = lock(folder)?;
     let mut manifest = read_or_new(folder)?;
-    if is_refusal(&outcome) && manifest.remove(&entry.cut_out_file()) {
+    if is_refusal(&outcome, entry) && manifest.remove(&entry.cut_out_file()) {
         manifest.write(folder)?;
         files::remove(folder, &entry.cut_out_file())?;
     }
@@ -85,9 +85,10 @@ pub(super) fn lock(folder: &Path) -> Result<Option<File>> {
     Ok(Some(file))
 }
 
-/// The photo itself gave no cut-out.
-fn is_refusal(outcome: &Result<Photo>) -> bool {
-    matches!(outcome, Err(Error::Photo { .. }))
+/// The photo itself gave no cut-out, whatever its scale: that may be a slip.
+fn is_refusal(outcome: &Result<Photo>, entry: &PhotoEntry) -> bool {
+    let is_scale = |what: &str| entry.scale().is_ok_and(|scale| scale.is_named_in(what));
+    matches!(outcome, Err(Error::Photo { what }) if !is_scale(what))
 }
 
 /// The manifest of a folder; a new one where there is no manifest.

@@ -341,7 +341,7 @@ impl Manifest {
         match role {
             Role::Object => self.class(class).map(drop),
             Role::Distractor if class.is_empty() => Ok(()),
-            Role::Distractor => check_class(class),
+            Role::Distractor => check_class(class.trim()),
         }
     }
 
@@ -350,7 +350,8 @@ impl Manifest {
             return Err(Error::value("classes", "empty, expected at least one"));
         }
         check_unique("classes", self.classes.iter().map(String::as_str))?;
-        check_each(&self.classes, "classes", |class| check_class(class))?;
+        // Earlier versions took spaces around names.
+        check_each(&self.classes, "classes", |class| check_class(class.trim()))?;
         let names = self.assets.iter().map(|asset| asset.name.as_str());
         check_unique("assets", names)?;
         check_each(&self.assets, "assets", |asset| {
@@ -377,7 +378,7 @@ impl Asset<PhotoRecord> {
         if let Some(old) = others.find(|old| old.is_of_another_photo(&photo)) {
             log::warn!(
                 "{}: replaces the cut-out of another photo, or of {} as it was; another object needs \
-                 another asset name (--name)",
+                 another asset name",
                 old.file,
                 old.source
             );

@@ -232,7 +232,14 @@ fn is_own_label(text: &str) -> bool {
     // Large files of other programs are not parsed once more.
     text.contains(OWN_FORMAT)
         && io::parse_json::<Value>(text)
-            .is_ok_and(|value| value.get(0).unwrap_or(&value)["format"] == OWN_FORMAT)
+            .is_ok_and(|value| says_where(value.get(0).unwrap_or(&value)))
+}
+
+/// A label of ours that says where its surface is; without corners and points it is a map of
+/// markers, or not filled in.
+fn says_where(label: &Value) -> bool {
+    let (corners, points) = (&label["surface"]["corners_px"], &label["points"]);
+    label["format"] == OWN_FORMAT && (corners.is_array() || points.is_array())
 }
 
 /// The text of a label, without a byte order mark; for a photo instead of one, the error says what

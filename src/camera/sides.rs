@@ -105,7 +105,10 @@ impl MeasuredSides {
     pub(crate) fn scale_sigma(self, label: &Label) -> f64 {
         match self {
             Self::Both(size) => stated_ratio_sigma(label, size).unwrap_or(0.0) / 2.0,
-            _ => 0.0,
+            Self::Width(side) | Self::Height(side) => {
+                let sigma = label.surface.dimension_sigma_m;
+                sigma.map_or(0.0, |sigma| sigma / side)
+            }
         }
     }
 }

@@ -28,6 +28,10 @@ impl Pipeline {
 
 /// Settings of layouts that are not written, and of polygons that no layout has.
 fn idle_labels(labels: &LabelConfig) -> Vec<String> {
+    if labels.formats.is_empty() {
+        // A preview of archives has none.
+        return Vec::new();
+    }
     let formats = serde_json::json!(labels.formats);
     let tables = [
         (Format::Yolo, labels.yolo != Yolo::default()),
@@ -48,13 +52,13 @@ fn idle_labels(labels: &LabelConfig) -> Vec<String> {
             let name = serde_json::json!(format);
             let table = name.as_str().unwrap_or_default();
             format!(
-                "labels.{table}: changes nothing, as {name} is not in labels.formats: {formats}"
+                "labels.{table}: changes nothing in the dataset, as {name} is not in labels.formats: {formats}"
             )
         })
         .collect();
     if labels.simplify > 0.0 && !has_polygons(labels) {
         told.push(format!(
-            "labels.simplify: {}, but no layout of labels.formats: {formats} has polygons, expected \
+            "labels.simplify: {}, but no layout of labels.formats: {formats} has polygons in the dataset, expected \
              labels.yolo.task = \"segment\" or labels.coco.masks = \"polygon\"",
             labels.simplify
         ));
@@ -143,8 +147,8 @@ mod tests {
         assert_eq!(
             told("formats = ['yolo']\ncoco = { masks = 'polygon' }\nlayers = { cards = true }"),
             [
-                r#"labels.coco: changes nothing, as "coco" is not in labels.formats: ["yolo"]"#,
-                r#"labels.layers: changes nothing, as "layers" is not in labels.formats: ["yolo"]"#,
+                r#"labels.coco: changes nothing in the dataset, as "coco" is not in labels.formats: ["yolo"]"#,
+                r#"labels.layers: changes nothing in the dataset, as "layers" is not in labels.formats: ["yolo"]"#,
             ]
         );
         let polygons = "formats = ['coco']\nsimplify = 1\ncoco = { masks = 'polygon' }";

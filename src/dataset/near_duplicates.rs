@@ -33,6 +33,9 @@ pub const NEAR_DUPLICATE_RMS: f64 = 2.0;
 /// one, whatever two people have labelled in it.
 const SAVED_AGAIN_RMS: f64 = 0.3;
 
+/// Nor does it change any pixel of a thumbnail by more than this; a small object does.
+const SAVED_AGAIN_MOST: u8 = 3;
+
 /// Boxes around the same thing, drawn twice, share more than this of their union.
 const MIN_OVERLAP: f64 = 0.5;
 
@@ -53,6 +56,12 @@ impl Thumbnail {
     /// Root mean square difference, 8-bit codes.
     fn codes_from(&self, other: &Self) -> f64 {
         (squared_error(&self.0, &other.0) as f64 / self.0.len().max(1) as f64).sqrt()
+    }
+
+    /// Greatest difference of a pixel, 8-bit codes.
+    fn greatest_error(&self, other: &Self) -> u8 {
+        let pairs = self.0.iter().zip(&other.0);
+        pairs.map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0)
     }
 
     /// Sum of squared differences where it is below a limit; most pairs are beyond it after a row.
@@ -111,7 +120,8 @@ impl Look {
     /// Whether another whose small copy has this squared error may show the same. Empty scenes of a
     /// place look the same and are not.
     fn may_show_the_same(&self, other: &Self, squared_error: u64) -> bool {
-        let is_copy = squared_error < self.thumbnail.squared_error_limit(SAVED_AGAIN_RMS);
+        let is_copy = squared_error < self.thumbnail.squared_error_limit(SAVED_AGAIN_RMS)
+            && self.thumbnail.greatest_error(&other.thumbnail) <= SAVED_AGAIN_MOST;
         match [self.is_empty(), other.is_empty()] {
             [true, true] => false,
             [false, false] => is_copy || self.may_be_labelled_like(other),

@@ -152,7 +152,10 @@ impl DataYaml {
     fn set_names(&mut self, value: Value) -> Result<(), Problem> {
         let Value::Map(mut entries) = value else {
             self.names = value.texts("names")?;
-            return Ok(());
+            return match self.names.is_empty() {
+                true => Err((None, "names: none, expected one for each class".into())),
+                false => Ok(()),
+            };
         };
         entries.sort_by_key(|(_, key, _)| key.parse().unwrap_or(usize::MAX));
         let mut wrong = Ok(());

@@ -80,7 +80,11 @@ impl SceneArgs {
         targets: impl Iterator<Item = &'a PathBuf>,
     ) -> anyhow::Result<Pipeline> {
         let pipeline = Pipeline::open_for(self.config_for(scene, quality)?, scene)?;
-        check_distinct(pipeline.input_files(scene)?, targets)?;
+        // A file that is not there yet is none of the inputs, of which there may be very many.
+        let there: Vec<_> = targets.filter(|target| target.exists()).collect();
+        if !there.is_empty() {
+            check_distinct(pipeline.input_files(scene)?, there)?;
+        }
         Ok(pipeline)
     }
 

@@ -89,6 +89,7 @@ impl Files {
     }
 
     fn read_yolo(&self, options: &mut EvalReportOptions) -> Result<Vec<EvalImage>> {
+        YoloSet::check_labels(&self.truth)?;
         let mut all = read_yolo_truth(&self.truth, None, self.size)?;
         read_yolo_detections(&self.predictions, &mut all)?;
         if options.classes.is_empty() {

@@ -37,15 +37,21 @@ struct RecipeSource {
 
 impl RecipeSource {
     fn config(&self) -> Result<DatasetConfig> {
-        let overrides: Result<Vec<Override>> = self.overrides.iter().map(|o| o.parse()).collect();
-        let config = match (&self.path, &self.json) {
-            (Some(path), _) => DatasetConfig::read(path, &overrides?)?,
-            (None, json) => config_of(json.as_deref().unwrap_or("{}"), &overrides?)?,
-        };
-        Ok(match &self.quality {
-            Some(quality) => quality.parse::<Quality>()?.config(config),
-            None => config,
-        })
+        let overrides = self.overrides_at_quality()?;
+        match (&self.path, &self.json) {
+            (Some(path), _) => DatasetConfig::read(path, &overrides),
+            (None, json) => config_of(json.as_deref().unwrap_or("{}"), &overrides),
+        }
+    }
+
+    /// Those of the quality, then its own.
+    fn overrides_at_quality(&self) -> Result<Vec<Override>> {
+        let quality = self.quality.as_deref().map(str::parse::<Quality>);
+        let mut overrides = quality.transpose()?.map_or(Vec::new(), Quality::overrides);
+        for text in &self.overrides {
+            overrides.push(text.parse()?);
+        }
+        Ok(overrides)
     }
 }
 

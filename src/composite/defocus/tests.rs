@@ -210,8 +210,10 @@ fn shadows_beyond_the_border_spread_into_the_picture() {
     };
     let plain = shot(Some(lens)).with_light(lamp);
     let small = plain
-        .with_card(card(1, [-51.0, 0.0], [30.0, 30.0], 0.0)) // its shadow ends at the left border
-        .with_card(card(2, [0.0, -24.0], [100.0, 10.0], 3.0)); // its shadow lies on the lower one
+        // Its shadow ends at the left border, between two nodes.
+        .with_card(card(1, [-50.6, 0.0], [30.0, 30.0], 0.0))
+        // Its shadow lies on the lower one.
+        .with_card(card(2, [0.0, -24.0], [100.0, 10.0], 3.0));
     let plate = white_plate(&small.camera);
     // The irradiance of both pictures is sampled at the same places.
     let options = RenderOptions {

@@ -78,11 +78,8 @@ impl SolveArgs {
     fn check_output(&self) -> anyhow::Result<()> {
         if let Some(output) = &self.output {
             check_distinct(&self.labels.labels, [output])?;
-            let labels = self.labels.read_all()?;
-            let count = labels.len();
+            let count = self.labels.read_all()?.len();
             anyhow::ensure!(count == 1, "-o: {count} labels, expected one");
-            let photos = labels.iter().filter_map(LabelledPhoto::photo);
-            check_distinct(photos, [output, &overlay_beside(output)])?;
         }
         Ok(())
     }
@@ -119,7 +116,8 @@ pub(super) fn solve_joint(args: &JointArgs, global: &GlobalArgs) -> anyhow::Resu
             && labels.len() > 1
         {
             log::warn!(
-                "{alone}: solved alone: no other label has its camera.id, picture's shape and lens"
+                "{alone}: solved alone: no other label has its camera.id, picture's shape and lens, \
+                 or it was cropped and states no principal point"
             );
         }
         match solve_together(&members) {
@@ -226,7 +224,8 @@ fn write_camera(
     labelled: &LabelledPhoto,
     file: &CameraFile,
     solution: &Solution,
-) -> petcomp::Result<()> {
+) -> anyhow::Result<()> {
+    check_distinct(labelled.photo(), [target, &overlay_beside(target)])?;
     io::write_json(target, file)?;
     match labelled.photo() {
         Some(photo) => write_overlay(target, &photo, solution)?,

@@ -122,16 +122,17 @@ impl BatchesArgs {
     /// Fails where a file of the sets would be written over.
     fn check_sets_stay(&self, sets: &MixedSets) -> anyhow::Result<()> {
         // A file that is not there yet is none of theirs, which may have very many.
-        if !self.output.exists() {
+        let Ok(real) = self.output.canonicalize() else {
             return Ok(());
-        }
+        };
         let folders = [&self.sets.real, &self.sets.synthetic].into_iter();
         let choosing = folders.map(|folder| YoloSet::choosing_files(folder));
         let mut files = choosing.collect::<petcomp::Result<Vec<_>>>()?.concat();
-        for image in [&sets.real, &sets.synthetic].map(YoloSet::series).concat() {
-            files.push(YoloSet::label_of(&image));
-            files.push(image);
-        }
+        let images = [&sets.real, &sets.synthetic].map(YoloSet::series).concat();
+        let theirs = images
+            .into_iter()
+            .flat_map(|image| [YoloSet::label_of(&image), image]);
+        files.extend(theirs.filter(|file| file.file_name() == real.file_name()));
         check_distinct(files, [&self.output])
     }
 }
