@@ -140,9 +140,9 @@ impl DatasetLayout {
         })
     }
 
-    /// Refuses a sample of which nothing would tell the labels: an archive takes them from what
-    /// other writers write, and a [`Sidecar`] only tells of samples with a scene.
-    fn told(&self, sample: dataset::Sample, k: u64) -> Result<dataset::Sample> {
+    /// Refuses a sample whose labels no file would hold: an archive takes them from what other
+    /// writers write, and a [`Sidecar`] is only of samples with a scene.
+    fn checked(&self, sample: dataset::Sample, k: u64) -> Result<dataset::Sample> {
         if sample.provenance.is_some() || self.labels.archives().is_none() {
             return Ok(sample);
         }
@@ -177,7 +177,7 @@ pub(crate) fn generate_with(
     let mut beside = |py: Python<'_>| steps.deliver(py, progress.as_ref());
     let made = work::run_beside(py, Stop::of_caller(), &mut beside, move |stop| {
         let plan = layout.plan(&classes, target)?;
-        let sample = |k| layout.told(keep.sample(&make, &classes, k)?, k);
+        let sample = |k| layout.checked(keep.sample(&make, &classes, k)?, k);
         own.generate(&plan, sample, stop)
     });
     raised.or_else(made)
