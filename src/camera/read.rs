@@ -589,6 +589,9 @@ pub(super) mod tests {
         let [other] = labels_of_photos(["d.jpg"]);
         io::write_json(folder.path().join("c.json"), &other).unwrap();
         std::fs::write(folder.path().join("notes.json"), "[\"plane-label\"]").unwrap();
+        // What `petcomp camera markers --map` takes.
+        let map = r#"{"format": "plane-label", "image": {"file": "a.jpg"}, "markers": {}}"#;
+        std::fs::write(folder.path().join("map.json"), map).unwrap();
         std::fs::write(folder.path().join("._c.label.json"), [0, 5, 22, 7]).unwrap();
         let found = labels_in(folder.path(), None).unwrap();
         let names: Vec<&str> = found.iter().map(|one| one.name.as_str()).collect();

@@ -39,6 +39,12 @@ def test_a_spawned_process_makes_the_same_picture(recipe):
     assert done.stdout == pipeline[0].image.tobytes()
 
 
+def test_changes_count_beside_a_quality(recipe):
+    with petcomp.Pipeline(recipe, quality="draft", set={"render.subsamples": 4}) as pipeline:
+        render = pipeline.config["render"]
+    assert (render["subsamples"], render["light_samples"]) == (4, 2)
+
+
 def test_a_pickled_pipeline_is_the_same(recipe, monkeypatch):
     document = petcomp.Pipeline(recipe).config
     monkeypatch.chdir(recipe.parent)
