@@ -64,9 +64,18 @@ impl Quality {
         config
     }
 
-    /// The values of a recipe that [`config`](Self::config) replaces, for other replaced values to
-    /// follow and go before them.
-    pub fn overrides(self) -> Vec<Override> {
+    /// The values of a recipe that a quality replaces, if there is one, then those that are replaced
+    /// by name, which go before it.
+    pub fn overrides_at(
+        quality: Option<Self>,
+        named: impl IntoIterator<Item = Override>,
+    ) -> Vec<Override> {
+        let overrides = quality.map_or_else(Vec::new, Self::overrides);
+        overrides.into_iter().chain(named).collect()
+    }
+
+    /// The values that [`config`](Self::config) replaces.
+    fn overrides(self) -> Vec<Override> {
         let (render, settle) = (self.render(), self.settle(SettleOptions::default()));
         let values = [
             format!("render.subsamples={}", render.subsamples),
@@ -233,11 +242,11 @@ mod tests {
             DatasetConfig::parse(odd, "recipe.toml".as_ref(), overrides).unwrap()
         };
         for quality in Quality::ALL {
-            let mut overrides = quality.overrides();
             let mut expected = quality.config(read(&[]));
-            assert_eq!(read(&overrides), expected);
-            overrides.push("render.subsamples=5".parse().unwrap());
+            assert_eq!(read(&Quality::overrides_at(Some(quality), [])), expected);
+            let named = ["render.subsamples=5".parse().unwrap()];
             expected.render.subsamples = 5;
+            let overrides = Quality::overrides_at(Some(quality), named);
             assert_eq!(read(&overrides), expected);
         }
     }

@@ -31,7 +31,7 @@ impl RecipeArgs {
 
     /// Reads the recipe, everything computed as finely as is asked for.
     pub(crate) fn read_config_at(&self, quality: Option<Quality>) -> anyhow::Result<DatasetConfig> {
-        let overrides = overrides_at(quality, &self.overrides);
+        let overrides = Quality::overrides_at(quality, self.overrides.iter().cloned());
         Ok(DatasetConfig::read(&self.path, &overrides)?)
     }
 
@@ -91,18 +91,12 @@ impl SceneArgs {
     /// The recipe's config or, without a recipe, that which the scene brings; everything computed as
     /// finely as is asked for.
     fn config_for(&self, scene: &Scene, quality: Option<Quality>) -> Result<DatasetConfig> {
-        let overrides = overrides_at(quality, &self.overrides);
+        let overrides = Quality::overrides_at(quality, self.overrides.iter().cloned());
         match &self.recipe {
             Some(recipe) => DatasetConfig::read(recipe, &overrides),
             None => DatasetConfig::for_scene(scene, &self.path, &overrides),
         }
     }
-}
-
-/// What a quality replaces, then what is replaced by name, which goes before it.
-fn overrides_at(quality: Option<Quality>, named: &[Override]) -> Vec<Override> {
-    let overrides = quality.map_or_else(Vec::new, Quality::overrides);
-    overrides.into_iter().chain(named.iter().cloned()).collect()
 }
 
 /// The file's name without its extension.

@@ -46,12 +46,9 @@ impl RecipeSource {
 
     /// Those of the quality, then its own.
     fn overrides_at_quality(&self) -> Result<Vec<Override>> {
+        let named: Result<Vec<Override>> = self.overrides.iter().map(|o| o.parse()).collect();
         let quality = self.quality.as_deref().map(str::parse::<Quality>);
-        let mut overrides = quality.transpose()?.map_or(Vec::new(), Quality::overrides);
-        for text in &self.overrides {
-            overrides.push(text.parse()?);
-        }
-        Ok(overrides)
+        Ok(Quality::overrides_at(quality.transpose()?, named?))
     }
 }
 
