@@ -343,6 +343,25 @@ impl<P: Copy> Image<P> {
         }
     }
 
+    /// A part, in the memory of the whole.
+    ///
+    /// # Panics
+    /// When `roi` reaches outside the picture.
+    pub fn into_crop(mut self, roi: Roi) -> Self {
+        for (to, y) in (roi.y..roi.y + roi.height).enumerate() {
+            assert!(roi.x + roi.width <= self.width && y < self.height);
+            let start = y * self.width + roi.x;
+            let row = start..start + roi.width;
+            self.pixels.copy_within(row, to * roi.width);
+        }
+        self.pixels.truncate(roi.area());
+        Self {
+            width: roi.width,
+            height: roi.height,
+            pixels: self.pixels,
+        }
+    }
+
     /// The nearest pixel inside the picture.
     ///
     /// # Panics
@@ -427,16 +446,17 @@ mod tests {
     #[test]
     fn crop_takes_the_named_pixels() {
         let img = Image::from_fn(4, 4, |x, y| 10 * y + x);
-        assert_eq!(
-            img.crop(Roi {
-                x: 1,
-                y: 2,
-                width: 2,
-                height: 2
-            })
-            .pixels(),
-            [21, 22, 31, 32]
-        );
+        let roi = Roi {
+            x: 1,
+            y: 2,
+            width: 2,
+            height: 2,
+        };
+        let part = img.crop(roi);
+        assert_eq!(part.pixels(), [21, 22, 31, 32]);
+        assert_eq!(img.clone().into_crop(roi), part);
+        let whole = Roi::spanning(0..4, 0..4);
+        assert_eq!(img.clone().into_crop(whole), img);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::io;
 use crate::matte::CutOutOptions;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
@@ -184,22 +184,12 @@ pub fn check_cut_out_files(photos: &[PhotoEntry]) -> Result<()> {
 /// # Errors
 /// [`Error::File`] for the first picture that would be written over.
 pub fn check_not_written_over(photos: &[PhotoEntry], folder: &Path) -> Result<()> {
-    let pictures = photos.iter().flat_map(PhotoEntry::pictures);
-    let read: BTreeSet<PathBuf> = pictures
-        .filter_map(|path| path.canonicalize().ok())
-        .collect();
-    let written = photos
-        .iter()
-        .flat_map(|photo| files::all_of(&photo.cut_out_file()))
+    let cut_outs = photos.iter().map(PhotoEntry::cut_out_file);
+    let written = cut_outs
+        .flat_map(|file| files::all_of(&file))
         .chain([CONTACT_SHEET.to_owned()]);
-    let is_read = |path: &PathBuf| path.canonicalize().is_ok_and(|real| read.contains(&real));
-    match written.map(|file| folder.join(file)).find(is_read) {
-        Some(path) => {
-            let what = "is read and would be written over; expected another output folder";
-            Err(Error::file(path, what))
-        }
-        None => Ok(()),
-    }
+    let pictures = photos.iter().flat_map(PhotoEntry::pictures);
+    io::check_distinct(pictures, written.map(|file| folder.join(file)))
 }
 
 /// No review that is there is that of two photos; their paths are relative to the working folder.

@@ -265,7 +265,7 @@ impl BackgroundPhoto {
     ) -> Result<Image<P>> {
         let photo = io::read::<P>(path)?;
         self.check_size(path, photo.size())?;
-        Ok(filter::resize(&photo.crop(self.kept), width, height))
+        Ok(filter::resize(&photo.into_crop(self.kept), width, height))
     }
 
     fn check_size(&self, path: &Path, (w, h): (usize, usize)) -> Result<()> {

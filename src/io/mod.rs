@@ -112,7 +112,7 @@ pub use document::{read_document, write_document};
 #[doc(hidden)]
 pub use format::Format;
 #[doc(hidden)]
-pub use fs::{Checksum, absolute, below, copy, create_folder, inside, relative};
+pub use fs::{Checksum, absolute, below, check_distinct, copy, create_folder, inside, relative};
 pub(crate) use fs::{
     files_below, is_apple_double, natural_key, refuse_links, with_last_step, write_through,
 };

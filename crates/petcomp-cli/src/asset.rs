@@ -2,7 +2,6 @@
 
 use crate::batch::FileBatch;
 use crate::diagnostics::{located, report_diagnostics};
-use crate::distinct_files::check_distinct;
 use crate::documents::stem_of;
 use crate::exit::NeedsReview;
 use crate::global::GlobalArgs;
@@ -192,7 +191,7 @@ fn draw_sheet(folder: &Path, output: &Path) -> anyhow::Result<()> {
     let library = Library::open(folder)?;
     let read = records_of(&library).flat_map(PhotoRecord::files);
     let read = read.chain([MANIFEST]).map(|file| folder.join(file));
-    check_distinct(read, [output])?;
+    io::check_distinct(read, [output])?;
     Ok(io::write(output, &asset::contact_sheet(&library))?)
 }
 

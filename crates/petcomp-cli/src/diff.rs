@@ -1,6 +1,5 @@
 //! `petcomp diff`: compares two pictures with the flags and exit codes of OpenImageIO's `idiff`.
 
-use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use crate::print;
 use petcomp::color::linear_to_srgb;
@@ -108,7 +107,7 @@ fn with_two_dashes(word: OsString) -> OsString {
 }
 
 pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<u8> {
-    check_distinct([&args.a, &args.b], &args.output)?;
+    io::check_distinct([&args.a, &args.b], &args.output)?;
     let pair = match PicturePair::read(args) {
         Ok(pair) => pair,
         Err(error) => return Ok(exit_unreadable(&error)),

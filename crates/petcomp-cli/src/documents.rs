@@ -1,6 +1,5 @@
 //! Recipes, scenes and options: the documents that several commands read.
 
-use crate::distinct_files::check_distinct;
 use petcomp::dataset::{DatasetConfig, Pipeline};
 use petcomp::io::{self, Override};
 use petcomp::{Quality, Result, Scene};
@@ -83,7 +82,7 @@ impl SceneArgs {
         // A file that is not there yet is none of the inputs, of which there may be very many.
         let there: Vec<_> = targets.filter(|target| target.exists()).collect();
         if !there.is_empty() {
-            check_distinct(pipeline.input_files(scene)?, there)?;
+            io::check_distinct(pipeline.input_files(scene)?, there)?;
         }
         Ok(pipeline)
     }

@@ -1,6 +1,5 @@
 //! `petcomp eval`: detections against the truth.
 
-use crate::distinct_files::check_distinct;
 use crate::documents::stem_of;
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
@@ -12,6 +11,7 @@ use petcomp::eval::{
     ConfusionOptions, EvalImage, Tags, read_coco_results, read_coco_truth, read_tags,
     read_yolo_detections, read_yolo_truth,
 };
+use petcomp::io;
 use std::path::{Component, Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -110,14 +110,14 @@ impl EvalArgs {
     }
 
     /// Fails where a file of the evaluation would replace one that it is made from.
-    fn check_inputs_stay(&self) -> anyhow::Result<()> {
+    fn check_inputs_stay(&self) -> petcomp::Result<()> {
         let Some(folder) = &self.output else {
             return Ok(());
         };
         let runs = run_names(self.predictions());
         let runs: Vec<&str> = runs.iter().map(String::as_str).collect();
         let written = page::file_names(&runs).into_iter();
-        check_distinct(
+        io::check_distinct(
             self.paths.iter().chain(&self.tags),
             written.map(|name| folder.join(name)),
         )

@@ -1,6 +1,5 @@
 //! `petcomp label`: scene -> outlines, boxes, visibility.
 
-use crate::distinct_files::check_distinct;
 use crate::documents::SceneArgs;
 use crate::global::GlobalArgs;
 use petcomp::dataset::Pipeline;
@@ -25,7 +24,7 @@ pub(crate) struct LabelArgs {
 }
 
 pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    check_distinct(args.scene.files(), args.targets())?;
+    io::check_distinct(args.scene.files(), args.targets())?;
     let scene = args.scene.read_scene()?;
     let pipeline = args.scene.open_pipeline(&scene, None, args.targets())?;
     let labels = args.label(&pipeline, scene);

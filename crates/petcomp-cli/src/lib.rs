@@ -11,7 +11,6 @@ mod dataset;
 mod demo;
 mod diagnostics;
 mod diff;
-mod distinct_files;
 mod doctor;
 mod documents;
 mod eval;

@@ -1,6 +1,5 @@
 //! `petcomp render`: scene -> picture.
 
-use crate::distinct_files::check_distinct;
 use crate::documents::SceneArgs;
 use crate::global::GlobalArgs;
 use anyhow::bail;
@@ -36,7 +35,7 @@ pub(crate) struct RenderArgs {
 
 pub(crate) fn run(args: &RenderArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     args.check_output()?;
-    check_distinct(args.scene.files(), args.targets())?;
+    io::check_distinct(args.scene.files(), args.targets())?;
     let scene = args.scene.read_scene()?;
     let pipeline = args
         .scene

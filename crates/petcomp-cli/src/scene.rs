@@ -1,6 +1,5 @@
 //! `petcomp scene`: recipe -> scene.
 
-use crate::distinct_files::check_distinct;
 use crate::documents::RecipeArgs;
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
@@ -68,10 +67,10 @@ pub(crate) fn run(command: &SceneCommand, global: &GlobalArgs) -> anyhow::Result
 }
 
 fn draw_scene(args: &DrawArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    check_distinct([&args.recipe.path], [&args.output])?;
+    io::check_distinct([&args.recipe.path], [&args.output])?;
     let pipeline = args.recipe.open_pipeline()?;
     let scene = pipeline.draw(args.seed, args.index)?;
-    check_distinct(pipeline.input_files(&scene)?, [&args.output])?;
+    io::check_distinct(pipeline.input_files(&scene)?, [&args.output])?;
     let scene = pipeline.config().with_files(scene, &args.output)?;
     io::write_document(&args.output, &scene)?;
     let (objects, plate) = (scene.objects.len(), &scene.plate);

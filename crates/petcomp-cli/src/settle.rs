@@ -1,6 +1,5 @@
 //! `petcomp settle`: dropped objects come to rest.
 
-use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use petcomp::dataset::DatasetConfig;
 use petcomp::settle::{SettleOptions, Settled, preview, settle_traced, trace_csv};
@@ -33,7 +32,7 @@ pub(crate) struct SettleArgs {
 const TRACE_RATE: f64 = 60.0;
 
 pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    check_distinct(args.inputs(), args.targets())?;
+    io::check_distinct(args.inputs(), args.targets())?;
     let scene: Scene = io::read_document(&args.scene)?;
     let options = args.options_for(&scene)?;
     let settled = args.settle(scene, &options)?;

@@ -3,6 +3,7 @@
 
 mod atomic;
 mod checksum;
+mod distinct;
 mod listing;
 mod natural_order;
 mod open;
@@ -11,6 +12,7 @@ mod sanitize_path;
 
 pub use atomic::{absolute, create_folder, relative};
 pub use checksum::{Checksum, copy};
+pub use distinct::check_distinct;
 pub use sanitize_path::{below, inside};
 
 pub(crate) use atomic::{Syncing, sync_file_system, with_last_step, write_bytes, write_through};

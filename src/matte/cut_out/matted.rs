@@ -69,7 +69,7 @@ impl Matted {
         let keyed = Keying::new(prepared.photo, Screen::Plate(&screen.plate.image))
             .run(&options.key)
             .map_err(|e| e.within("key"))?;
-        let cutout = region.with_core(keyed.cutout.crop(region.around));
+        let cutout = region.with_core(keyed.cutout.into_crop(region.around));
         Ok(Self::grey(
             MatteMethod::Key,
             cutout.zip_map(&region.cut, |p, m| p.masked(m)),

@@ -1,6 +1,5 @@
 //! `petcomp camera export`: cameras in the files of other programs.
 
-use crate::distinct_files::check_distinct;
 use crate::print;
 use petcomp::camera::{CameraFile, ColmapModel, OpencvCamera};
 use petcomp::io;
@@ -32,7 +31,7 @@ enum ExportFormat {
 }
 
 pub(super) fn export_cameras(args: &ExportCameraArgs) -> anyhow::Result<()> {
-    check_distinct(&args.cameras, &args.output)?;
+    io::check_distinct(&args.cameras, &args.output)?;
     let (files, output) = (args.read_cameras()?, args.output.as_deref());
     match args.to {
         ExportFormat::Colmap => {

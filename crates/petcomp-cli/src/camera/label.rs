@@ -1,6 +1,5 @@
 //! `petcomp camera init` and `markers`: labels for photos.
 
-use crate::distinct_files::check_distinct;
 use crate::documents::stem_of;
 use crate::global::GlobalArgs;
 use crate::values::{parse_corners, parse_metres};
@@ -47,7 +46,7 @@ pub(super) fn init_label(args: &InitLabelArgs, global: &GlobalArgs) -> anyhow::R
     let path = args.output_path();
     let shown = path.display();
     args.check_is_free(&path)?;
-    check_distinct(args.like.iter().chain([&args.photo]), [&path])?;
+    io::check_distinct(args.like.iter().chain([&args.photo]), [&path])?;
     let label = args.with_markers(args.known_label(&path)?)?;
     io::write_text(&path, &camera::commented(&label)?)?;
     let corners = args.describe_corners(marker_corners(&label));
@@ -122,7 +121,7 @@ impl InitLabelArgs {
 
 pub(super) fn add_markers(args: &MarkersArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     // The map may be the label to write: it gets its markers.
-    check_distinct([&args.photo], [&args.output])?;
+    io::check_distinct([&args.photo], [&args.output])?;
     let label = args.known_label()?;
     let photo: Image<LinearRgb> = io::read(&args.photo)?;
     let label = camera::with_markers(label, &photo).map_err(|e| e.in_file(&args.map))?;

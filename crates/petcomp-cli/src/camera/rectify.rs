@@ -1,7 +1,6 @@
 //! `petcomp camera rectify`: a metric top view, and the way back into the photo.
 
 use super::solve::{accepted, solved};
-use crate::distinct_files::check_distinct;
 use crate::values::parse_metres;
 use petcomp::camera::{self, Camera, LabelledPhoto, Solution};
 use petcomp::filter::Pyramid;
@@ -34,7 +33,7 @@ pub(crate) struct RectifyArgs {
 /// Writes the photo from above, or another picture as the photo's camera sees it on the surface.
 pub(super) fn write_view(args: &RectifyArgs) -> anyhow::Result<()> {
     let inputs = [&args.photo, &args.label].into_iter().chain(&args.back);
-    check_distinct(inputs, [&args.output])?;
+    io::check_distinct(inputs, [&args.output])?;
     let labelled = read_only(&args.label, args.size)?;
     let solution = accepted(solved(&labelled)?, &labelled, args.force)?;
     let camera = solution.camera.resized(args.photo_size(&labelled)?);

@@ -2,7 +2,6 @@
 
 use crate::batch::FileBatch;
 use crate::diagnostics::report_diagnostics;
-use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use crate::print;
 use crate::values::parse_metres;
@@ -77,7 +76,7 @@ impl SolveArgs {
     /// One file can hold one camera only, and not a label or a photo too.
     fn check_output(&self) -> anyhow::Result<()> {
         if let Some(output) = &self.output {
-            check_distinct(&self.labels.labels, [output])?;
+            io::check_distinct(&self.labels.labels, [output])?;
             let count = self.labels.read_all()?.len();
             anyhow::ensure!(count == 1, "-o: {count} labels, expected one");
         }
@@ -225,7 +224,7 @@ fn write_camera(
     file: &CameraFile,
     solution: &Solution,
 ) -> anyhow::Result<()> {
-    check_distinct(labelled.photo(), [target, &overlay_beside(target)])?;
+    io::check_distinct(labelled.photo(), [target, &overlay_beside(target)])?;
     io::write_json(target, file)?;
     match labelled.photo() {
         Some(photo) => write_overlay(target, &photo, solution)?,

@@ -1,7 +1,6 @@
 //! `petcomp dataset check`, `report` and `sheet`: what is in a dataset.
 
 use crate::diagnostics::located;
-use crate::distinct_files::check_distinct;
 use crate::exit::NeedsReview;
 use crate::global::GlobalArgs;
 use crate::print::{self, counted};
@@ -116,7 +115,7 @@ fn page_folder(page: &Path) -> &Path {
 }
 
 /// Fails where a file of the dataset would be written over.
-fn check_dataset_stays(folder: &Path, output: &Path) -> anyhow::Result<()> {
+fn check_dataset_stays(folder: &Path, output: &Path) -> petcomp::Result<()> {
     // A file that is not there yet is none of the dataset's.
     let Ok(real) = output.canonicalize() else {
         return Ok(());
@@ -126,7 +125,7 @@ fn check_dataset_stays(folder: &Path, output: &Path) -> anyhow::Result<()> {
     let listed = dataset::listed_files(folder).unwrap_or_default();
     let listed = listed.into_iter();
     let alike = listed.filter(|file| file.file_name() == real.file_name());
-    check_distinct(own.into_iter().chain(alike), [output])
+    io::check_distinct(own.into_iter().chain(alike), [output])
 }
 
 fn write_report(args: &ReportArgs, global: &GlobalArgs) -> anyhow::Result<()> {

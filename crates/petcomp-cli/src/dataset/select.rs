@@ -1,12 +1,11 @@
 //! `petcomp dataset split` and `subset`: lists of images, without copies.
 
-use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
 use crate::print;
 use crate::values::check_companion;
-use petcomp::Error;
 use petcomp::dataset::{Group, Leakage, NEAR_DUPLICATE_RMS, NearDuplicate, Partition, YoloSet};
+use petcomp::{Error, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
@@ -104,9 +103,9 @@ impl SplitArgs {
 }
 
 /// Fails where a list or the data.yaml would replace one that they are made from.
-fn check_sources_stay(folder: &Path, output: &Path) -> anyhow::Result<()> {
+fn check_sources_stay(folder: &Path, output: &Path) -> petcomp::Result<()> {
     let written = ["train.txt", "val.txt", "data.yaml"].map(|file| output.join(file));
-    check_distinct(YoloSet::choosing_files(folder)?, written)
+    io::check_distinct(YoloSet::choosing_files(folder)?, written)
 }
 
 /// Of what there may be too few, for which options.

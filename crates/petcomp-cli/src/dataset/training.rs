@@ -1,6 +1,5 @@
 //! What trainings need of a dataset: batches, anchors, the kit for PyTorch.
 
-use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
 use crate::print;
@@ -120,7 +119,7 @@ fn plan_batches(args: &BatchesArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 
 impl BatchesArgs {
     /// Fails where a file of the sets would be written over.
-    fn check_sets_stay(&self, sets: &MixedSets) -> anyhow::Result<()> {
+    fn check_sets_stay(&self, sets: &MixedSets) -> petcomp::Result<()> {
         // A file that is not there yet is none of theirs, which may have very many.
         let Ok(real) = self.output.canonicalize() else {
             return Ok(());
@@ -133,7 +132,7 @@ impl BatchesArgs {
             .into_iter()
             .flat_map(|image| [YoloSet::label_of(&image), image]);
         files.extend(theirs.filter(|file| file.file_name() == real.file_name()));
-        check_distinct(files, [&self.output])
+        io::check_distinct(files, [&self.output])
     }
 }
 

@@ -1,7 +1,6 @@
 //! `petcomp matte cut`: the object without its background.
 
 use crate::diagnostics::report_diagnostics;
-use crate::distinct_files::check_distinct;
 use crate::documents::read_options;
 use crate::global::GlobalArgs;
 use petcomp::matte::{CutOutOptions, cut_out};
@@ -22,7 +21,7 @@ pub(crate) struct CutArgs {
 
 pub(crate) fn run(args: &CutArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let inputs = std::iter::once(&args.photo).chain(&args.options);
-    check_distinct(inputs, [&args.output])?;
+    io::check_distinct(inputs, [&args.output])?;
     let options: CutOutOptions = read_options(args.options.as_deref())?;
     let photo = io::read::<LinearRgb>(&args.photo)?;
     let cut = cut_out(&photo, &options).map_err(|e| e.in_file(&args.photo))?;

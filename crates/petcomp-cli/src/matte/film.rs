@@ -2,7 +2,6 @@
 
 use super::picture_files::{check_same_size, is_exr, write_optional};
 use crate::diagnostics::report_diagnostics;
-use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use anyhow::Result;
 use petcomp::io::{self, Override, from_overrides};
@@ -148,7 +147,7 @@ impl FilmOptionArgs {
         );
         let inputs = photos.iter().chain(&self.plates).chain(&self.mask);
         let extras = self.plate_out.iter().chain(&self.uncertainty);
-        check_distinct(inputs, extras.chain([&self.output]))?;
+        io::check_distinct(inputs, extras.chain([&self.output]))?;
         let (plates, photos) = (self.plates.len(), photos.len());
         anyhow::ensure!(
             plates == 0 || plates == photos,

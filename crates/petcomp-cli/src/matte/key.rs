@@ -3,7 +3,6 @@
 use super::picture_files::{check_same_size, write_optional, write_picture};
 use crate::batch::FileBatch;
 use crate::diagnostics::report_diagnostics;
-use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use crate::values::parse_color;
 use anyhow::{Context, Result};
@@ -81,7 +80,7 @@ impl KeyArgs {
                 files.collect::<Result<_>>()?
             }
         };
-        check_distinct(self.inputs(), files.iter().flat_map(FrameFiles::targets))?;
+        io::check_distinct(self.inputs(), files.iter().flat_map(FrameFiles::targets))?;
         Ok(files)
     }
 

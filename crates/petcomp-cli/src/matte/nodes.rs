@@ -2,7 +2,6 @@
 //! Blender's other keyers.
 
 use super::picture_files::{write_optional, write_picture};
-use crate::distinct_files::check_distinct;
 use crate::values::{parse_color, parse_pixel};
 use anyhow::Result;
 use nalgebra::Point2;
@@ -81,7 +80,7 @@ pub(crate) struct KeyingScreenArgs {
 
 impl KeyingScreenArgs {
     fn run(&self) -> Result<()> {
-        check_distinct([&self.input], [&self.output])?;
+        io::check_distinct([&self.input], [&self.output])?;
         let photo: Image<PremulRgba> = io::read(&self.input)?;
         let points = self.points.iter().map(|&at| screen_point(&photo, at));
         let points = points.collect::<Result<Vec<_>>>()?;
@@ -114,7 +113,7 @@ impl NodePicture {
 
     /// Not where it would be written over, or where the matte goes to the same file.
     fn read_photo(&self, matte: &Option<PathBuf>) -> Result<Image<PremulRgba>> {
-        check_distinct([&self.input], matte.iter().chain([&self.output]))?;
+        io::check_distinct([&self.input], matte.iter().chain([&self.output]))?;
         Ok(io::read(&self.input)?)
     }
 }
@@ -128,7 +127,7 @@ impl KeyerPictures {
     }
 
     fn difference_key(&self, clean: &Path) -> Result<()> {
-        check_distinct([clean], self.matte.iter().chain([&self.picture.output]))?;
+        io::check_distinct([clean], self.matte.iter().chain([&self.picture.output]))?;
         let clean: Image<PremulRgba> = io::read(clean)?;
         self.write_cut_out(|photo, given| {
             let options = from_overrides("key", given)?;

@@ -1,7 +1,6 @@
 //! `petcomp matte segment`: every step of the search as a picture.
 
 use crate::diagnostics::report_diagnostics;
-use crate::distinct_files::check_distinct;
 use crate::documents::read_options;
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
@@ -29,7 +28,7 @@ pub(crate) fn run(args: &SegmentArgs, global: &GlobalArgs) -> anyhow::Result<()>
     pictures.extend(keyer_mattes(&photo, &found));
     let numbered = numbered(pictures, &args.output);
     let inputs = args.options.iter().chain([&args.photo]);
-    check_distinct(inputs, numbered.iter().map(|(path, _)| path))?;
+    io::check_distinct(inputs, numbered.iter().map(|(path, _)| path))?;
     io::create_folder(&args.output)?;
     report_diagnostics(args.photo.display(), &found.diagnostics);
     for (path, picture) in &numbered {

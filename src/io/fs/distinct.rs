@@ -1,11 +1,14 @@
 //! Files that are read and files that are written: never the same.
 
-use anyhow::Result;
+use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Fails on the first file that is read and would be written over, or that would be written twice.
-pub(crate) fn check_distinct(
+/// No file is read and written, and none is written twice, under whatever names.
+///
+/// # Errors
+/// [`Error::File`] for the first file that would be.
+pub fn check_distinct(
     inputs: impl IntoIterator<Item = impl AsRef<Path>>,
     targets: impl IntoIterator<Item = impl AsRef<Path>>,
 ) -> Result<()> {
@@ -14,12 +17,13 @@ pub(crate) fn check_distinct(
     let mut written = BTreeSet::new();
     for target in targets {
         let target = target.as_ref();
-        let (path, shown) = (real_path(target), target.display());
-        anyhow::ensure!(
-            !inputs.contains(&path),
-            "{shown}: is read and would be written over"
-        );
-        anyhow::ensure!(written.insert(path), "{shown}: two files would go here");
+        let path = real_path(target);
+        if inputs.contains(&path) {
+            return Err(Error::file(target, "is read and would be written over"));
+        }
+        if !written.insert(path) {
+            return Err(Error::file(target, "two files would go here"));
+        }
     }
     Ok(())
 }
