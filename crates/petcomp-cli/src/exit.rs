@@ -40,7 +40,7 @@ fn status_of(error: &anyhow::Error) -> u8 {
         return INCOMPLETE_STATUS;
     }
     match error.downcast_ref::<petcomp::Error>() {
-        Some(petcomp::Error::File { .. }) => FILE_STATUS,
+        Some(petcomp::Error::File { .. } | petcomp::Error::Photo { .. }) => FILE_STATUS,
         Some(petcomp::Error::Interrupted { .. }) => INTERRUPTED_STATUS,
         _ => DATA_STATUS,
     }
