@@ -402,6 +402,16 @@ impl Film {
         self.opacity.r == self.opacity.g && self.opacity.g == self.opacity.b
     }
 
+    /// The same with every opacity held between 0 and 1: the weights of a filter add up to 1 only up
+    /// to rounding.
+    #[inline(always)]
+    pub(crate) fn clamped(self) -> Self {
+        Self {
+            opacity: self.opacity.map(|o| o.clamp(0.0, 1.0)),
+            ..self
+        }
+    }
+
     /// Every channel is finite and every opacity between 0 and 1: what a texture may hold.
     #[inline(always)]
     pub fn is_sound(self) -> bool {

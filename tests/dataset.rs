@@ -640,7 +640,7 @@ fn a_check_finds_every_fault_and_its_place() {
         "labels/train/000004.txt: missing",
         "labels/train/000099.txt: no image of this name",
         "images/val/000005.png: ",
-        "images/val/000010.png: the same bytes as images/train/000006.png",
+        "images/val/000010.png: leak: the same bytes as images/train/000006.png",
         "images/train/000007.png: 9 x 30 pixels, expected at least 10 a side",
         "index.jsonl:2: labels/train/000001.txt has ",
         "index.jsonl:5: labels/train/000004.txt is missing",
@@ -1791,7 +1791,7 @@ fn a_copy_is_a_leak_whatever_its_labels_say() {
     io::write(path("retouched.png"), &retouched).unwrap();
     let original = format!("images/{train}.png");
     for (picture, told) in [
-        (original.as_str(), "the same bytes as"),
+        (original.as_str(), "leak: the same bytes as"),
         ("retouched.png", "leak: differs from"),
     ] {
         std::fs::copy(path(picture), path(&format!("images/{val}.png"))).unwrap();
@@ -1803,6 +1803,7 @@ fn a_copy_is_a_leak_whatever_its_labels_say() {
             let found = faults(dir.path()).join("\n");
             let expected = format!("images/{val}.png: {told} images/{train}.png");
             assert!(found.contains(&expected), "{labels:?}: {found}");
+            assert!(!found.contains("[dataset.duplicate_image]"), "{found}");
         }
     }
 }
@@ -2203,6 +2204,27 @@ fn what_a_mask_beside_the_photo_hides_is_the_place_in_picture_and_labels() {
     assert!(cut > 2);
     let drawn = held.provenance.unwrap().drawn;
     assert_eq!(open().label(drawn).unwrap(), held.labels);
+}
+
+#[test]
+fn a_scene_of_another_size_than_its_plate_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    write_world(dir.path());
+    let config = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
+    let pipeline = Pipeline::open(config).unwrap();
+    let [w, h] = pipeline.config().scene.image;
+    let scene = Scene {
+        image: [w / 2, h / 2],
+        ..pipeline.draw(1, 0).unwrap()
+    };
+    let resolved = pipeline.resolve(scene.clone()).map(|_| ());
+    for told in [resolved, pipeline.label(scene).map(|_| ())] {
+        let (told, expected) = (told.unwrap_err().to_string(), format!("expected {w} x {h}"));
+        assert!(
+            told.starts_with("image: ") && told.contains(&expected),
+            "{told}"
+        );
+    }
 }
 
 #[test]

@@ -537,6 +537,26 @@ fn the_depth_of_layers_is_where_a_mask_is() {
 }
 
 #[test]
+fn what_is_too_faint_for_a_label_has_its_layer() {
+    let layers = |threshold: f32| {
+        let dir = made(&format!(
+            "alpha_threshold = {threshold}\nformats = [\"layers\"]\nlayers = {{ cards = true }}"
+        ));
+        let record: SampleRecord =
+            io::read_json(dir.path().join("scenes/train/000003.json")).unwrap();
+        let path = dir.path().join("layers/train/000003.exr");
+        let mut texts = io::read_header(&path).unwrap().metadata;
+        texts.retain(|(key, _)| key.starts_with("cryptomatte/"));
+        let (_, mut channels) = read_channels(path).unwrap();
+        channels.retain(|channel| channel.name != "Z");
+        (record.labels.objects.len(), (texts, channels))
+    };
+    let ((labels, plain), (strict_labels, strict)) = (layers(0.1), layers(0.999));
+    assert_eq!((labels, strict_labels), (3, 0));
+    assert!(plain == strict);
+}
+
+#[test]
 fn a_mask_is_what_the_layer_of_its_object_shows() {
     let dir = made("formats = [\"layers\"]\nlayers = { cards = true }");
     let (_, channels) = read_channels(dir.path().join("layers/train/000007.exr")).unwrap();

@@ -3,11 +3,10 @@
 use super::MANIFEST;
 use super::entry::PhotoEntry;
 use super::files;
-use super::folder::{CutOutWriter, lock, read_or_new};
+use super::folder::{CutOutWriter, is_rejected, lock, read_or_new, refusal};
 use super::library::{Library, Photo};
 use super::list::{List, check_not_written_over, check_reviews, find_list};
 use super::manifest::{Manifest, PhotoRecord};
-use super::review::Review;
 use super::screen_source::EmptyScreens;
 use crate::error::{Error, Result};
 use rayon::prelude::*;
@@ -40,7 +39,7 @@ pub struct Built {
 ///
 /// `list` is a TOML or CSV file, or a folder with `photos.toml` or `photos.csv` in it. A photo
 /// without a usable object, or one that a person rejected, is left out and reported in
-/// [`Built::refused`]; the folder keeps no earlier cut-out of it.
+/// [`Built::refused`]; an earlier cut-out of it stays, and goes only where a person rejected it.
 ///
 /// `progress` is called with the photos done and their number, at the start and after each photo,
 /// from several threads. What the folder has of other photos stays ([`Built::unlisted`]); a photo
@@ -181,25 +180,26 @@ struct TakenIn {
     refused: Vec<String>,
     /// How many of these a person rejected.
     rejected: usize,
-    /// Earlier cut-outs of these that the manifest had.
+    /// Earlier cut-outs of the rejected ones that the manifest had.
     removed: Vec<String>,
     /// The first that could not be read or written, or fits no asset.
     failed: Option<Error>,
 }
 
-/// Puts the cut-outs of a list into a manifest, and takes out what photos gave that give none now.
+/// Puts the cut-outs of a list into a manifest, and takes out those that a person rejected.
 fn take_in(list: &List, outcomes: Vec<Result<Photo>>, manifest: &mut Manifest) -> TakenIn {
     let mut taken = TakenIn::default();
     for (i, (outcome, entry)) in outcomes.into_iter().zip(&list.photos).enumerate() {
         match outcome.and_then(|photo| inserted(photo, entry, manifest)) {
             Ok(photo) => taken.photos.push(photo),
-            Err(refusal @ Error::Photo { .. }) => {
-                let file = entry.cut_out_file();
-                if manifest.remove(&file) {
+            Err(error @ Error::Photo { .. }) => {
+                let (file, rejected) = (entry.cut_out_file(), is_rejected(entry));
+                if rejected && manifest.remove(&file) {
                     taken.removed.push(file);
                 }
-                taken.refused.push(refusal.to_string());
-                taken.rejected += usize::from(is_rejected(entry));
+                let error = refusal(error, entry, manifest);
+                taken.refused.push(error.to_string());
+                taken.rejected += usize::from(rejected);
             }
             Err(error) => {
                 let error = error.within(&format!("photos[{i}]"));
@@ -208,11 +208,6 @@ fn take_in(list: &List, outcomes: Vec<Result<Photo>>, manifest: &mut Manifest) -
         }
     }
     taken
-}
-
-fn is_rejected(entry: &PhotoEntry) -> bool {
-    let review = Review::of_photo(&entry.file).ok().flatten();
-    review.is_some_and(|review| review.is_rejected())
 }
 
 /// A photo that is now in the manifest.
@@ -232,7 +227,7 @@ fn record_to_review(photo: &Photo) -> Option<PhotoRecord> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{MANIFEST, PhotoRecord, Scale, Texture, Verdict};
+    use super::super::{MANIFEST, PhotoRecord, Review, Scale, Texture, Verdict};
     use super::super::{add_photo, contact_sheet};
     use super::*;
     use crate::diagnostic::{Code, Diagnostic};
@@ -326,6 +321,15 @@ mod tests {
         assert!((asset.photos[1].record.object_m[0] - 0.6).abs() <= 0.02);
         assert!((asset.photos[1].record.object_m[1] - 0.3).abs() <= 0.02);
         assert_eq!(asset.photos[1].record.source, "two.png");
+    }
+
+    #[test]
+    fn an_opaque_cut_out_may_be_reduced_to_any_size() {
+        for longest_side in [32, 48, 64] {
+            let list = format!("[cut_out]\nlongest_side = {longest_side}\n{TWO}");
+            let library = built(&list).unwrap();
+            assert_eq!(library.assets[0].photos.len(), 2, "{longest_side}");
+        }
     }
 
     #[test]
@@ -447,6 +451,35 @@ mod tests {
         assert!(told.contains("one.png: rejected in"), "{told}");
         assert!(Library::open(&out).unwrap().assets.is_empty());
         assert_eq!(std::fs::read_dir(out.join("a")).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_photo_that_gives_no_cut_out_any_more_keeps_its_earlier_one() {
+        let folder = folder_with(TWO);
+        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        build(&list, &out, &|_, _| ()).unwrap();
+        let kept = |name: &str| {
+            let both = ["a/one.exr", "a/two.exr"];
+            assert_eq!(cut_outs(&Library::open(&out).unwrap()), both, "{name}");
+        };
+        let stays = "; the earlier cut-out a/two.exr stays";
+        std::fs::write(&list, TWO.replace("= 100.0", "= 2.0")).unwrap();
+        let refused = build(&list, &out, &|_, _| ()).unwrap().refused;
+        assert!(refused[0].ends_with(stays), "{refused:?}");
+        kept("a scale that is wrong");
+        let two = folder.path().join("two.png");
+        let options = CutOutOptions::default();
+        // There is no marker in the photo.
+        let entry = PhotoEntry::new(&two, "a", "cap", Scale::Marker(0.05));
+        let told = add_photo(&out, &entry, &[], &options).unwrap_err();
+        assert!(told.to_string().ends_with(stays), "{told}");
+        kept("a marker that is not there");
+        let empty = Image::filled(120, 80, LinearRgb::new(0.04, 0.4, 0.08));
+        io::write(&two, &empty).unwrap();
+        std::fs::write(&list, TWO).unwrap();
+        let refused = build(&list, &out, &|_, _| ()).unwrap().refused;
+        assert!(refused[0].ends_with(stays), "{refused:?}");
+        kept("a photo of nothing");
     }
 
     #[test]
@@ -742,6 +775,12 @@ mod tests {
         let captured = refused("captured = { photos = [] }\nmatte = \"outline\"");
         let expected = "photos[0].matte: \"outline\" beside captured, whose matte is measured";
         assert!(captured.contains(expected), "{captured}");
+        let screen = refused("captured = { photos = [] }\nscreen = \"two.png\"");
+        let expected = "two.png\" beside captured, whose empty display goes to captured.empty";
+        assert!(
+            screen.contains("photos[0].screen: ") && screen.contains(expected),
+            "{screen}"
+        );
     }
 
     #[test]

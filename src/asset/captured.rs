@@ -231,7 +231,8 @@ impl<'a> Placed<'a> {
     }
 
     fn object(&self, measured: &Measured, trim: &Trim, photos: usize) -> CapturedObject {
-        let film = trim.cropped(&measured.film);
+        // The weights of a reduction add up to 1 only up to rounding.
+        let film = trim.cropped(&measured.film).map(Film::clamped);
         let flow = self.flow(measured, trim, &film);
         let captured = self.capture_record(measured, flow.as_ref(), photos);
         let record = self.record(measured, trim, &film, captured);

@@ -185,11 +185,18 @@ impl PhotoEntry {
         MASS.check("mass", self.mass())
     }
 
-    /// What is measured on a display has no other matte.
+    /// What is measured on a display has no other matte and no other screen.
     fn check_capture(&self) -> Result<()> {
         let Some(captured) = &self.captured else {
             return Ok(());
         };
+        if self.screen != ScreenSource::Auto {
+            let what = format!(
+                "\"{}\" beside captured, whose empty display goes to captured.empty",
+                self.screen
+            );
+            return Err(Error::value("screen", what));
+        }
         match self.matte {
             Some(matte) => {
                 let what = format!("\"{matte}\" beside captured, whose matte is measured");

@@ -35,8 +35,8 @@ const LOCK: &str = ".lock";
 /// are none, a class that the folder does not have comes behind those that it has.
 ///
 /// Adding the same photo to the same asset again replaces it; where it gives no cut-out any more,
-/// the folder keeps none of it. The manifest is written last, whole or not at all. Several
-/// processes may add to one folder at a time.
+/// the earlier one stays, and goes only where a person rejected it. The manifest is written last,
+/// whole or not at all. Several processes may add to one folder at a time.
 ///
 /// # Errors
 /// [`Error::Value`] for a wrong name, class or size; [`Error::File`] for a photo that lies where its
@@ -62,11 +62,11 @@ pub fn add_photo(
     let outcome = writer.write(entry);
     let _alone = lock(folder)?;
     let mut manifest = read_or_new(folder)?;
-    if is_refusal(&outcome, entry) && manifest.remove(&entry.cut_out_file()) {
+    if outcome.is_err() && is_rejected(entry) && manifest.remove(&entry.cut_out_file()) {
         manifest.write(folder)?;
         files::remove(folder, &entry.cut_out_file())?;
     }
-    let photo = outcome?;
+    let photo = outcome.map_err(|e| refusal(e, entry, &manifest))?;
     manifest.add_classes(classes, entry.label_class().into_iter())?;
     manifest.insert(entry.asset_with(photo.record.clone()))?;
     manifest.write(folder)?;
@@ -85,10 +85,21 @@ pub(super) fn lock(folder: &Path) -> Result<Option<File>> {
     Ok(Some(file))
 }
 
-/// The photo itself gave no cut-out, whatever its scale: that may be a slip.
-fn is_refusal(outcome: &Result<Photo>, entry: &PhotoEntry) -> bool {
-    let is_scale = |what: &str| entry.scale().is_ok_and(|scale| scale.is_named_in(what));
-    matches!(outcome, Err(Error::Photo { what }) if !is_scale(what))
+/// A person does not want the cut-out of a photo: a folder keeps none of it.
+pub(super) fn is_rejected(entry: &PhotoEntry) -> bool {
+    let review = Review::of_photo(&entry.file).ok().flatten();
+    review.is_some_and(|review| review.is_rejected())
+}
+
+/// Why a photo gave no cut-out, and that an earlier one stays: it may be a slip in an option.
+pub(super) fn refusal(error: Error, entry: &PhotoEntry, manifest: &Manifest) -> Error {
+    let file = entry.cut_out_file();
+    match error {
+        Error::Photo { what } if manifest.has(&file) => Error::Photo {
+            what: format!("{what}; the earlier cut-out {file} stays"),
+        },
+        other => other,
+    }
 }
 
 /// The manifest of a folder; a new one where there is no manifest.

@@ -272,16 +272,18 @@ impl Manifest {
 
     /// Takes a cut-out out, and with its last one the asset. Returns whether it was there.
     pub(super) fn remove(&mut self, file: &str) -> bool {
-        let is_it = |photo: &PhotoRecord| photo.file == file;
-        let was_there = self
-            .assets
-            .iter()
-            .any(|asset| asset.photos.iter().any(is_it));
+        let was_there = self.has(file);
         for asset in &mut self.assets {
-            asset.photos.retain(|photo| !is_it(photo));
+            asset.photos.retain(|photo| photo.file != file);
         }
         self.assets.retain(|asset| !asset.photos.is_empty());
         was_there
+    }
+
+    /// It tells of a cut-out in this file.
+    pub(super) fn has(&self, file: &str) -> bool {
+        let mut photos = self.assets.iter().flat_map(|asset| &asset.photos);
+        photos.any(|photo| photo.file == file)
     }
 
     /// Takes classes into the list: those that are declared, in that order, or else those in use,

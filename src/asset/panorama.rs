@@ -5,7 +5,7 @@ use super::moments::{LightSums, Piece};
 use crate::error::{Error, Result};
 use crate::geom::Vector3;
 use crate::image::Image;
-use crate::io;
+use crate::io::{self, Format};
 use crate::pixel::LinearRgb;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -34,13 +34,17 @@ impl Panorama {
         })
     }
 
-    /// Reads a panorama from a file, an HDR or EXR as a rule.
+    /// Reads a panorama from a file, an HDR or EXR as a rule: one of 8 bits is warned of.
     ///
     /// # Errors
-    /// Those of [`io::read`]; those of [`new`](Self::new), naming the file.
+    /// Those of [`io::read`]; those of [`new`](Self::new), and [`Error::Field`] for a picture that
+    /// is not twice as wide as high, naming the file.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        Self::new(io::read(path)?).map_err(|e| e.in_file(path))
+        let image: Image<LinearRgb> = io::read(path)?;
+        check_shape(image.size()).map_err(|e| e.in_file(path))?;
+        warn_of_bits(path)?;
+        Self::new(image).map_err(|e| e.in_file(path))
     }
 
     /// The picture.
@@ -89,6 +93,28 @@ impl Panorama {
         let sums = LightSums::new(&self.image);
         self.sums.get_or_init(|| sums)
     }
+}
+
+/// Fails for an ordinary photo; a map that was reduced may be off by a pixel or a percent.
+fn check_shape((width, height): (usize, usize)) -> Result<()> {
+    let twice = 2 * height;
+    if width.abs_diff(twice) <= (twice / 100).max(1) {
+        return Ok(());
+    }
+    let what = format!("{width} x {height} pixels, expected an equirectangular map, 2 to 1");
+    Err(Error::value("environment", what))
+}
+
+/// Of 8 bits the brightest are cut off, and with them most of the light of lamps and of the sun.
+fn warn_of_bits(path: &Path) -> Result<()> {
+    let header = io::read_header(path)?;
+    if header.bits == 8 && header.format != Format::Hdr {
+        let path = path.display();
+        log::warn!(
+            "{path}: 8 bits, whose values end at 1: lamps and the sun are too weak; expected HDR or EXR"
+        );
+    }
+    Ok(())
 }
 
 /// What is wrong with a picture that cannot be radiance.
@@ -170,6 +196,24 @@ mod tests {
                     .to_string()
                     .contains("(1, 1)")
             );
+        }
+    }
+
+    #[test]
+    fn a_map_is_twice_as_wide_as_high() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.png");
+        let read = |w, h| {
+            io::write(&path, &Image::filled(w, h, LinearRgb::WHITE)).unwrap();
+            Panorama::read(&path)
+        };
+        let told = read(30, 40).unwrap_err().to_string();
+        let expected =
+            "map.png: environment: 30 x 40 pixels, expected an equirectangular map, 2 to 1";
+        assert!(told.ends_with(expected), "{told}");
+        assert!(read(40, 40).is_err());
+        for (w, h) in [(40, 20), (41, 20), (404, 200)] {
+            assert!(read(w, h).is_ok(), "{w} x {h}");
         }
     }
 

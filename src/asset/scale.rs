@@ -63,12 +63,6 @@ impl Scale {
         Err(Error::Photo { what })
     }
 
-    /// An error is about it.
-    pub(super) fn is_named_in(self, what: &str) -> bool {
-        let field = self.measured_field();
-        field.is_some_and(|(at, _)| what.starts_with(&format!("{at}: ")))
-    }
-
     /// The field of an entry that gives it and its value, where that is something else than the
     /// object.
     fn measured_field(self) -> Option<(&'static str, String)> {

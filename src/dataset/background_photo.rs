@@ -6,10 +6,12 @@ use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::{Point2, Point3, Vector2};
 use crate::image::{Image, Roi};
-use crate::io::{self, FromFile};
+use crate::io::{self, Format, FromFile};
 use crate::light::{MeasuredPlate, PlateMeasures};
 use crate::pixel::{Coverage, LinearRgb, Mix};
 use crate::scene::{Background, CameraSource, Wall};
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -94,6 +96,7 @@ impl BackgroundPhoto {
             .map(|(label, seen)| Self::open(label, seen, options.image));
         let places = opened.collect::<Result<Vec<_>>>()?;
         warn_of_shapes(&places);
+        warn_of_unlabelled(folder, &places);
         Ok(places)
     }
 
@@ -329,6 +332,44 @@ fn warn_of_shapes(places: &[BackgroundPhoto]) {
     }
 }
 
+/// Says, once for all, that photos lie beside the labels which none of these is of.
+fn warn_of_unlabelled(folder: &Path, places: &[BackgroundPhoto]) {
+    let photos = places.iter().filter_map(|place| place.photo.file_stem());
+    let labelled: BTreeSet<_> = photos.collect();
+    let unlabelled = unlabelled_photos(folder, &labelled);
+    if let Some(first) = unlabelled.first() {
+        let (folder, count) = (folder.display(), unlabelled.len());
+        let of = count + labelled.len();
+        let (tell, more) = match count {
+            1 => ("has no label and is not used", ""),
+            _ => ("have no label and are not used", ", ..."),
+        };
+        log::warn!("{folder}: {count} of {of} photos {tell} ({first}{more})");
+    }
+}
+
+/// Names of the photos of a folder, in order, that have another name before their extension than
+/// the labelled ones, and are not made for these.
+fn unlabelled_photos(folder: &Path, labelled: &BTreeSet<&OsStr>) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let paths = entries.map(|entry| entry.path());
+    let photos = paths.filter(|path| path.is_file() && is_photo(path));
+    let is_labelled = |path: &PathBuf| path.file_stem().is_some_and(|s| labelled.contains(s));
+    let unlabelled = photos.filter(|path| !is_labelled(path));
+    let names =
+        unlabelled.filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()));
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    names
+}
+
+/// A picture that is neither hidden nor an overlay or a mask of a photo.
+fn is_photo(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let is_made = name.ends_with(".overlay.png") || name.ends_with(".front.png");
+    !name.starts_with('.') && !is_made && Format::from_extension(path).is_some()
+}
+
 /// The walls of a surface of this size, as its label says.
 fn wall_of(labelled: &LabelledPhoto, size: [f64; 2]) -> Option<Wall> {
     let wall = labelled.label.surface.wall?;
@@ -407,6 +448,30 @@ fn area([w, h]: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn photos_without_a_label_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = [
+            "a.jpg",
+            "a.heic",
+            "a.overlay.png",
+            "a.front.png",
+            "a.label.json",
+            "c.png",
+            "B.JPG",
+            "._a2.jpg",
+            ".hidden.png",
+            "notes.txt",
+        ];
+        for file in files {
+            std::fs::write(folder.path().join(file), "").unwrap();
+        }
+        std::fs::create_dir(folder.path().join("more.png")).unwrap();
+        let labelled = BTreeSet::from([OsStr::new("a")]);
+        let unlabelled = unlabelled_photos(folder.path(), &labelled);
+        assert_eq!(unlabelled, ["B.JPG", "c.png"]);
+    }
 
     #[test]
     fn a_photo_of_the_picture_s_shape_is_kept_whole() {

@@ -156,12 +156,13 @@ impl DatasetConfig {
 
     /// The recipe as a file at a place has it.
     fn text(&self, path: &Path) -> Result<String> {
-        let folder = io::absolute(folder_of(path))?;
+        let place = io::absolute(path)?;
+        let folder = folder_of(&place);
         let mut config = self.clone();
-        config.assets = io::relative(&io::absolute(&config.assets)?, &folder);
-        config.backgrounds = io::relative(&io::absolute(&config.backgrounds)?, &folder);
+        config.assets = io::relative_on_disk(&config.assets, folder)?;
+        config.backgrounds = io::relative_on_disk(&config.backgrounds, folder)?;
         for file in &mut config.scene.environment.files {
-            *file = seen_from(&folder, &self.folder, file)?;
+            *file = seen_from(folder, &self.folder, file)?;
         }
         toml::to_string_pretty(&config).map_err(|e| Error::file(path, e))
     }

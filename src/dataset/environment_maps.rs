@@ -114,8 +114,8 @@ fn total_bytes(kept: &[(String, Arc<Panorama>)]) -> usize {
 
 /// A name in a recipe as it is seen from another folder.
 pub(crate) fn seen_from(folder: &Path, own: &Path, name: &str) -> Result<String> {
-    let file = io::absolute(&own.join(name))?;
-    Ok(io::relative(&file, folder).to_string_lossy().into_owned())
+    let file = io::relative_on_disk(&own.join(name), folder)?;
+    Ok(file.to_string_lossy().into_owned())
 }
 
 #[cfg(test)]

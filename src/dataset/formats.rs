@@ -5,7 +5,7 @@ use crate::dataset::label_table::LabelTable;
 use crate::dataset::{
     Coco, Layers, Mot, Obstructed, PictureFormat, Pictures, Voc, WebDataset, Writer, Yolo,
 };
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::label::{AmodalBox, LabelOptions, ObjectLabel, ObstructionRule, RleMask};
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,8 @@ pub struct LabelConfig {
     /// An object has no label when more than this share of its outline lies outside of the picture,
     /// 0 to 1; truncation and the box of the whole outline are then told as well. Default: none.
     pub max_truncation: Option<f64>,
-    /// A pixel belongs to an object when more than this share of it is covered. Default: 0.1.
+    /// A pixel belongs to an object when more than this share of it is covered, 0 to less than 1.
+    /// Default: 0.1.
     pub alpha_threshold: f32,
     /// What an amodal box is drawn around: `mask` or `outline`. Default: `mask`.
     pub amodal: AmodalBox,
@@ -131,7 +132,7 @@ impl LabelConfig {
         if let Some(max) = self.max_truncation {
             share.check("max_truncation", max)?;
         }
-        share.check("alpha_threshold", self.alpha_threshold.into())?;
+        check_threshold(self.alpha_threshold)?;
         Bounds::new(0.0, 1000.0, "pixels").check("simplify", self.simplify)?;
         Bounds::new(1.0, 1e6, "samples in an archive")
             .check("webdataset.samples", self.webdataset.samples as f64)
@@ -204,6 +205,15 @@ impl LabelConfig {
     }
 }
 
+/// Coverage is never more than 1: above a threshold of 1 nothing has a label.
+fn check_threshold(threshold: f32) -> Result<()> {
+    if (0.0..1.0).contains(&threshold) {
+        return Ok(());
+    }
+    let what = format!("{threshold}, expected 0 to less than 1 (a share)");
+    Err(Error::value("alpha_threshold", what))
+}
+
 /// Whether polygons keep every corner: a setting that need not be told.
 pub(super) fn is_exact(tolerance_px: &f64) -> bool {
     *tolerance_px == 0.0
@@ -239,6 +249,10 @@ mod tests {
             ("simplify = -1", "simplify: -1"),
             ("simplify = inf", "simplify: inf"),
             ("alpha_threshold = 2", "alpha_threshold: 2"),
+            (
+                "alpha_threshold = 1",
+                "alpha_threshold: 1, expected 0 to less than 1",
+            ),
             ("overlap_iou = nan", "overlap_iou: NaN"),
             ("min_visible = 1.01", "min_visible: 1.01"),
             ("min_visible = -0.1", "min_visible: -0.1"),

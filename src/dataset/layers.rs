@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 /// | `object003.Z`, `amodal003.A` | its depth, and its coverage as if alone (`cards`) |
 ///
 /// Objects are called `object003_CLASS` in the Cryptomatte's list, distractors
-/// `object003_distractor`. Without film,
+/// `object003_distractor`; what is too faint for a label is among them. Without film,
 /// `RGB = sum of object RGB + background * shadow * (1 - sum of object A)`: all but the picture is
 /// of the sharp objects at rest, before blur, depth of field, a belt's exposure and finish; with
 /// those the sum does not give the picture.
@@ -89,7 +89,12 @@ impl Writer for Layers {
     }
 }
 
-fn name(id: ObjectId, what: &str) -> String {
+/// The name of an object, or of a distractor, which has no class.
+fn name(id: ObjectId, class: Option<u32>, classes: &[String]) -> String {
+    let what = class.map_or_else(
+        || Role::Distractor.to_string(),
+        |class| class_name(class, classes),
+    );
     format!("object{:03}_{what}", id.0)
 }
 
@@ -169,13 +174,15 @@ fn cryptomatte(entry: &Entry<'_>) -> Cryptomatte {
     Cryptomatte::new(&entry.sample.deep, "CryptoObject", &object_names(entry))
 }
 
+/// Names of all that the picture shows, whether or not it has a label.
 fn object_names(entry: &Entry<'_>) -> Vec<(ObjectId, String)> {
     let labels = &entry.sample.labels;
-    let objects = labels.objects.iter();
-    let objects = objects.map(|o| (o.id, name(o.id, &class_name(o.class, entry.classes))));
-    let distractors = labels.distractors.iter();
-    let distractors = distractors.map(|d| (d.id, name(d.id, &Role::Distractor.to_string())));
-    objects.chain(distractors).collect()
+    let objects = labels.objects.iter().map(|o| (o.id, Some(o.class)));
+    let distractors = labels.distractors.iter().map(|d| (d.id, None));
+    let faint = labels.faint.iter().copied();
+    let all = objects.chain(distractors).chain(faint);
+    all.map(|(id, class)| (id, name(id, class, entry.classes)))
+        .collect()
 }
 
 /// Depth of the first sample of a pixel of which enough is seen to belong to a mask.

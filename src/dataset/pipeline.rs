@@ -417,11 +417,14 @@ impl Pipeline {
     /// Labels a scene without making its picture: nothing is lit, and neither plate nor environment
     /// is read.
     ///
-    /// The labels are those of [`take`](Self::take).
+    /// The labels are those of [`take`](Self::take), but for rounding: without light, coverage is
+    /// summed in another order, so that numbers (`visible_fraction`, `depth`) agree to 1e-6. Masks and
+    /// boxes are the same unless a pixel is that close to the threshold.
     ///
     /// # Errors
     /// As [`take`](Self::take).
     pub fn label(&self, scene: Scene) -> Result<Labels> {
+        self.check_image(&scene)?;
         let plate = scene.plate.clone();
         let (scene, shot) = self.resolve(scene.unlit())?;
         let shot = self.behind_front(&plate, &scene, shot)?;
@@ -456,6 +459,7 @@ impl Pipeline {
 
     fn resolve_within(&self, scene: Scene, allowance: &Allowance) -> Result<(Scene, Shot)> {
         let place = self.known_place(&scene.plate)?;
+        self.check_image(&scene)?;
         let mut scene = self.rest(locate(scene)?, allowance)?;
         let panorama = self.panorama(&scene)?;
         let mut plate = None;
@@ -524,6 +528,18 @@ impl Pipeline {
             None if !name.is_empty() => Err(self.unknown_plate(name)),
             place => Ok(place),
         }
+    }
+
+    /// Fails on a scene over a plate that was opened for pictures of another size.
+    fn check_image(&self, scene: &Scene) -> Result<()> {
+        let ([w, h], [width, height]) = (scene.image, self.config.scene.image);
+        if scene.plate.is_empty() || [w, h] == [width, height] {
+            return Ok(());
+        }
+        let what = format!(
+            "{w} x {h}, expected {width} x {height}, the recipe's scene.image, for which the plates were opened"
+        );
+        Err(Error::value("image", what))
     }
 
     fn unknown_plate(&self, name: &str) -> Error {

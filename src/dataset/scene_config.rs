@@ -17,7 +17,27 @@ const SCENE_KEYS: [&str; 5] = [
     "force_cameras",
 ];
 
+/// Values of a recipe's `scene` that count for a scene that is there already, if the recipe is
+/// beside it.
+const KEYS_BESIDE_A_SCENE: [&str; 2] = ["scene.settle", "scene.environment.files"];
+
 impl DatasetConfig {
+    /// Reads a recipe file, some of its values replaced, for a scene that is there already: its
+    /// pictures have the scene's size, whatever the recipe says.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read); a value replaced that only decides how scenes are drawn.
+    pub fn read_for_scene(
+        recipe: impl AsRef<Path>,
+        scene: &Scene,
+        overrides: &[io::Override],
+    ) -> Result<Self> {
+        overrides.iter().try_for_each(check_override)?;
+        let mut config = Self::read(recipe, overrides)?;
+        config.scene.image = scene.image;
+        Ok(config)
+    }
+
     /// The config that a scene read from `path` brings by itself, some of its values replaced: its
     /// [`files`](Scene::files) and [`settings`](Scene::settings), and nothing else but defaults.
     ///
@@ -39,24 +59,29 @@ impl DatasetConfig {
     /// The defaults with the settings of a scene.
     ///
     /// # Errors
-    /// Settings that no recipe can have.
+    /// Settings that no recipe can have, or that only decide how scenes are drawn.
     pub fn from_settings(settings: &SceneSettings, overrides: &[io::Override]) -> Result<Self> {
-        let mut table = settings.to_table();
+        overrides.iter().try_for_each(check_override)?;
+        Self::from_scene_table(settings.to_table(), overrides).map_err(|e| e.within("settings"))
+    }
+
+    fn from_scene_table(mut table: Table, overrides: &[io::Override]) -> Result<Self> {
         leave_out_formats(&mut table);
-        let config: Self =
-            io::from_table_with(table, overrides).map_err(|e| e.within("settings"))?;
-        config.check().map_err(|e| e.within("settings"))?;
+        let table: Table = io::from_table_with(table, overrides)?;
+        check_scene_table(&table)?;
+        let config: Self = io::from_table(table)?;
+        config.check()?;
         Ok(config)
     }
 
     fn with_scene_folders(mut self, scene: &Scene, path: &Path) -> Result<Self> {
         let files = scene.files.as_ref().ok_or_else(no_files)?;
         let folder = folder_of(path);
-        self.assets = folder.join(required(&files.assets, "assets", "the assets")?);
+        self.assets = below(folder, required(&files.assets, "assets", "the assets")?);
         self.backgrounds = backgrounds_folder(files, &scene.plate, folder)?;
         self.folder = folder.into();
         if let Some(environments) = &files.environments {
-            self.use_environments(scene, folder.join(environments));
+            self.use_environments(scene, below(folder, environments));
         }
         Ok(self)
     }
@@ -116,6 +141,40 @@ fn leave_out_formats(settings: &mut Table) {
             settings.remove("labels");
         }
     }
+}
+
+/// Fails on a replaced value that only decides how scenes are drawn.
+fn check_override(given: &io::Override) -> Result<()> {
+    let path = given.path();
+    let counts = |key: &&str| path.starts_with(*key);
+    if path.starts_with("scene.") && !KEYS_BESIDE_A_SCENE.iter().any(counts) {
+        return Err(only_drawn(path));
+    }
+    Ok(())
+}
+
+/// The same in settings of a scene, whose own values say where its environment map is.
+fn check_scene_table(settings: &Table) -> Result<()> {
+    let scene = settings.get("scene").and_then(Value::as_table);
+    let mut keys = scene.into_iter().flat_map(Table::keys);
+    match keys.find(|key| *key != "settle") {
+        Some(key) => Err(only_drawn(&format!("scene.{key}"))),
+        None => Ok(()),
+    }
+}
+
+fn only_drawn(key: &str) -> Error {
+    let what = "decides how scenes are drawn, expected a change of the scene itself";
+    Error::value(key, what)
+}
+
+/// A path that a file in a folder names; older scenes name the folder itself by nothing.
+fn below(folder: &Path, path: &Path) -> PathBuf {
+    let joined = folder.join(path);
+    if joined.as_os_str().is_empty() {
+        return ".".into();
+    }
+    joined
 }
 
 fn required<'a>(folder: &'a Option<PathBuf>, key: &str, content: &str) -> Result<&'a Path> {
@@ -185,7 +244,8 @@ fn backgrounds_folder(files: &SceneFiles, plate: &str, folder: &Path) -> Result<
         return Ok(PathBuf::new());
     }
     let content = format!("the photo \"{plate}\" and its label");
-    Ok(folder.join(required(&files.backgrounds, "backgrounds", &content)?))
+    let backgrounds = required(&files.backgrounds, "backgrounds", &content)?;
+    Ok(below(folder, backgrounds))
 }
 
 #[cfg(test)]
@@ -244,6 +304,57 @@ mod tests {
             ..config
         };
         assert_eq!(brought, expected);
+    }
+
+    #[test]
+    fn a_scene_and_its_files_may_lie_in_one_folder() {
+        let config = DatasetConfig {
+            assets: ".".into(),
+            backgrounds: ".".into(),
+            ..DatasetConfig::default()
+        };
+        let map = Environment {
+            file: "sky.exr".into(),
+            rotation_deg: 0.0,
+            strength: 1.0,
+        };
+        let scene = Scene {
+            environment: Some(map),
+            ..scene()
+        };
+        let written = config.with_files(scene, "scene.toml").unwrap();
+        let older = Scene {
+            files: Some(SceneFiles {
+                assets: Some("".into()),
+                backgrounds: Some("".into()),
+                environments: Some("".into()),
+            }),
+            ..written.clone()
+        };
+        for scene in [written, older] {
+            let brought = DatasetConfig::for_scene(&scene, "scene.toml", &[]).unwrap();
+            let folders = [&brought.assets, &brought.backgrounds, &brought.folder];
+            assert_eq!(folders.map(|folder| folder.as_os_str()), ["."; 3]);
+        }
+    }
+
+    #[test]
+    fn what_only_decides_how_scenes_are_drawn_is_refused() {
+        let given = |text: &str| {
+            let set: io::Override = text.parse().unwrap();
+            let told = DatasetConfig::from_settings(&SceneSettings::default(), &[set]);
+            told.map_err(|e| e.to_string())
+        };
+        let told = given("scene.gain_ev=5").unwrap_err();
+        let expected =
+            "scene.gain_ev: decides how scenes are drawn, expected a change of the scene itself";
+        assert_eq!(told, expected);
+        for counts in ["scene.settle.attempts=3", "pictures.jpeg_quality=5"] {
+            assert!(given(counts).is_ok(), "{counts}");
+        }
+        let settings = SceneSettings::from_table("[scene]\ngain_ev = 5\n".parse().unwrap());
+        let told = DatasetConfig::from_settings(&settings, &[]).unwrap_err();
+        assert_eq!(told.to_string(), format!("settings.{expected}"));
     }
 
     #[test]

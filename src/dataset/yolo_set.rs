@@ -5,7 +5,7 @@ use crate::dataset::Part;
 use crate::dataset::listing::{images_in, is_list, place_of, whole_path};
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::error::{Error, Result};
-use crate::eval::label_of;
+use crate::eval::{is_image, label_of};
 use crate::io;
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
@@ -144,30 +144,55 @@ impl YoloSet {
         Ok(self.with_parts([&self.train, &self.val].map(|images| first_share(images, share))))
     }
 
+    /// Those files of a set, or of a folder of images with labels, that `output` may be: the ones
+    /// that choose the images, and images and labels of its name; none of a file that is not there.
+    ///
+    /// # Errors
+    /// Those of [`YoloSet::read`]; [`Error::File`] for a folder that cannot be listed.
+    pub fn files_like(folder: &Path, output: &Path) -> Result<Vec<PathBuf>> {
+        // A file that is not there yet is none of theirs, which may have very many.
+        let Ok(real) = output.canonicalize() else {
+            return Ok(Vec::new());
+        };
+        let (mut files, images) = match folder.join("data.yaml").is_file() {
+            true => (Self::choosing_files(folder)?, Self::read(folder)?.series()),
+            false => (Vec::new(), io::files_below(folder, is_image, usize::MAX)?),
+        };
+        let theirs = images.into_iter().flat_map(with_labels);
+        files.extend(theirs.filter(|file| file.file_name() == real.file_name()));
+        Ok(files)
+    }
+
     /// Writes `train.txt`, `val.txt` and `data.yaml`; what lies below the folder is relative to it.
     ///
     /// # Errors
-    /// When a file cannot be written.
+    /// When a file cannot be written; before any is, for an image whose name is not UTF-8.
     pub fn write(&self, folder: &Path) -> Result<()> {
+        let whole = whole_path(folder)?;
+        let [train, val] = Part::ALL.map(|part| list_of(self.part(part), &whole));
+        let lists = [train?, val?];
+        let test = self.test_places(&whole)?;
         io::create_folder(folder)?;
-        let folder = whole_path(folder)?;
-        for part in Part::ALL {
-            let list = folder.join(part.name()).with_extension("txt");
-            io::write_text(list, &list_of(self.part(part), &folder))?;
+        for (part, list) in Part::ALL.into_iter().zip(&lists) {
+            io::write_text(whole.join(part.name()).with_extension("txt"), list)?;
         }
-        let test = self.test_places(&folder);
         let yaml = DataYaml::write_with(&self.classes, &test, |part| format!("{part}.txt"));
-        io::write_text(folder.join("data.yaml"), &yaml)
+        io::write_text(whole.join("data.yaml"), &yaml)
     }
 
     /// What to test with as a `data.yaml` in the folder names it.
-    fn test_places(&self, folder: &Path) -> Vec<String> {
+    fn test_places(&self, folder: &Path) -> Result<Vec<String>> {
         let places = self.test.iter();
         places
             .map(|place| place.strip_prefix(folder).unwrap_or(place))
-            .map(|place| place.display().to_string())
+            .map(|place| io::path_text(place).map(str::to_owned))
             .collect()
     }
+}
+
+/// An image and where its label may be: in the folder of labels, or beside it.
+fn with_labels(image: PathBuf) -> [PathBuf; 3] {
+    [label_of(&image), image.with_extension("txt"), image]
 }
 
 /// The `data.yaml` of the set that a folder of labels belongs to, if there is one.
@@ -222,18 +247,18 @@ fn first_share(images: &[PathBuf], share: f64) -> Vec<PathBuf> {
 }
 
 /// Images as lines of a list.
-fn list_of(images: &[PathBuf], folder: &Path) -> String {
+fn list_of(images: &[PathBuf], folder: &Path) -> Result<String> {
     let lines = images.iter().map(|path| list_line(path, folder));
     lines.collect()
 }
 
 /// Trainers take `./` for the list's folder, older ones each `./` of a line, that of `../` too: what
 /// lies elsewhere has its whole path.
-fn list_line(image: &Path, folder: &Path) -> String {
-    match image.strip_prefix(folder) {
-        Ok(below) => format!("./{}\n", below.display()),
-        Err(_) => format!("{}\n", image.display()),
-    }
+fn list_line(image: &Path, folder: &Path) -> Result<String> {
+    Ok(match image.strip_prefix(folder) {
+        Ok(below) => format!("./{}\n", io::path_text(below)?),
+        Err(_) => format!("{}\n", io::path_text(image)?),
+    })
 }
 
 #[cfg(test)]
@@ -388,6 +413,54 @@ mod tests {
         let own = std::fs::read_to_string(set.path().join("data.yaml")).unwrap();
         let line = r#"test: ["images/val","some.txt"]"#;
         assert!(own.lines().any(|own| own == line), "{own}");
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn an_image_that_no_list_can_name_is_refused_before_anything_is_written() {
+        use std::os::unix::ffi::OsStrExt;
+        let out = tempfile::tempdir().unwrap();
+        let odd = PathBuf::from(std::ffi::OsStr::from_bytes(b"/photos/\xff.png"));
+        let places = [
+            ("train", [1, 0, 0]),
+            ("val", [0, 1, 0]),
+            ("test", [0, 0, 1]),
+        ];
+        for (name, [train, val, test]) in places {
+            let set = YoloSet {
+                classes: vec!["cap".into()],
+                train: vec![odd.clone(); train],
+                val: vec![odd.clone(); val],
+                test: vec![odd.clone(); test],
+            };
+            let told = set.write(&out.path().join(name)).unwrap_err().to_string();
+            assert!(
+                told.ends_with("a name that is not UTF-8, expected one that is"),
+                "{told}"
+            );
+            assert!(!out.path().join(name).exists());
+        }
+    }
+
+    #[test]
+    fn a_file_that_is_there_may_be_one_of_the_sets() {
+        let set = folder("train: images/train\nval: some.txt\nnames: [cap]\n");
+        let like = |of: &str, file: &str| {
+            let file = set.path().join(file);
+            let files = YoloSet::files_like(&set.path().join(of), &file).unwrap();
+            files.contains(&file)
+        };
+        for file in ["data.yaml", "some.txt", "images/train/b.png"] {
+            assert!(like(".", file), "{file}");
+        }
+        for file in ["images/val/c.txt", "page.html"] {
+            std::fs::write(set.path().join(file), "").unwrap();
+        }
+        // No data.yaml is there: all images below the folder, with labels beside them.
+        for file in ["images/val/c.png", "images/val/c.txt"] {
+            assert!(like("images", file), "{file}");
+        }
+        assert!(!like(".", "page.html") && !like(".", "nowhere.txt"));
     }
 
     #[test]

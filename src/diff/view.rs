@@ -20,6 +20,7 @@ pub fn difference<P: NamedChannels>(a: &Image<P>, b: &Image<P>, scale: f32) -> I
 }
 
 /// `|a - b| * scale` of every channel, alpha too: a difference in colour alone is transparent.
+/// Infinite where one of them is not a number and the other is.
 ///
 /// # Panics
 /// When the sizes differ.
@@ -33,9 +34,19 @@ pub fn absolute_difference<P: NamedChannels>(
     let mut pixels = Vec::with_capacity(width * height);
     for band in bands((width, height)) {
         let (a, b) = (a.read_rows(band.clone()), b.read_rows(band));
-        pixels.extend_from_slice(combined_pixels(&a, &b, |u, v| (u - v).abs() * scale).pixels());
+        pixels.extend_from_slice(combined_pixels(&a, &b, |u, v| distance(u, v) * scale).pixels());
     }
     Image::from_vec(width, height, pixels)
+}
+
+fn distance(u: f32, v: f32) -> f32 {
+    if is_same(u, v) {
+        0.0
+    } else if (u - v).is_nan() {
+        f32::INFINITY
+    } else {
+        (u - v).abs()
+    }
 }
 
 fn combined_pixels<P: NamedChannels>(
@@ -130,6 +141,15 @@ mod tests {
             absolute_difference(&a, &b, 2.0),
             Image::filled(2, 1, Coverage(0.5))
         );
+    }
+
+    #[test]
+    fn nan_against_a_number_is_an_infinite_difference_and_against_nan_none() {
+        let [a, b] = [f32::NAN, 0.5].map(|v| Image::filled(1, 1, Coverage(v)));
+        let difference =
+            |a: &Image<Coverage>, b: &Image<Coverage>| absolute_difference(a, b, 2.0)[(0, 0)];
+        assert_eq!(difference(&a, &b), Coverage(f32::INFINITY));
+        assert_eq!(difference(&a, &a), Coverage(0.0));
     }
 
     #[test]

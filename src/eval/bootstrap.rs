@@ -18,7 +18,8 @@ pub struct Interval {
 }
 
 /// mAP@0.5:0.95 with its percentile bootstrap interval over images: `rounds` times, as many images
-/// are drawn with replacement as there are. The same seed gives the same interval.
+/// are drawn with replacement as there are. The same seed gives the same interval. A draw in which
+/// nothing is to be found has no score and does not count.
 ///
 /// # Method
 /// [Efron 1979], percentile interval.
@@ -37,7 +38,10 @@ impl Matches {
     /// As [`bootstrap()`].
     pub fn bootstrap(&self, rounds: usize, seed: u64) -> Interval {
         let rounds = (0..rounds as u64).into_par_iter();
-        let values = rounds.map(|round| self.map(&drawn(self.images(), seed, round)));
+        let values = rounds.filter_map(|round| {
+            let times = drawn(self.images(), seed, round);
+            self.map_if_any(&times)
+        });
         interval(self.map(&[]), values.collect())
     }
 }
@@ -117,6 +121,23 @@ mod tests {
         let [few, many] = [12, 300].map(|n| bootstrap(&some(n), Definition::Coco, 200, 7));
         assert!(few.low < few.value && few.value < few.high);
         assert!(many.high - many.low < 0.5 * (few.high - few.low));
+    }
+
+    #[test]
+    fn a_draw_without_anything_to_find_is_no_score_of_zero() {
+        let b = bbox(0.0, 0.0, 10.0, 10.0);
+        let bare = || sheet(vec![], vec![]);
+        let seen = || sheet(vec![there(0, b)], vec![found(0, b, 0.5)]);
+        let sheets: Vec<EvalImage> = (0..20)
+            .map(|i| if i < 2 { seen() } else { bare() })
+            .collect();
+        for definition in [Definition::Yolov5, Definition::Coco] {
+            assert!(bootstrap(&sheets, definition, 1000, 0).low > 0.99);
+            assert_eq!(
+                bootstrap(&sheets[2..], definition, 100, 0),
+                Interval::default()
+            );
+        }
     }
 
     #[test]

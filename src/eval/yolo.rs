@@ -29,13 +29,15 @@ pub struct YoloTruth {
 /// it, COCO's ranges of area do.
 ///
 /// # Errors
-/// [`Error::File`] for a folder without labels, a label without an image where no `size` is given,
-/// files of one name in several folders, or a bad line.
+/// [`Error::File`] for a folder without labels or a whole dataset's, a label without an image where
+/// no `size` is given, files of one name in several folders or whose names are not UTF-8, or a bad
+/// line.
 pub fn read_yolo_truth(
     labels: &Path,
     images: Option<&Path>,
     size: Option<[u32; 2]>,
 ) -> Result<YoloTruth> {
+    refuse_dataset(labels)?;
     let folder = LabelFolder::open(labels, images)?;
     if folder.labels.is_empty() {
         return Err(Error::file(labels, "no label files, expected NAME.txt"));
@@ -45,6 +47,20 @@ pub fn read_yolo_truth(
         .map(|name| folder.read(name, size))
         .collect::<Result<_>>()?;
     Ok(YoloTruth::from_images(all))
+}
+
+/// A dataset's folder has the labels of all its parts, and texts that are none.
+fn refuse_dataset(folder: &Path) -> Result<()> {
+    let is_there = |name: &&str| folder.join(name).is_file();
+    let Some(file) = ["data.yaml", "dataset.json"].into_iter().find(is_there) else {
+        return Ok(());
+    };
+    let labels = folder.join("labels/val");
+    let what = format!(
+        "a dataset (it has {file}), expected a folder of labels, such as {}",
+        labels.display()
+    );
+    Err(Error::file(folder, what))
 }
 
 /// The truth of an image, its size, and the image where it is found.
@@ -65,7 +81,7 @@ impl LabelFolder {
         let beside = || io::with_last_step(labels, "labels", "images");
         let image_folder = images.map_or_else(beside, Path::to_path_buf);
         let images = picture_files(&image_folder)?;
-        let is_label = |path: &Path| !is_class_list(path) || images.contains_key(&name_of(path));
+        let is_label = |path: &Path| !is_class_list(path) || images.contains_key("classes");
         Ok(Self {
             labels: text_files(labels, is_label)?,
             images,
@@ -115,7 +131,8 @@ fn read_image(image: &Path) -> Result<LabelledImage> {
     let label = Some(label_of(image)).filter(|label| label.exists());
     let truth = truth_of(label.as_deref(), size)?;
     let picture = Some(picture_of(image.into(), size));
-    Ok((EvalImage::new(name_of(image), truth), size, picture))
+    let name = image.file_stem().unwrap_or_default().to_string_lossy();
+    Ok((EvalImage::new(name, truth), size, picture))
 }
 
 /// Where YOLO has the label of an image.
@@ -164,7 +181,7 @@ fn picture_of(path: PathBuf, size: [u32; 2]) -> Picture {
 ///
 /// # Errors
 /// [`Error::File`] for a folder that cannot be read, a name that the truth does not have, files of
-/// one name in several folders, or a bad line.
+/// one name in several folders or whose names are not UTF-8, or a bad line.
 pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
     let (known, files) = (truth.places_by_name(), text_files(folder, |_| true)?);
     if files.is_empty() {
@@ -240,12 +257,6 @@ pub(crate) fn sheet_of(
     })
 }
 
-/// What an image and its label are called.
-fn name_of(path: &Path) -> String {
-    let name = path.file_stem().unwrap_or_default();
-    name.to_string_lossy().into_owned()
-}
-
 /// The text files of a kind below a folder.
 fn text_files(folder: &Path, is_wanted: impl Fn(&Path) -> bool) -> Result<FilesByName> {
     let is_text = |path: &Path| path.extension().is_some_and(|e| e == "txt");
@@ -268,12 +279,14 @@ fn picture_files(folder: &Path) -> Result<FilesByName> {
     by_name(paths)
 }
 
+/// By what an image and its label are called.
+///
 /// Of one name in one folder the first file counts; in several folders they are of several images,
 /// which nothing tells apart.
 fn by_name(paths: Vec<PathBuf>) -> Result<FilesByName> {
     let mut files = FilesByName::new();
     for path in paths {
-        match files.entry(name_of(&path)) {
+        match files.entry(io::stem_text(&path)?.to_owned()) {
             Entry::Vacant(place) => {
                 place.insert(path);
             }
@@ -463,6 +476,17 @@ mod tests {
     }
 
     #[test]
+    fn a_whole_dataset_is_no_folder_of_labels() {
+        for file in ["data.yaml", "dataset.json"] {
+            let set = folder(&[(file, ""), ("labels/train/a.txt", BOX)]);
+            let told = read_yolo_truth(set.path(), None, Some([9, 9])).unwrap_err();
+            let (told, labels) = (told.to_string(), set.path().join("labels/val"));
+            assert!(told.contains(file), "{told}");
+            assert!(told.ends_with(&labels.display().to_string()), "{told}");
+        }
+    }
+
+    #[test]
     fn images_of_one_name_are_refused_and_files_of_one_image_are_not() {
         let labels = folder(&[("a.txt", BOX), ("room1/a.txt", BOX)]);
         let told = read_yolo_truth(labels.path(), None, Some([9, 9])).unwrap_err();
@@ -481,6 +505,19 @@ mod tests {
             told.to_string().contains("room1/a.jpg: named as "),
             "{told}"
         );
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn names_that_are_no_text_are_refused_and_not_taken_for_each_other() {
+        use std::os::unix::ffi::OsStrExt;
+        let labels = folder(&[("a.txt", BOX)]);
+        for name in [&b"\xfe.txt"[..], b"\xff.txt"] {
+            let odd = std::ffi::OsStr::from_bytes(name);
+            std::fs::write(labels.path().join(odd), BOX).unwrap();
+        }
+        let told = read_yolo_truth(labels.path(), None, Some([9, 9])).unwrap_err();
+        assert!(told.to_string().contains("not UTF-8"), "{told}");
     }
 
     #[test]

@@ -62,7 +62,7 @@ fn encode(
 /// parts give the same bytes.
 ///
 /// # Errors
-/// [`Error::File`] for no part at all, a channel of another size, a name twice or not Latin-1, or a
+/// [`Error::File`] for no part at all, a channel of another size, a name twice, or a
 /// file that cannot be written.
 pub fn write_parts(path: impl AsRef<Path>, size: (usize, usize), parts: &[Part]) -> Result<()> {
     write_encoded(path.as_ref(), exr::encode_parts(size, parts))

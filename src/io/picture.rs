@@ -103,10 +103,16 @@ impl Picture {
     /// # Panics
     /// When the rows reach outside the picture, or the requested pixels are not colours.
     pub fn rows<P: FromFile>(&self, rows: Range<usize>) -> Image<P> {
-        assert_eq!(P::WANTED, Wanted::Color, "pixels that are not colours");
-        self.raster
-            .pixels(self.profile.as_ref(), rows)
-            .expect("colours were found when the picture was read")
+        self.colors(self.profile.as_ref(), rows)
+    }
+
+    /// As [`rows`](Self::rows), but by sRGB whatever profile the file has: encoded again, they are
+    /// its codes.
+    ///
+    /// # Panics
+    /// As [`rows`](Self::rows).
+    pub fn rows_as_srgb<P: FromFile>(&self, rows: Range<usize>) -> Image<P> {
+        self.colors(None, rows)
     }
 
     /// All colours, as [`read`](super::read) makes them.
@@ -121,6 +127,17 @@ impl Picture {
         let whole = self.raster.rows(self.profile.as_ref(), rows.clone());
         P::check(&whole).map_err(|e| Error::file(&self.path, e))?;
         Ok(self.rows(rows))
+    }
+
+    fn colors<P: FromFile>(
+        &self,
+        profile: Option<&DisplayProfile>,
+        rows: Range<usize>,
+    ) -> Image<P> {
+        assert_eq!(P::WANTED, Wanted::Color, "pixels that are not colours");
+        self.raster
+            .pixels(profile, rows)
+            .expect("colours were found when the picture was read")
     }
 
     pub(super) fn into_image<P: FromFile>(self) -> Result<Image<P>> {

@@ -73,6 +73,11 @@ pub struct Labels {
     /// What touches the picture and has no label: it is in the way, in order of id.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub distractors: Vec<Distractor>,
+    /// What the picture shows too faintly for a box, no pixel being above
+    /// [`alpha_threshold`](LabelOptions::alpha_threshold), with its class (none of a distractor), in
+    /// order of id; in no file.
+    #[serde(skip)]
+    pub faint: Vec<(ObjectId, Option<u32>)>,
 }
 
 /// Everything known of one object in one picture.
@@ -140,9 +145,9 @@ impl ObjectLabel {
 pub struct LabelOptions {
     /// What the amodal box is drawn around. Default: `mask`.
     pub amodal: AmodalBox,
-    /// A pixel belongs to an object when more than this share of it is covered; counts for masks,
-    /// not for sums of coverage. Default: 0.1, under which thin film and the noise of a matte
-    /// look alike.
+    /// A pixel belongs to an object when more than this share of it is covered, 0 to less than 1;
+    /// counts for masks, not for sums of coverage. Default: 0.1, under which thin film and the noise
+    /// of a matte look alike.
     pub alpha_threshold: f32,
     /// An object has no label when more than this share of its outline lies outside of the picture,
     /// 0 to 1. Default: none, however little of it is inside; then truncation is not measured.
@@ -197,13 +202,15 @@ struct Silhouette<'a> {
 pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     let image = shot.camera.image;
     check_size(deep, image);
-    let mut objects = silhouettes(deep, shot, options);
-    objects.retain(|s| !s.amodal_box(options.amodal).is_empty());
+    let (boxless, objects): (Vec<_>, Vec<_>) = silhouettes(deep, shot, options)
+        .into_iter()
+        .partition(|s| s.amodal_box(options.amodal).is_empty());
     let occluders = topmost::occluders(&objects, shot, options.obstruction.pair_iou());
     let uncovered: Vec<_> =
         uncovered_fractions(&objects, &occluders, shot, options.obstruction).collect();
     let mut labels = Labels {
         image,
+        faint: faint(&boxless),
         ..Labels::default()
     };
     for ((object, covered_by), uncovered) in objects.into_iter().zip(occluders).zip(uncovered) {
@@ -218,6 +225,12 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
         );
     }
     labels
+}
+
+/// Those that cover anything, and their classes.
+fn faint(boxless: &[Silhouette<'_>]) -> Vec<(ObjectId, Option<u32>)> {
+    let covering = boxless.iter().filter(|s| s.visibility.covers_any());
+    covering.map(|s| (s.card.id, s.card.class)).collect()
 }
 
 /// What lies over a card: others by their ids, and the share that neither they nor the place cover,

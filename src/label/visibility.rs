@@ -20,6 +20,13 @@ pub(crate) struct ObjectVisibility {
     pub(crate) depth: DepthRange,
 }
 
+impl ObjectVisibility {
+    /// Whether it covers anything of any pixel.
+    pub(crate) fn covers_any(&self) -> bool {
+        self.depth.far > 0.0
+    }
+}
+
 /// Distances of an object along the optical axis, metres, over the pixels that it touches; zeros
 /// where it touches none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

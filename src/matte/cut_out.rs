@@ -6,7 +6,7 @@ mod options;
 pub use options::{Boundary, CutOutOptions, MatteMethod};
 
 use super::check::check_photo;
-use super::clipping::clipping_level;
+use super::clipping::clipped_screen;
 use super::film::ColorUncertainty;
 use super::outline::Outline;
 use super::plate::{PlateOptions, ScreenPlate};
@@ -333,9 +333,11 @@ impl Trim {
     /// The matte of the region, trimmed; without diagnostics.
     fn cut_out(&self, matted: Matted, found: Segmentation, screen: &CleanScreen) -> CutOut {
         CutOut {
-            film: self.cropped(&matted.film),
-            transmittance: self.cropped(&matted.transmittance),
-            uncertainty: self.cropped(&matted.uncertainty),
+            film: self.cropped(&matted.film).map(Film::clamped),
+            transmittance: self
+                .cropped(&matted.transmittance)
+                .map(|t| t.map(|t| t.clamp(0.0, 1.0))),
+            uncertainty: self.cropped(&matted.uncertainty).map(|u| u.clamp(0.0, 1.0)),
             hull: found.hull.iter().map(|p| self.moved(*p)).collect(),
             outline: found.outline.map(|p| self.moved(p)),
             roi: self.roi,
@@ -356,7 +358,7 @@ impl Trim {
         Point2::from((p - corner) * self.scale)
     }
 
-    /// A picture of the region as one of the cut-out.
+    /// A picture of the region as one of the cut-out; reduced, it may exceed its range by rounding.
     fn cropped<P: Mix>(&self, image: &Image<P>) -> Image<P> {
         let image = image.crop(self.in_region);
         if self.scale >= 1.0 {
@@ -404,18 +406,6 @@ fn softened(mask: &Image<Coverage>, sigma_px: f32) -> Image<Coverage> {
     filter::gaussian_blur(mask, sigma_px).map(|c| Coverage(c.0.clamp(0.0, 1.0)))
 }
 
-/// Share of the pixels outside a mask with a channel that is clipped, in photos that end at 1 from
-/// `clipped` on.
-fn clipped_share(photo: &Image<LinearRgb>, mask: &Image<Coverage>, clipped: f32) -> f32 {
-    let level = clipping_level(photo, clipped);
-    let pixels = photo.pixels().iter().zip(mask.pixels());
-    let outside = pixels.filter(|(_, m)| m.0 <= 0.0);
-    let (all, count) = outside.fold((0_u64, 0_u64), |(all, count), (p, _)| {
-        (all + 1, count + u64::from(p.max_channel() >= level))
-    });
-    count as f32 / all.max(1) as f32
-}
-
 /// A matte that leaves more than this of the screen is worth a warning: what it leaves veils the
 /// object, too.
 const MAX_RESIDUAL_MATTE: f32 = 0.2;
@@ -433,8 +423,7 @@ fn diagnostics(
     diagnostics.extend((residual > MAX_RESIDUAL_MATTE).then(|| residual_matte(residual)));
     // An outline alone does not depend on the screen.
     if matted.method != MatteMethod::Outline {
-        let share = clipped_share(photo, &found.mask, options.film.clipped);
-        diagnostics.extend((share > MAX_CLIPPED_SHARE).then(|| clipped_screen(share)));
+        diagnostics.extend(clipped_screen(photo, &found.mask, options.film.clipped));
     }
     diagnostics
 }
@@ -445,21 +434,6 @@ fn residual_matte(share: f32) -> Diagnostic {
         Code::ResidualMatte,
         format_args!(
             "residual matte of {:.0} % on the screen: uneven light, or an object of the screen's hue",
-            100.0 * share
-        ),
-    )
-}
-
-/// A screen that is clipped in more of its pixels than this is worth a warning: a plate goes on
-/// under the object, so a corner beside a lamp may be clipped.
-const MAX_CLIPPED_SHARE: f32 = 0.1;
-
-/// The warning about a screen that is too bright for the camera in a share of its pixels.
-fn clipped_screen(share: f32) -> Diagnostic {
-    Diagnostic::warning(
-        Code::ClippedScreen,
-        format_args!(
-            "{:.0} % of the screen is clipped: transmittance cannot be measured; use a shorter exposure",
             100.0 * share
         ),
     )
@@ -483,16 +457,6 @@ mod tests {
                 screen
             }
         })
-    }
-
-    #[test]
-    fn a_bright_screen_is_not_clipped_where_the_photo_does_not_end_at_1() {
-        let photo = slab(GREEN);
-        let share = |exposure: f32| {
-            let exposed = photo.map(|p| p.scale(exposure));
-            clipped_share(&exposed, &Image::new(120, 80), 0.98)
-        };
-        assert_eq!([1.0, 3.0].map(share), [0.0; 2]);
     }
 
     #[test]

@@ -17,7 +17,7 @@ pub(super) use view::view;
 
 use super::arrays::largest;
 use super::check::{check_coverage, check_photo, check_positive, check_value};
-use super::clipping::clipping_level;
+use super::clipping::{CLIPPED, clipped_screen, clipping_level};
 use super::plate::ScreenPlate;
 use super::prepared::{check_finite, longer_side};
 use super::screen::{is_keyable, strongest_channel};
@@ -58,7 +58,7 @@ impl Default for FilmOptions {
     fn default() -> Self {
         Self {
             flat: None,
-            clipped: 0.98,
+            clipped: CLIPPED,
             thickness_spread: 0.35,
             reflection_error: 0.15,
         }
@@ -133,7 +133,10 @@ pub fn film(
     options.check()?;
     check_finite(photo)?;
     check_coverage(inside)?;
-    solve_film(FilmInput::whole(photo, plate, inside, options), options)
+    let mut matte = solve_film(FilmInput::whole(photo, plate, inside, options), options)?;
+    let clipped = clipped_screen(photo, inside, options.clipped);
+    matte.diagnostics.extend(clipped);
+    Ok(matte)
 }
 
 /// A photo on its screen, or the part of it around the object: there is nothing to solve elsewhere.

@@ -8,6 +8,7 @@ use super::arrays::channel_pairs;
 use super::check::{
     check_coverage, check_length, check_photo, check_positive, check_share, check_value, refused,
 };
+use super::clipping::{CLIPPED, clipped_screen};
 use super::film::{ColorUncertainty, covered, view};
 use super::plate::ScreenPlate;
 use super::prepared::check_finite_photo;
@@ -124,9 +125,11 @@ pub fn triangulate(
     let inferred = Inferred::fit(&lines, inside, determined, dye);
     let solved = lines.map(|line| inferred.complete(&line));
     let shift_px: Vec<[f64; 2]> = aligned.iter().map(|photo| photo.shift_px).collect();
+    let mut diagnostics = diagnostics(&shift_px, determined, inferred.largest_spread());
+    diagnostics.extend(clipped_screens(shots, inside));
     Ok(Triangulated {
         residual: residual(&aligned, &solved, inside),
-        diagnostics: diagnostics(&shift_px, determined, inferred.largest_spread()),
+        diagnostics,
         determined,
         shift_px,
         ..composed(&solved, inside)
@@ -189,6 +192,21 @@ fn open_channels(determined: [bool; 3]) -> impl Iterator<Item = Diagnostic> {
     let channels = CHANNELS.into_iter().zip(determined);
     let open = channels.filter(|(_, determined)| !determined);
     open.map(|(name, _)| similar_screens(name))
+}
+
+/// The warnings about screens that are clipped; photos count from 1.
+fn clipped_screens(
+    shots: &[(&Image<LinearRgb>, &ScreenPlate)],
+    inside: &Image<Coverage>,
+) -> impl Iterator<Item = Diagnostic> {
+    let photos = (1..).zip(shots);
+    photos.filter_map(move |(number, (photo, _))| {
+        let found = clipped_screen(photo, inside, CLIPPED)?;
+        Some(Diagnostic {
+            message: format!("photo {number}: {}", found.message),
+            ..found
+        })
+    })
 }
 
 /// Noise of a photo at least: coded pictures are no finer.

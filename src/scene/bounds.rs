@@ -31,6 +31,9 @@ pub(super) const RADIANCE: Bounds = Bounds::new(0.0, 1e9, "what single precision
 /// Temperatures that [`planckian`](crate::color::planckian) knows.
 pub(super) const KELVIN: Bounds =
     Bounds::new(1667.0, 25_000.0, "kelvin, from a candle to a blue sky");
+/// Whites of a camera: below, the light has hardly any blue that a gain could bring back.
+pub(super) const WHITE: Bounds =
+    Bounds::new(2000.0, 25_000.0, "kelvin, from a sunset to a blue sky");
 pub(super) const GAIN: Bounds = Bounds::new(1e-6, 1e6, "a factor");
 pub(super) const FRICTION: Bounds =
     Bounds::new(0.0, 100.0, "a coefficient; plastics have 0.2 to 0.6");

@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::io;
 use serde::{Deserialize, Serialize};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 /// Where the files of a scene lie, relative to the scene's own file: with it a scene is rendered
 /// without its recipe.
@@ -40,34 +40,18 @@ impl SceneFiles {
 
 /// A path as it is named in a file.
 pub(crate) fn relative_to_file(path: &Path, file: &Path) -> Result<PathBuf> {
-    let file = absolute(file)?;
+    let file = io::absolute(file)?;
     let folder = file.parent().unwrap_or(&file);
-    Ok(io::relative(&absolute(path)?, folder))
+    io::relative_on_disk(or_working_folder(path), folder)
 }
 
-/// The path from the root. `..` is resolved on the disk where the path is there, since a link may
-/// stand before it.
-fn absolute(path: &Path) -> Result<PathBuf> {
-    match path.canonicalize() {
-        Ok(resolved) if climbs(path) => Ok(resolved),
-        _ => Ok(without_parent_steps(&io::absolute(path)?)),
+/// What older scenes name by an empty path.
+fn or_working_folder(path: &Path) -> &Path {
+    if path.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        path
     }
-}
-
-fn climbs(path: &Path) -> bool {
-    let mut steps = path.components();
-    steps.any(|step| step == Component::ParentDir)
-}
-
-fn without_parent_steps(path: &Path) -> PathBuf {
-    path.components().fold(PathBuf::new(), |mut steps, step| {
-        if step == Component::ParentDir {
-            steps.pop();
-        } else {
-            steps.push(step);
-        }
-        steps
-    })
 }
 
 /// A path that is named in one file as it is named in another.
@@ -118,5 +102,18 @@ mod tests {
             environments: None,
         };
         assert_eq!(moved, expected);
+    }
+
+    #[test]
+    fn a_folder_may_be_that_of_the_file() {
+        let own = relative_to_file(Path::new("job"), Path::new("job/scene.toml")).unwrap();
+        assert_eq!(own.as_os_str(), ".");
+        // As older scenes name it, beside a file without a folder.
+        let older = moved_path(
+            Some(Path::new("")),
+            Path::new("scene.toml"),
+            Path::new("out/b.toml"),
+        );
+        assert_eq!(older.unwrap(), Some("..".into()));
     }
 }

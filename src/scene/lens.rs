@@ -2,7 +2,7 @@
 
 use crate::bounds::Bounds;
 use crate::camera::{self, Camera, RadialDistortion};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::Point2;
 use crate::scene::bounds::{F_NUMBER, FOCUS, K1, SENSOR};
 use crate::scene::check::field;
@@ -152,6 +152,14 @@ impl Lens {
     }
 }
 
+/// An error that names the background too.
+fn told_of(error: Error, background: &str) -> Error {
+    match error {
+        Error::Value { at, what } => Error::value(at, format!("{what} (background {background})")),
+        other => other,
+    }
+}
+
 fn check_optional(value: Option<f64>, at: &str, bounds: &Bounds) -> Result<()> {
     value.map_or(Ok(()), |value| bounds.check(at, value))
 }
@@ -201,6 +209,7 @@ impl LensRanges {
             ..Lens::default()
         };
         lens.check_fold(camera)
+            .map_err(|e| told_of(e, &background.name))
     }
 
     /// A photo that has no distortion of its own is bent.

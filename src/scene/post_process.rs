@@ -3,7 +3,7 @@
 use crate::color::planckian;
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
-use crate::scene::bounds::{BLUR, CHROMATIC, EV, GAIN, KELVIN, NOISE, SHARPENING};
+use crate::scene::bounds::{BLUR, CHROMATIC, EV, GAIN, NOISE, SHARPENING, WHITE};
 use crate::scene::check::field;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
@@ -204,8 +204,8 @@ impl Noise {
 pub struct PostProcessRanges {
     /// Stops. Default: 0.
     pub exposure_ev: Range,
-    /// Temperature of the light that the camera treats as white, kelvin: below 6504 the frame
-    /// becomes bluer. Default: 6504.
+    /// Temperature of the light that the camera treats as white, kelvin, 2000 to 25 000: below
+    /// 6504 the frame becomes bluer. Default: 6504.
     pub white_k: Range,
     /// Blur of rendered cards and shadows, pixels. Default: 0.
     pub blur_px: Blur<Range>,
@@ -288,7 +288,7 @@ impl PostProcessRanges {
 
     pub(super) fn check(&self) -> Result<()> {
         self.exposure_ev.check("finish.exposure_ev", &EV)?;
-        self.white_k.check("finish.white_k", &KELVIN)?;
+        self.white_k.check("finish.white_k", &WHITE)?;
         self.sharpening.check("finish.sharpening", &SHARPENING)?;
         self.chromatic_px.check("finish.chromatic_px", &CHROMATIC)?;
         self.camera_blur_px.check("finish.camera_blur_px", &BLUR)?;
@@ -344,6 +344,25 @@ mod tests {
         let balanced = planckian(3000.0) * gains;
         let neutral = planckian(NEUTRAL_K);
         assert!((balanced.r / balanced.b - neutral.r / neutral.b).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_whites_that_are_taken_give_gains_that_a_scene_may_have() {
+        let drawn_at = |white_k: f64| {
+            let finish = PostProcessRanges {
+                white_k: Range::fixed(white_k),
+                ..PostProcessRanges::default()
+            };
+            finish.check()?;
+            finish
+                .draw(&Draws::new(3, 4), &Draws::new(3, 5))
+                .check("finish")
+        };
+        for end in [2000.0, 25_000.0] {
+            assert!(drawn_at(end).is_ok(), "{end}");
+        }
+        let told = drawn_at(1700.0).unwrap_err().to_string();
+        assert!(told.starts_with("finish.white_k: 1700"), "{told}");
     }
 
     #[test]

@@ -56,8 +56,7 @@ impl DemoArgs {
     }
 
     fn relative_backgrounds(&self) -> petcomp::Result<PathBuf> {
-        let backgrounds = io::absolute(&self.samples.join("backgrounds"))?;
-        Ok(io::relative(&backgrounds, &io::absolute(&self.output)?))
+        io::relative_on_disk(&self.samples.join("backgrounds"), &self.output)
     }
 
     /// A recipe file that names its folders and nothing else, or the one that is there: a person

@@ -47,11 +47,11 @@ pub(crate) struct DiffArgs {
     /// As --hardfail, for a warning
     #[arg(long = "hardwarn", default_value_t = f32::INFINITY, value_parser = parse_threshold)]
     hard_warn: f32,
-    /// Write a picture of the absolute difference
+    /// Write a picture of the absolute difference: of each colour or of alpha, whichever is larger
     #[arg(short, long, value_name = "PICTURE")]
     output: Option<PathBuf>,
     /// Factor on the written difference
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, value_parser = parse_scale)]
     scale: f32,
     /// Write the difference only when there is one
     #[arg(long = "od")]
@@ -62,6 +62,12 @@ pub(crate) struct DiffArgs {
 fn parse_threshold(text: &str) -> Result<f32, String> {
     let threshold = text.parse::<f32>().ok().filter(|v| *v >= 0.0);
     threshold.ok_or_else(|| "expected a number from 0".into())
+}
+
+fn parse_scale(text: &str) -> Result<f32, String> {
+    let scale = text.parse::<f32>().ok();
+    let scale = scale.filter(|v| v.is_finite() && *v > 0.0);
+    scale.ok_or_else(|| "expected a finite number above 0".into())
 }
 
 /// `idiff` has long flags with a single dash; they become ours.
@@ -175,21 +181,24 @@ impl PicturePair {
     /// Pictures without alpha have three channels, over which means are taken.
     fn compare(&self, thresholds: &Thresholds) -> Comparison {
         if self.a.has_alpha() || self.b.has_alpha() {
-            let [a, b] = [&self.a, &self.b].map(|picture| pixel_rows(picture, |value| value));
+            let [a, b] = self.rows(|value| value);
             compare(&a, &b, thresholds)
         } else {
-            let [a, b] = self.opaque_rows();
+            let [a, b] = self.rows(opaque);
             compare(&a, &b, thresholds)
         }
     }
 
-    fn opaque_rows(&self) -> [impl RowSource<LinearRgb>; 2] {
-        [&self.a, &self.b].map(|picture| pixel_rows(picture, opaque))
+    fn rows<P: Copy + Send>(
+        &self,
+        pixel: impl Fn([f32; 4]) -> P + Copy + Sync,
+    ) -> [impl RowSource<P>; 2] {
+        [&self.a, &self.b].map(|picture| pixel_rows(picture, pixel))
     }
 
     fn write_difference(&self, path: &Path, scale: f32) -> petcomp::Result<()> {
-        let [a, b] = self.opaque_rows();
-        io::write(path, &absolute_difference(&a, &b, scale))
+        let [a, b] = self.rows(|value| value);
+        io::write(path, &absolute_difference(&a, &b, scale).map(with_alpha))
     }
 
     /// It takes long, so nothing is computed that is not shown.
@@ -228,6 +237,11 @@ fn opaque([r, g, b, _]: [f32; 4]) -> LinearRgb {
     LinearRgb::new(r, g, b)
 }
 
+/// A difference of alpha alone is one to be seen, too.
+fn with_alpha([r, g, b, a]: [f32; 4]) -> LinearRgb {
+    LinearRgb::new(r.max(a), g.max(a), b.max(a))
+}
+
 /// The values of a picture's rows, made into pixels.
 fn pixel_rows<P: Copy + Send>(
     picture: &Picture,
@@ -243,7 +257,7 @@ fn pixel_rows<P: Copy + Send>(
 /// shares of full scale, floats as they are.
 fn stored_values(picture: &Picture, rows: Range<usize>) -> Image<[f32; 4]> {
     if picture.is_display_encoded() {
-        return picture.rows::<StraightRgba>(rows).map(encoded);
+        return picture.rows_as_srgb::<StraightRgba>(rows).map(encoded);
     }
     picture
         .rows::<PremulRgba>(rows)

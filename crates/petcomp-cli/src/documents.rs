@@ -1,14 +1,22 @@
-//! Recipes, scenes and options: the documents that several commands read.
+//! Recipes, scenes and options: the documents that several commands read, and what they refuse to
+//! write before they begin.
 
 use petcomp::dataset::{DatasetConfig, Pipeline};
 use petcomp::io::{self, Override};
-use petcomp::{Quality, Result, Scene};
+use petcomp::{Error, Quality, Result, Scene};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
 /// Options from a TOML file, or the defaults where there is none.
 pub(crate) fn read_options<T: Default + DeserializeOwned>(file: Option<&Path>) -> Result<T> {
     file.map_or_else(|| Ok(T::default()), io::read_toml)
+}
+
+/// Reads a scene that is possible: photos are opened by the size of its pictures.
+pub(crate) fn read_scene(path: &Path) -> Result<Scene> {
+    let scene: Scene = io::read_document(path)?;
+    scene.check().map_err(|e| e.in_file(path))?;
+    Ok(scene)
 }
 
 /// A recipe file, and values in it that are to be different.
@@ -40,6 +48,11 @@ impl RecipeArgs {
         Ok(DatasetConfig::read(&self.path, &overrides)?)
     }
 
+    /// Reads the recipe for a scene that is there already.
+    pub(crate) fn read_config_for(&self, scene: &Scene) -> Result<DatasetConfig> {
+        DatasetConfig::read_for_scene(&self.path, scene, &self.overrides)
+    }
+
     /// Opens the folders that the recipe names.
     pub(crate) fn open_pipeline(&self) -> anyhow::Result<Pipeline> {
         Ok(Pipeline::open(self.read_config()?)?)
@@ -67,8 +80,8 @@ impl SceneArgs {
         self.recipe.iter().chain([&self.path])
     }
 
-    pub(crate) fn read_scene(&self) -> anyhow::Result<Scene> {
-        Ok(io::read_document(&self.path)?)
+    pub(crate) fn read_scene(&self) -> Result<Scene> {
+        read_scene(&self.path)
     }
 
     /// Opens what the scene is made from, of which no target may be a part.
@@ -92,9 +105,40 @@ impl SceneArgs {
     fn config_for(&self, scene: &Scene, quality: Option<Quality>) -> Result<DatasetConfig> {
         let overrides = Quality::overrides_at(quality, self.overrides.iter().cloned());
         match &self.recipe {
-            Some(recipe) => DatasetConfig::read(recipe, &overrides),
+            Some(recipe) => DatasetConfig::read_for_scene(recipe, scene, &overrides),
             None => DatasetConfig::for_scene(scene, &self.path, &overrides),
         }
+    }
+}
+
+/// Fails on a picture to write that no format is known for, or no folder.
+pub(crate) fn check_picture_target(path: &Path) -> Result<()> {
+    let known = ["png", "jpg", "jpeg", "exr", "tif", "tiff"];
+    let expected = ".png, .jpg, .exr or .tif";
+    check_target(path, &known, expected)
+}
+
+/// The same of a scene.
+pub(crate) fn check_scene_target(path: &Path) -> Result<()> {
+    check_target(path, &["toml", "json"], ".toml or .json")
+}
+
+fn check_target(path: &Path, known: &[&str], expected: &str) -> Result<()> {
+    if known.iter().any(|end| io::has_extension(path, end)) {
+        return check_folder_of(path);
+    }
+    let what = format!("no format for this extension, expected {expected}");
+    Err(Error::file(path, what))
+}
+
+/// Fails on a file to write whose folder is not there.
+pub(crate) fn check_folder_of(path: &Path) -> Result<()> {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+            let what = format!("cannot be written: no folder {}", folder.display());
+            Err(Error::file(path, what))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -102,4 +146,31 @@ impl SceneArgs {
 pub(crate) fn stem_of(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default();
     stem.to_string_lossy().into_owned()
+}
+
+/// A path as one word of a command for the shell.
+pub(crate) fn shell_word(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "._-/".contains(c);
+    if text.chars().all(is_plain) {
+        return text;
+    }
+    format!("'{}'", text.replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_is_one_word_for_the_shell() {
+        let words = [
+            ("bg/a-1_b.label.json", "bg/a-1_b.label.json"),
+            ("my photos/a.json", "'my photos/a.json'"),
+            ("colleague's/$a.json", r"'colleague'\''s/$a.json'"),
+        ];
+        for (path, word) in words {
+            assert_eq!(shell_word(Path::new(path)), word);
+        }
+    }
 }

@@ -4,14 +4,14 @@ use crate::documents::stem_of;
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
 use crate::print;
-use crate::values::{count, parse_pixel_size};
+use crate::values::{check_companion, count, parse_pixel_size};
 use petcomp::dataset::YoloSet;
 use petcomp::eval::page::{self, EvalReportOptions, Metrics, Run};
 use petcomp::eval::{
     ConfusionOptions, EvalImage, Tags, read_coco_results, read_coco_truth, read_tags,
     read_yolo_detections, read_yolo_truth,
 };
-use petcomp::io;
+use petcomp::{Error, io};
 use std::path::{Component, Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -58,10 +58,12 @@ fn parse_confidence(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(args: &EvalArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let mut options = args.report_options();
+    args.check_options()?;
     args.check_inputs_stay()?;
     let runs = args.read_runs(&mut options)?;
     options.tags = args.tags_of(&runs)?;
     let metrics = args.measure(&runs, &options)?;
+    args.warn_of_empty_truth(&metrics);
     print_scores(&metrics, &options, global);
     print_factors(&runs, &options);
     if let Some(folder) = &args.output {
@@ -109,6 +111,23 @@ impl EvalArgs {
         split.map(|(_, runs)| runs).unwrap_or_default()
     }
 
+    /// Fails for an option that the truth has no use for, and for pictures that are nowhere.
+    fn check_options(&self) -> petcomp::Result<()> {
+        let is_yolo = self.paths.last().is_some_and(|truth| !is_coco(truth));
+        let yolo = "a folder of YOLO labels as TRUTH: COCO tells sizes itself";
+        check_companion("--size", self.size.is_some(), yolo, is_yolo)?;
+        match self.images.as_ref().filter(|folder| !folder.is_dir()) {
+            None => Ok(()),
+            Some(folder) => {
+                let what = format!(
+                    "no folder {}, expected that of the images",
+                    folder.display()
+                );
+                Err(Error::value("--images", what))
+            }
+        }
+    }
+
     /// Fails where a file of the evaluation would replace one that it is made from.
     fn check_inputs_stay(&self) -> petcomp::Result<()> {
         let Some(folder) = &self.output else {
@@ -136,6 +155,14 @@ impl EvalArgs {
         match &self.output {
             Some(folder) => page::write(folder, runs, options),
             None => Ok(runs.iter().map(|run| Metrics::of(run, options)).collect()),
+        }
+    }
+
+    fn warn_of_empty_truth(&self, metrics: &[Metrics]) {
+        let is_empty = |metrics: &Metrics| metrics.yolov5.classes.is_empty();
+        if let Some(truth) = self.paths.last().filter(|_| metrics.iter().all(is_empty)) {
+            let truth = truth.display();
+            log::warn!("{truth}: no object, so there was nothing to be found in any image");
         }
     }
 

@@ -22,11 +22,18 @@ pub(crate) fn interruption() -> &'static AtomicBool {
 }
 
 fn catch_interrupts() {
-    let ignored = ignored_signals();
-    if let Err(error) = ctrlc::set_handler(stop_soon) {
+    if let Err(error) = on_interrupt(stop_soon) {
         log::warn!("interrupts cannot be caught: {error}");
     }
+}
+
+/// Calls `handler` at every Ctrl-C, SIGTERM and SIGHUP, but for those that the program was started
+/// to ignore.
+pub(crate) fn on_interrupt(handler: impl FnMut() + Send + 'static) -> Result<(), ctrlc::Error> {
+    let ignored = ignored_signals();
+    let caught = ctrlc::set_handler(handler);
     ignored.into_iter().for_each(ignore);
+    caught
 }
 
 /// What the program was started to ignore, as `nohup` does with hang-ups and a script's shell with

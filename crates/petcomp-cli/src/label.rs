@@ -1,6 +1,6 @@
 //! `petcomp label`: scene -> outlines, boxes, visibility.
 
-use crate::documents::SceneArgs;
+use crate::documents::{SceneArgs, check_folder_of, check_picture_target};
 use crate::global::GlobalArgs;
 use petcomp::dataset::Pipeline;
 use petcomp::label::{self, Labels};
@@ -24,6 +24,7 @@ pub(crate) struct LabelArgs {
 }
 
 pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    args.check_targets()?;
     io::check_distinct(args.scene.files(), args.targets())?;
     let scene = args.scene.read_scene()?;
     let pipeline = args.scene.open_pipeline(&scene, None, args.targets())?;
@@ -36,6 +37,14 @@ pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 }
 
 impl LabelArgs {
+    /// Refuses what could not be written before anything is labelled.
+    fn check_targets(&self) -> petcomp::Result<()> {
+        let mut pictures = self.overlay.iter();
+        pictures.try_for_each(|path| check_picture_target(path))?;
+        let mut lists = self.polygons.iter().chain([&self.output]);
+        lists.try_for_each(|path| check_folder_of(path))
+    }
+
     /// The files to write.
     fn targets(&self) -> impl Iterator<Item = &PathBuf> {
         let more = self.overlay.iter().chain(&self.polygons);

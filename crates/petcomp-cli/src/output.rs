@@ -19,7 +19,7 @@ pub(crate) enum Output {
 impl Output {
     /// Reads a path or a URL; `file://` is a path.
     pub(crate) fn parse(text: OsString) -> Result<Self> {
-        match scheme_of(&text) {
+        match scheme_of(&text).as_deref() {
             None | Some("file") => parse_folder(text).map(Self::Folder),
             Some(_) => {
                 let url = text.to_string_lossy().into_owned();
@@ -60,7 +60,7 @@ pub(crate) fn folder_parser() -> impl TypedValueParser<Value = PathBuf> {
 }
 
 fn parse_folder(text: OsString) -> Result<PathBuf> {
-    match scheme_of(&text) {
+    match scheme_of(&text).as_deref() {
         None => Ok(text.into()),
         Some("file") => stores::folder_of(&text.to_string_lossy()),
         Some(_) => {
@@ -70,10 +70,12 @@ fn parse_folder(text: OsString) -> Result<PathBuf> {
     }
 }
 
-/// What stands before the `://` of a URL; none of a path.
-fn scheme_of(text: &OsStr) -> Option<&str> {
-    let (scheme, _) = text.to_str()?.split_once("://")?;
-    Some(scheme)
+/// What stands before the `://` of a URL, or before the `:/` of a file's, in small letters; none of
+/// a path.
+fn scheme_of(text: &OsStr) -> Option<String> {
+    let (scheme, rest) = text.to_str()?.split_once(":/")?;
+    let scheme = scheme.to_ascii_lowercase();
+    (scheme == "file" || rest.starts_with('/')).then_some(scheme)
 }
 
 fn scratch_name(url: &str) -> String {
@@ -107,5 +109,25 @@ mod stores {
         let what =
             "a URL, expected a folder: this program is built without the feature object-store";
         Error::value("output", what)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn urls_are_told_from_paths() {
+        for (text, scheme) in [
+            ("file:///a", Some("file")),
+            ("FILE:///a", Some("file")),
+            ("file:/a", Some("file")),
+            ("S3://bucket/a", Some("s3")),
+            ("file:a", None),
+            ("a:/b", None),
+            ("a/b", None),
+        ] {
+            assert_eq!(scheme_of(OsStr::new(text)).as_deref(), scheme, "{text}");
+        }
     }
 }

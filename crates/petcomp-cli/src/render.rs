@@ -1,6 +1,6 @@
 //! `petcomp render`: scene -> picture.
 
-use crate::documents::SceneArgs;
+use crate::documents::{SceneArgs, check_picture_target, check_scene_target};
 use crate::global::GlobalArgs;
 use anyhow::bail;
 use petcomp::composite::{self, Aov};
@@ -34,7 +34,7 @@ pub(crate) struct RenderArgs {
 }
 
 pub(crate) fn run(args: &RenderArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    args.check_output()?;
+    args.check_targets()?;
     io::check_distinct(args.scene.files(), args.targets())?;
     let scene = args.scene.read_scene()?;
     let pipeline = args
@@ -53,15 +53,17 @@ pub(crate) fn run(args: &RenderArgs, global: &GlobalArgs) -> anyhow::Result<()> 
 }
 
 impl RenderArgs {
-    /// Refuses a picture that could not be written before it is rendered.
-    fn check_output(&self) -> anyhow::Result<()> {
-        let path = self.output.display();
-        match extension_of(&self.output).as_str() {
-            "exr" => Ok(()),
-            _ if !self.aov.is_empty() => bail!("{path}: parts need a file called .exr"),
-            "tif" | "tiff" | "png" | "jpg" | "jpeg" => Ok(()),
-            _ => bail!("{path}: no format for this extension, expected .png, .jpg, .exr or .tif"),
+    /// Refuses what could not be written before anything is rendered.
+    fn check_targets(&self) -> anyhow::Result<()> {
+        if !self.aov.is_empty() && !io::has_extension(&self.output, "exr") {
+            let path = self.output.display();
+            bail!("{path}: parts need a file called .exr");
         }
+        let mut pictures = self.preview.iter().chain([&self.output]);
+        pictures.try_for_each(|path| check_picture_target(path))?;
+        let mut scenes = self.resolved.iter();
+        scenes.try_for_each(|path| check_scene_target(path))?;
+        Ok(())
     }
 
     /// What is written.

@@ -1,12 +1,12 @@
 //! `petcomp scene`: recipe -> scene.
 
-use crate::documents::RecipeArgs;
+use crate::documents::{RecipeArgs, read_scene};
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
 use crate::print;
-use petcomp::dataset::DatasetConfig;
+use petcomp::dataset::{DatasetConfig, Pipeline};
 use petcomp::scene::{Card, EdgeTreatment, PostProcess, cycles};
-use petcomp::{Scene, Shot, io};
+use petcomp::{LinearRgb, Scene, Shot, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
@@ -79,17 +79,16 @@ fn draw_scene(args: &DrawArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 }
 
 fn check_scene(path: &Path) -> anyhow::Result<()> {
-    let scene: Scene = io::read_document(path)?;
-    scene.check().map_err(|e| e.in_file(path))?;
+    let scene = read_scene(path)?;
     DatasetConfig::from_settings(&scene.settings, &[]).map_err(|e| e.in_file(path))?;
     print::line(format_args!("{}: possible", path.display()));
     Ok(())
 }
 
 fn export_scene(args: &ExportSceneArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let scene: Scene = io::read_document(&args.scene)?;
+    let scene = read_scene(&args.scene)?;
     let Renderer::Cycles = args.to;
-    let pipeline = args.recipe.open_pipeline()?;
+    let pipeline = Pipeline::open_for(args.recipe.read_config_for(&scene)?, &scene)?;
     let (scene, shot) = pipeline
         .resolve(scene)
         .map_err(|e| e.in_file(&args.scene))?;
@@ -114,6 +113,10 @@ fn left_out(scene: &Scene, shot: &Shot) -> Vec<&'static str> {
         (shot.holdout.is_some(), "what the walls hide"),
         (shot.motion_m != [0.0; 2], "motion blur"),
         (shot.cards.iter().any(bends), "refraction"),
+        (
+            shot.interreflection != LinearRgb::grey(shot.interreflection.g),
+            "the colour of the interreflection",
+        ),
         (shot.edges == EdgeTreatment::Poisson, "Poisson blending"),
         (scene.finish != PostProcess::default(), "the finish"),
     ];

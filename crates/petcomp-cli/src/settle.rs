@@ -1,5 +1,6 @@
 //! `petcomp settle`: dropped objects come to rest.
 
+use crate::documents::{check_folder_of, check_picture_target, check_scene_target};
 use crate::global::GlobalArgs;
 use petcomp::dataset::DatasetConfig;
 use petcomp::settle::{SettleOptions, Settled, preview, settle_traced, trace_csv};
@@ -32,6 +33,7 @@ pub(crate) struct SettleArgs {
 const TRACE_RATE: f64 = 60.0;
 
 pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    args.check_targets()?;
     io::check_distinct(args.inputs(), args.targets())?;
     let scene: Scene = io::read_document(&args.scene)?;
     let options = args.options_for(&scene)?;
@@ -49,6 +51,15 @@ pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> 
 impl SettleArgs {
     fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
         self.options.iter().chain([&self.scene])
+    }
+
+    /// Refuses what could not be written before anything falls.
+    fn check_targets(&self) -> petcomp::Result<()> {
+        check_scene_target(&self.output)?;
+        let mut pictures = self.preview.iter();
+        pictures.try_for_each(|path| check_picture_target(path))?;
+        let mut texts = self.trace.iter();
+        texts.try_for_each(|path| check_folder_of(path))
     }
 
     /// What is written.

@@ -1,6 +1,7 @@
 //! `petcomp studio`: pages in the browser of this machine.
 
 use crate::global::GlobalArgs;
+use crate::interruption::on_interrupt;
 use crate::print;
 use petcomp_studio::Server;
 use std::path::PathBuf;
@@ -22,7 +23,7 @@ pub(crate) fn run(args: &StudioArgs, global: &GlobalArgs) -> anyhow::Result<()> 
     print::line(server.address());
     global.print_status("open this address in a browser of this machine; Ctrl-C ends the studio");
     let stop = server.stop();
-    ctrlc::set_handler(move || stop.stop())?;
+    on_interrupt(move || stop.stop())?;
     server.run();
     Ok(())
 }

@@ -485,6 +485,31 @@ fn corners_that_are_given_stand_in_for_markers_that_are_not_found() {
 }
 
 #[test]
+fn corners_of_a_larger_size_of_the_photo_are_asked_about() {
+    let desk = Desk::with_recipe();
+    desk.photo("a b", IMAGE);
+    let corners = "300,200 1200,210 1190,900 290,890";
+    let init = [
+        "camera",
+        "init",
+        "bg/a b.png",
+        "--size",
+        "0.56x0.37",
+        "--corners",
+        corners,
+    ];
+    let said = desk.ok(&init).concat();
+    let question = "3 of 4 corners lie outside of the 640 x 480 picture";
+    assert!(said.contains(question), "{said}");
+    // The command that is proposed is one for the shell.
+    let command = "then `petcomp camera solve 'bg/a b.label.json'`";
+    assert!(said.contains(command), "{said}");
+    let solved = desk.run(&["camera", "solve", "bg/a b.label.json"]);
+    let told = text(&solved.stderr);
+    assert!(told.contains(question), "{told}");
+}
+
+#[test]
 fn no_camera_and_no_overlay_takes_the_place_of_the_photo() {
     let desk = Desk::with_recipe();
     for (photo, output) in [("a", "bg/a.png"), ("b.overlay", "bg/b.camera.json")] {

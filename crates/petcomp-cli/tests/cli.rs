@@ -435,14 +435,14 @@ fn a_list_whose_only_photo_a_person_rejected_leaves_an_empty_sheet() {
     );
     desk.ok(&build);
     assert!(height() < full && !desk.path("built/a/one.exr").exists());
-    // What gives no cut-out is no more on the sheet either.
+    // What gives no cut-out any more keeps its earlier one, on the sheet too.
     std::fs::remove_file(desk.path("one.review.json")).expect("a review");
     desk.ok(&build);
     let screen = petcomp::LinearRgb::new(0.04, 0.4, 0.08);
     let empty = petcomp::Image::filled(120, 80, screen);
     petcomp::io::write(desk.path("one.png"), &empty).expect("a picture");
     assert!(!desk.run(&build).status.success());
-    assert!(height() < full && !desk.path("built/a/one.png").exists());
+    assert!(height() == full && desk.path("built/a/one.png").exists());
 }
 
 #[test]
@@ -831,6 +831,14 @@ fn no_command_writes_over_what_it_reads() {
     let counts = r#""classes":[],"obstructed":0,"knotted":0,"retries":0"#;
     let line = format!(r#"{{"k":0,"part":"train",{counts},"files":{files}}}"#);
     desk.write("c/index.jsonl", line + "\n");
+    for joined in [
+        "c/annotations/instances_train.json",
+        "c/webdataset/train-000000.tar",
+    ] {
+        desk.write(joined, "joined");
+    }
+    desk.write("photos/1.png", "");
+    desk.write("photos/1.txt", "");
     desk.write("metrics.json", "{}");
     desk.write("res/factors.csv", "image,light\n");
     let files = [
@@ -845,6 +853,10 @@ fn no_command_writes_over_what_it_reads() {
         "c/images/0.png",
         "c/images/train/000000.png",
         "c/index.jsonl",
+        "c/annotations/instances_train.json",
+        "c/webdataset/train-000000.tar",
+        "photos/1.png",
+        "photos/1.txt",
         "metrics.json",
         "res/factors.csv",
     ];
@@ -875,6 +887,15 @@ fn no_command_writes_over_what_it_reads() {
         &words("dataset report c -o c/data.yaml")[..],
         &words("dataset sheet c -o ./c/index.jsonl")[..],
         &words("dataset sheet c -o c/images/train/000000.png")[..],
+        &words("dataset sheet c -o c/annotations/instances_train.json")[..],
+        &words("dataset report c -o c/webdataset/train-000000.tar")[..],
+        &words("dataset report a -o b/val.txt")[..],
+        &words("dataset report c --beside a -o b/val.txt")[..],
+        &words("dataset report c --beside photos -o photos/1.txt")[..],
+        &words("dataset fit --recipe recipe.toml -o recipe.toml")[..],
+        &words("dataset fit --recipe recipe.toml -o f.toml --page ./recipe.toml")[..],
+        &words("dataset fit c --recipe recipe.toml -o f.toml --page c/data.yaml")[..],
+        &words("dataset fit c --recipe recipe.toml -o c/images/0.png")[..],
         &words("eval p.json metrics.json -o .")[..],
         &words("eval p.json t.json --tags res/factors.csv -o res")[..],
     ] {
@@ -882,6 +903,64 @@ fn no_command_writes_over_what_it_reads() {
         assert!(told.contains("is read and would be written over"), "{told}");
     }
     assert!(content() == before);
+}
+
+#[test]
+fn a_fit_finds_out_at_once_where_it_cannot_write() {
+    let desk = Desk::new();
+    desk.write("recipe.toml", "");
+    let refused = |more: &str| {
+        let line = format!("dataset fit --recipe recipe.toml {more}");
+        desk.refused(&words(&line))
+    };
+    assert!(refused("-o none/f.toml").contains("no folder none"));
+    assert!(refused("-o f.toml --page none/f.html").contains("no folder none"));
+    assert!(refused("-o f.toml --page f.toml").contains("two files would go here"));
+}
+
+#[test]
+fn an_evaluation_takes_no_option_in_vain() {
+    let desk = Desk::new();
+    let picture = r#"{"id": 1, "file_name": "a.png"}"#;
+    let truth = format!(r#"{{"images": [{picture}], "annotations": [], "categories": []}}"#);
+    desk.write("truth.json", truth);
+    desk.write("found.json", "[]");
+    let eval =
+        |more: &'static str| [&words("eval found.json truth.json")[..], &words(more)].concat();
+    let told = desk.refused(&eval("--size 64x48"));
+    assert!(
+        told.contains("--size: given without a folder of YOLO labels"),
+        "{told}"
+    );
+    let told = desk.refused(&eval("--images nowhere"));
+    assert!(
+        told.contains("--images: no folder nowhere, expected"),
+        "{told}"
+    );
+    let output = desk.run(&eval("--rounds 0"));
+    let told = text(&output.stderr);
+    assert!(
+        output.status.success() && told.contains("truth.json: no object"),
+        "{told}"
+    );
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn images_that_no_list_can_name_are_refused() {
+    use std::os::unix::ffi::OsStrExt;
+    let desk = Desk::new();
+    write_unsplit_set(&desk, "set", 1, "[cap]");
+    let odd = std::ffi::OsStr::from_bytes(b"set/images/\xff.png");
+    desk.write(Path::new(odd), "");
+    for command in [
+        "dataset batches --real set --synthetic set -o b.jsonl",
+        "dataset subset set --head 1 -o half",
+        "dataset train-kit --real set --synthetic set -o kit",
+    ] {
+        let told = desk.refused(&words(command));
+        assert!(told.contains("a name that is not UTF-8"), "{told}");
+    }
 }
 
 #[test]
@@ -1283,6 +1362,13 @@ fn diff_speaks_like_idiff() {
             "{limit}: {refused}"
         );
     }
+    for scale in ["nan", "inf", "0"] {
+        let refused = desk.refused(&["diff", "--scale", scale, &a, &b]);
+        assert!(
+            refused.contains("expected a finite number above 0"),
+            "{scale}: {refused}"
+        );
+    }
 }
 
 #[test]
@@ -1297,6 +1383,36 @@ fn diff_compares_floats_as_they_are() {
     }
     let told = text(&desk.run(&["diff", "a.tif", "b.tif"]).stdout);
     assert!(told.contains("Max error  = 1 "), "{told}");
+}
+
+#[test]
+fn diff_compares_codes_as_they_are_whatever_the_profile() {
+    let desk = Desk::new();
+    for (name, code) in [("a.png", 100), ("b.png", 101)] {
+        let file = std::fs::File::create(desk.path(name)).expect("a file");
+        let mut encoder = png::Encoder::new(file, 1, 1);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_source_gamma(png::ScaledFloat::from_scaled(100_000));
+        let mut writer = encoder.write_header().expect("a PNG");
+        writer.write_image_data(&[code]).expect("a picture");
+    }
+    let told = text(&desk.run(&["diff", "a.png", "b.png"]).stdout);
+    assert!(told.contains("Max error  = 0.00392"), "{told}");
+}
+
+#[test]
+fn a_written_difference_shows_one_of_alpha_alone() {
+    let desk = Desk::new();
+    for (name, alpha) in [("a.exr", 0.25), ("b.exr", 0.5)] {
+        let clear = petcomp::PremulRgba::new(0.0, 0.0, 0.125, alpha);
+        let picture = petcomp::Image::filled(1, 1, clear);
+        petcomp::io::write(desk.path(name), &picture).expect("a picture");
+    }
+    let output = desk.run(&words("diff a.exr b.exr --scale 2 -o difference.exr"));
+    assert_eq!(output.status.code(), Some(2));
+    let written: petcomp::Image<petcomp::LinearRgb> =
+        petcomp::io::read(desk.path("difference.exr")).expect("a picture");
+    assert_eq!(written[(0, 0)], petcomp::LinearRgb::grey(0.5));
 }
 
 #[test]
@@ -1412,6 +1528,22 @@ fn compare_with_pin(found: &str) {
         pinned, found,
         "set {UPDATE}=1 to write it, and say why in CHANGELOG.md"
     );
+}
+
+#[cfg(unix)]
+#[test]
+fn files_that_are_written_behind_a_link_name_their_inputs() {
+    let desk = Desk::new();
+    std::fs::create_dir_all(desk.path("real/a/b")).expect("a folder");
+    std::os::unix::fs::symlink("real/a/b", desk.path("link")).expect("a link");
+    let samples = sample("");
+    let demo = words("demo -n 1 -q -o link/demo --samples");
+    desk.ok(&[&demo[..], &[samples.as_str()]].concat());
+    desk.ok(&words(
+        "scene draw link/demo/recipe.toml -k 3 --seed 5 -o scene.toml",
+    ));
+    desk.ok(&words("settle scene.toml -o link/rest.toml"));
+    desk.ok(&words("render link/rest.toml -o frame.exr"));
 }
 
 #[test]
@@ -1657,6 +1789,47 @@ fn a_scene_is_rendered_without_its_recipe() {
             .contains("far/off/bare.toml: files: missing, expected a table that names the folders"),
         "{refused}"
     );
+}
+
+#[test]
+fn a_scene_has_its_own_size_whatever_the_recipe_says() {
+    let desk = Desk::new();
+    demo(&desk);
+    desk.ok(&words(
+        "scene draw demo/recipe.toml --set scene.image=[160,120] -o s.toml",
+    ));
+    desk.ok(&words("render s.toml -o alone.png"));
+    desk.ok(&words("render s.toml demo/recipe.toml -o recipe.png"));
+    let bytes = |name: &str| std::fs::read(desk.path(name)).expect("a picture");
+    assert!(bytes("alone.png") == bytes("recipe.png"));
+    for recipe in ["", " demo/recipe.toml"] {
+        let set = format!("render s.toml{recipe} -o no.exr --set scene.gain_ev=5");
+        let told = desk.refused(&words(&set));
+        assert!(
+            told.contains("scene.gain_ev: decides how scenes are drawn"),
+            "{told}"
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_written_is_told_before_anything_is() {
+    let desk = Desk::new();
+    for line in [
+        "render s.toml -o a.exr --preview b.txt",
+        "render s.toml -o a.exr --preview no/b.png",
+        "render s.toml -o a.exr --resolved b.txt",
+        "label s.toml -o a.json --overlay b.abc",
+        "label s.toml -o a.json --polygons no/b.json",
+        "settle s.toml -o a.toml --preview b.abc",
+        "settle s.toml -o a.toml --trace no/b.csv",
+    ] {
+        let told = desk.refused(&words(line));
+        assert!(
+            told.contains("b.") && told.contains("expected .") || told.contains("no folder no"),
+            "{line}: {told}"
+        );
+    }
 }
 
 #[test]

@@ -5,6 +5,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 /// The status line of the answer to a GET.
 fn status(address: &str) -> String {
@@ -35,6 +36,28 @@ fn the_studio_answers_at_its_address_until_it_is_interrupted() {
         "HTTP/1.1 403 Forbidden"
     );
     kill_process(Pid::from_child(&studio), Signal::INT).unwrap();
+    assert!(studio.wait().unwrap().success());
+}
+
+#[test]
+fn a_studio_that_was_started_to_ignore_hang_ups_outlives_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut studio = Command::new("sh")
+        .args(["-c", "trap '' HUP; exec \"$0\" studio \"$1\""])
+        .arg(env!("CARGO_BIN_EXE_petcomp"))
+        .arg(folder.path())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(studio.stdout.take().unwrap()).lines();
+    let address = lines.next().unwrap().unwrap();
+    let id = Pid::from_child(&studio);
+    // It is printed before signals are caught, and answers after that.
+    assert_eq!(status(&address), "HTTP/1.1 200 OK");
+    kill_process(id, Signal::HUP).unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    assert_eq!(studio.try_wait().unwrap(), None);
+    kill_process(id, Signal::TERM).unwrap();
     assert!(studio.wait().unwrap().success());
 }
 

@@ -119,10 +119,16 @@ pub fn check(url: &str) -> Result<()> {
 /// The folder of a `file://` URL.
 ///
 /// # Errors
-/// [`Error::Value`] for any other, and for one that names another machine.
+/// [`Error::Value`] for any other, for one that names another machine, and for one with a query or
+/// a fragment, which are no part of a path.
 pub fn folder_of(url: &str) -> Result<PathBuf> {
-    let path = Url::parse(url).ok().and_then(|url| url.to_file_path().ok());
-    path.ok_or_else(|| Error::value("output", format!("\"{url}\", expected file:///FOLDER")))
+    let refused = |expected| Error::value("output", format!("\"{url}\", expected {expected}"));
+    let parsed = Url::parse(url).map_err(|_| refused("file:///FOLDER"))?;
+    if parsed.query().is_some() || parsed.fragment().is_some() {
+        return Err(refused("%23 for # and %3F for ?"));
+    }
+    let path = parsed.to_file_path();
+    path.map_err(|()| refused("file:///FOLDER"))
 }
 
 fn scheme_of(url: &Url) -> Result<Scheme> {
@@ -218,7 +224,16 @@ mod tests {
             folder_of("file:///a/b%20c").unwrap(),
             PathBuf::from("/a/b c")
         );
+        assert_eq!(folder_of("FILE:/a%23b").unwrap(), PathBuf::from("/a#b"));
         assert!(folder_of("file://elsewhere/a").is_err());
+    }
+
+    #[test]
+    fn a_query_or_a_fragment_is_no_part_of_a_folder() {
+        for url in ["file:///a/b#c", "file:///a/b?c"] {
+            let expected = format!("output: \"{url}\", expected %23 for # and %3F for ?");
+            assert_eq!(folder_of(url).unwrap_err().to_string(), expected);
+        }
     }
 
     #[test]

@@ -257,15 +257,18 @@ impl Checker<'_> {
         found.map(|path| io::relative(path, self.folder)).collect()
     }
 
-    /// Images with the bytes of another; images of an empty scene may well be the same.
+    /// Images with the bytes of an earlier one, which is one to train on where any of them is; images
+    /// of an empty scene may well be the same.
     fn find_duplicates(&mut self, images: &[CheckedImage]) {
         let mut known: BTreeMap<(u64, u32), &CheckedImage> = BTreeMap::new();
         for image in images {
-            let twin = image
-                .checksum
-                .and_then(|checksum| known.insert(checksum, image));
-            if let Some(twin) = twin.filter(|twin| !(image.is_empty && twin.is_empty)) {
-                let (code, message) = twin_message(image, twin);
+            let Some(checksum) = image.checksum else {
+                continue;
+            };
+            let first = *known.entry(checksum).or_insert(image);
+            let is_twin = !std::ptr::eq(first, image);
+            if is_twin && !(image.is_empty && first.is_empty) {
+                let (code, message) = twin_message(image, first);
                 self.add(&image.path, code, message);
             }
         }
@@ -363,14 +366,15 @@ impl Checker<'_> {
 
 /// What is wrong with an image that has the bytes of another, or is listed again.
 fn twin_message(image: &CheckedImage, twin: &CheckedImage) -> (Code, String) {
-    if image.path == twin.path && image.part != twin.part {
-        return (
-            Code::Leak,
-            "leak: validation image is also trained on".into(),
-        );
-    }
     let message = format!("the same bytes as {}", twin.path.display());
-    (Code::DuplicateImage, message)
+    match (image.part == twin.part, image.path == twin.path) {
+        (true, _) => (Code::DuplicateImage, message),
+        (false, false) => (Code::Leak, format!("leak: {message}")),
+        (false, true) => {
+            let message = "leak: validation image is also trained on";
+            (Code::Leak, message.into())
+        }
+    }
 }
 
 /// The images of a part that can be read, and what they are compared by.

@@ -89,7 +89,7 @@ pub(super) const KNOBS: [Knob; 5] = [
 const SLOPES: [f64; 2] = [0.4, 2.5];
 
 /// Temperatures that a camera's white has, kelvin.
-const WHITES_K: [f64; 2] = [1667.0, 25_000.0];
+const WHITES_K: [f64; 2] = [2000.0, 25_000.0];
 
 /// What a white balance does to red over blue, natural logarithm.
 fn log_red_over_blue(white_k: f64) -> f64 {

@@ -1,7 +1,6 @@
 //! What names files in a recipe, once it lies in another folder.
 
 use crate::dataset::DatasetConfig;
-use crate::dataset::environment_maps::seen_from;
 use crate::dataset::paths::folder_of;
 use crate::dataset::recipe_text::KeyEdit;
 use crate::error::Result;
@@ -30,23 +29,22 @@ pub(super) fn moved_paths(
 }
 
 fn moved_folder(key: &str, folder: &Path, to: &Path) -> Result<KeyEdit> {
-    let folder = io::relative(&io::absolute(folder)?, to);
-    Ok(KeyEdit::set(key, quoted(&folder.to_string_lossy())))
+    Ok(KeyEdit::set(key, moved(folder, to)?))
 }
 
 fn environment_files(config: &DatasetConfig, to: &Path) -> Result<Option<KeyEdit>> {
     let files = config.scene.environment.files.iter();
-    let files: Result<Vec<String>> = files
-        .map(|file| Ok(quoted(&seen_from(to, &config.folder, file)?)))
-        .collect();
-    let files = files?;
+    let files = files.map(|file| moved(&config.folder.join(file), to));
+    let files: Vec<String> = files.collect::<Result<_>>()?;
     let text = format!("[{}]", files.join(", "));
     Ok((!files.is_empty()).then(|| KeyEdit::set("scene.environment.files", text)))
 }
 
-/// A string as TOML.
-fn quoted(text: &str) -> String {
-    toml::Value::String(text.into()).to_string()
+/// A path as it is seen from a folder, as TOML.
+fn moved(path: &Path, to: &Path) -> Result<String> {
+    let path = io::relative_on_disk(path, to)?;
+    let text = io::path_text(&path)?;
+    Ok(toml::Value::String(text.into()).to_string())
 }
 
 #[cfg(test)]
@@ -73,6 +71,23 @@ mod tests {
         ];
         let expected = expected.map(|(key, text)| KeyEdit::set(key, text));
         assert_eq!(moved(&config, "c/fitted.toml"), expected);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_folder_that_no_recipe_can_name_is_refused() {
+        use std::os::unix::ffi::OsStrExt;
+        let odd = Path::new(std::ffi::OsStr::from_bytes(b"b\xff"));
+        let config = DatasetConfig {
+            backgrounds: odd.into(),
+            ..DatasetConfig::default()
+        };
+        let told = moved_paths(
+            &config,
+            Path::new("a/recipe.toml"),
+            Path::new("c/fitted.toml"),
+        );
+        assert!(told.unwrap_err().to_string().contains("not UTF-8"));
     }
 
     #[test]

@@ -61,6 +61,11 @@ fn is_finite(value: &Value) -> bool {
 }
 
 impl Override {
+    /// Where the value goes: `scene.objects`.
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
     /// Puts the value into a document; tables on the way are made where they are missing, list
     /// entries are not.
     pub(super) fn apply(&self, document: &mut toml::Table) -> Result<()> {

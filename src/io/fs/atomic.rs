@@ -203,8 +203,11 @@ pub fn absolute(path: &Path) -> Result<PathBuf> {
     std::path::absolute(path).map_err(|e| Error::file(path, e))
 }
 
-/// The relative path from a folder to a file or folder, both absolute.
+/// The relative path from a folder to a file or folder, both absolute; `.` to the folder itself.
 pub fn relative(to: &Path, from: &Path) -> PathBuf {
+    if to == from {
+        return ".".into();
+    }
     let shared = to
         .components()
         .zip(from.components())
@@ -212,6 +215,33 @@ pub fn relative(to: &Path, from: &Path) -> PathBuf {
         .count();
     let up = from.components().skip(shared).map(|_| Component::ParentDir);
     up.chain(to.components().skip(shared)).collect()
+}
+
+/// The relative path from a folder to a file or folder as the disk has them: the system climbs by
+/// `..` from where a link leads to, not from where it stands. A link that is the last step of `to`
+/// stays, and what is not there is taken as it is named.
+///
+/// # Errors
+/// As [`absolute`].
+pub fn relative_on_disk(to: &Path, from: &Path) -> Result<PathBuf> {
+    let (to, from) = (absolute(to)?, resolved(&absolute(from)?));
+    let place = match (to.parent(), to.file_name()) {
+        (Some(folder), Some(name)) => resolved(folder).join(name),
+        _ => resolved(&to),
+    };
+    Ok(relative(&place, &from))
+}
+
+/// A path from the root without links and `..`, step by step as the system walks it.
+fn resolved(path: &Path) -> PathBuf {
+    path.components().fold(PathBuf::new(), |mut place, step| {
+        if step == Component::ParentDir {
+            place.pop();
+        } else {
+            place.push(step);
+        }
+        place.canonicalize().unwrap_or(place)
+    })
 }
 
 /// A path with its last step of one name given another: `a/images/b/images/c.png` leads from images
@@ -259,6 +289,23 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
+    fn a_path_from_behind_a_link_climbs_as_the_system_does() {
+        let dir = tempfile::tempdir().unwrap();
+        let [folder, link, data] = ["real/a/b", "l", "data"].map(|name| dir.path().join(name));
+        create_folder(&folder).unwrap();
+        write_bytes(&data, b"x").unwrap();
+        std::os::unix::fs::symlink(&folder, &link).unwrap();
+        let beside = |to: &Path, from: &Path| relative_on_disk(to, from).unwrap();
+        assert_eq!(beside(&data, &link), Path::new("../../../data"));
+        assert!(link.join(beside(&data, &link)).is_file());
+        let deeper = beside(&data, &link.join("new"));
+        assert_eq!(deeper, Path::new("../../../../data"));
+        assert_eq!(beside(&link.join("../x"), &folder), Path::new("../x"));
+        assert_eq!(beside(&link, dir.path()), Path::new("l"));
+    }
+
+    #[cfg(unix)]
+    #[test]
     fn what_is_replaced_is_a_file_and_keeps_its_permissions() {
         use std::os::unix::fs::PermissionsExt;
         let dir = tempfile::tempdir().unwrap();
@@ -302,6 +349,14 @@ mod tests {
         write_bytes(&file, b"x").unwrap();
         let e = create_folder(file.join("labels")).unwrap_err().to_string();
         assert!(e.ends_with("out: is a file, expected a folder"), "{e}");
+    }
+
+    #[test]
+    fn the_way_from_a_folder_to_itself_is_a_dot() {
+        let way = |to: &str| relative(Path::new(to), Path::new("/a/b"));
+        assert_eq!(way("/a/b/").as_os_str(), ".");
+        assert_eq!(way("/a/b/c"), Path::new("c"));
+        assert_eq!(way("/a"), Path::new(".."));
     }
 
     #[test]

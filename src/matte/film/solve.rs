@@ -226,11 +226,15 @@ impl PixelMeasurement {
     }
 }
 
-/// The factor at which a channel is all screen: nothing reflects less than no light.
+/// The factor at which a channel is all screen: nothing reflects less than no light. Channels in
+/// which the screen has none bound nothing.
 #[inline(always)]
 fn largest_factor(pixel: [f32; 3], through: [f32; 3]) -> f32 {
     (0..3)
-        .map(|c| pixel[c] / through[c].max(f32::MIN_POSITIVE))
+        .map(|c| match through[c] > 0.0 {
+            true => pixel[c] / through[c],
+            false => f32::MAX,
+        })
         .fold(f32::MAX, f32::min)
 }
 

@@ -320,6 +320,34 @@ fn cardboard_and_wood_have_not_the_screens_hue() {
 }
 
 #[test]
+fn a_screen_outside_the_gamut_shows_what_is_let_through() {
+    let screen = LinearRgb::new(-0.09, 0.417, 0.056);
+    let plastic = LinearRgb::grey(0.074) + screen.scale(0.7);
+    let photo = inside().map(|c| if c.0 > 0.0 { plastic } else { screen });
+    let free = inside().map(|c| c.0 == 0.0);
+    let plate = ScreenPlate::fit(&photo, &free, &PlateOptions::default()).unwrap();
+    let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
+    let (film, t) = (found.film[(90, 60)], found.transmittance[(90, 60)]);
+    assert!((t.r - 0.7).abs() < 0.03, "{t:?}");
+    assert!((film.color.r - 0.074).abs() < 0.01, "{film:?}");
+}
+
+#[test]
+fn a_clipped_screen_is_told() {
+    let clipped = |green: f32| {
+        let screen = LinearRgb { g: green, ..GREEN };
+        let photo = inside().map(|c| screen.scale(1.0 - 0.4 * c.0));
+        let plate = ScreenPlate::even(screen, SIZE);
+        let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
+        found
+            .diagnostics
+            .iter()
+            .any(|d| d.code == Code::ClippedScreen)
+    };
+    assert!(clipped(1.0) && !clipped(GREEN.g));
+}
+
+#[test]
 fn an_opaque_red_card_has_no_uncertain_tint() {
     let card = LinearRgb::new(0.46, 0.02, 0.02);
     let photo = inside().map(|c| if c.0 > 0.0 { card } else { GREEN });

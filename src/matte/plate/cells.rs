@@ -111,15 +111,16 @@ fn add_to<const N: usize>(sums: &mut [f64; N], values: [f64; N]) {
 }
 
 /// The factor per channel from the second picture's cells to the first's: the median of their
-/// quotients.
+/// quotients, or 1 in a channel without light; none without cells that both have.
 pub(super) fn gain(photo: &[Cell], plate: &[Cell]) -> Option<LinearRgb> {
-    let [r, g, b] = [0, 1, 2].map(|c| {
+    pairs(photo, plate).next()?;
+    let gains = [0, 1, 2].map(|c| {
         let quotients = pairs(photo, plate)
             .filter(|(_, b)| b.color[c] > 0.0)
             .map(|(a, b)| a.color[c] / b.color[c]);
-        median(quotients, f64::total_cmp)
+        median(quotients, f64::total_cmp).unwrap_or(1.0) as f32
     });
-    Some([r? as f32, g? as f32, b? as f32].into())
+    Some(gains.into())
 }
 
 /// Median over the cells of the largest difference between the channels, as a share of the

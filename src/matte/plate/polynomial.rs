@@ -15,6 +15,8 @@ use rayon::prelude::*;
 #[derive(Clone, Debug)]
 pub(super) struct Polynomial {
     pub(super) degree: usize,
+    /// What is added to each channel before its logarithm.
+    lifts: [f64; 3],
     coefficients: [DVector<f64>; 3],
 }
 
@@ -51,11 +53,13 @@ impl Polynomial {
         size: (usize, usize),
         options: &PlateOptions,
     ) -> Result<Self> {
-        let samples = samples(cells, size, options.max_degree)?;
+        let lifts = [0, 1, 2].map(|c| lift(cells, c));
+        let samples = samples(cells, lifts, size, options.max_degree)?;
         let degree = chosen_degree(&samples, options);
         let all: Vec<&FitSample> = samples.iter().collect();
         Ok(Self {
             degree,
+            lifts,
             coefficients: [0, 1, 2].map(|c| robust_fit(&all, degree, c)),
         })
     }
@@ -72,8 +76,9 @@ impl Polynomial {
 
     fn fill_row(&self, v: f64, u: &[f32], row: &mut [LinearRgb]) {
         let [r, g, b] = [0, 1, 2].map(|c| exponentials(&self.row_coefficients(c, v), u));
+        let [lift_r, lift_g, lift_b] = self.lifts.map(|lift| lift as f32);
         for (pixel, (r, (g, b))) in row.iter_mut().zip(r.into_iter().zip(g.into_iter().zip(b))) {
-            *pixel = LinearRgb::new(r, g, b);
+            *pixel = LinearRgb::new(r - lift_r, g - lift_g, b - lift_b);
         }
     }
 
@@ -159,12 +164,27 @@ fn normalized_columns(size: (usize, usize)) -> Vec<f32> {
         .collect()
 }
 
-fn samples(cells: &[Cell], size: (usize, usize), max_degree: usize) -> Result<Vec<FitSample>> {
+/// What is added to a channel before its logarithm. A screen outside the gamut of Rec. 709 has less
+/// than no light in one: its least then lies as far above 0 as it lay below.
+fn lift(cells: &[Cell], channel: usize) -> f64 {
+    let values = cells.iter().map(|cell| cell.color[channel]);
+    match values.clone().sum::<f64>() < 0.0 {
+        true => -2.0 * values.fold(0.0, f64::min),
+        false => 0.0,
+    }
+}
+
+fn samples(
+    cells: &[Cell],
+    lifts: [f64; 3],
+    size: (usize, usize),
+    max_degree: usize,
+) -> Result<Vec<FitSample>> {
     let exponents = exponents(max_degree);
     let darkest = MIN_BRIGHTNESS * brightest_channel(cells)?;
     let samples = cells.iter().map(|cell| FitSample {
         basis: monomials(&exponents, normalized(cell.at_px, size)),
-        log: cell.color.map(|c| libm::log(c.max(darkest))),
+        log: [0, 1, 2].map(|c| libm::log((cell.color[c] + lifts[c]).max(darkest))),
     });
     Ok(samples.collect())
 }

@@ -163,6 +163,21 @@ fn a_photographed_screen_without_dirt_is_taken_as_it_lies() {
 }
 
 #[test]
+fn an_empty_screen_without_light_in_a_channel_is_a_plate() {
+    let without_red = |image: Image<LinearRgb>| image.map(|p| LinearRgb { r: 0.0, ..p });
+    let truth = without_red(screen(0.3));
+    let found = ScreenPlate::from_photo(
+        &truth.map(|p| p.scale(0.9)),
+        &without_red(photo(&truth, 0.002)),
+        &free(),
+        &PlateOptions::default(),
+    )
+    .unwrap();
+    assert!(worst(&found, &truth) < 0.03, "{}", worst(&found, &truth));
+    assert!(found.image.pixels().iter().all(|p| p.r == 0.0));
+}
+
+#[test]
 fn an_empty_screen_that_lies_too_far_off_is_refused() {
     let empty = dirty(&screen(0.0), [-6.0, 0.0]);
     let near = PlateOptions {

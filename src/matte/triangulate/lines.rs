@@ -5,9 +5,11 @@ use crate::matte::film::OPAQUE;
 use crate::pixel::{Coverage, LinearRgb};
 use crate::quantile::{median, quantile};
 
-/// Sums for a straight line through points.
+/// Sums for a straight line through points, about the x of the first: x that hardly differ would
+/// cancel in others.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ScreenLine {
+    first_x: f32,
     count: f32,
     x: f32,
     y: f32,
@@ -17,6 +19,10 @@ pub(super) struct ScreenLine {
 
 impl ScreenLine {
     pub(super) fn add(&mut self, x: f32, y: f32) {
+        if self.count == 0.0 {
+            self.first_x = x;
+        }
+        let x = x - self.first_x;
         self.count += 1.0;
         self.x += x;
         self.y += y;
@@ -29,9 +35,13 @@ impl ScreenLine {
         (self.xx - self.x * self.x / self.count).max(0.0)
     }
 
+    fn mean_x(&self) -> f32 {
+        self.first_x + self.x / self.count
+    }
+
     /// By how much a share that all x are off changes the slope, as a share of it.
     fn lever(&self) -> f32 {
-        self.x / self.count / self.spread().sqrt().max(f32::MIN_POSITIVE)
+        self.mean_x() / self.spread().sqrt().max(f32::MIN_POSITIVE)
     }
 
     fn slope(&self) -> f32 {
@@ -40,7 +50,7 @@ impl ScreenLine {
 
     /// Mean of the values less a slope's part.
     fn intercept(&self, slope: f32) -> f32 {
-        (self.y - slope * self.x) / self.count
+        self.y / self.count - slope * self.mean_x()
     }
 }
 
@@ -55,6 +65,11 @@ impl PixelLines {
     /// Transmittance of a channel as its line has it.
     pub(super) fn slope(&self, channel: usize) -> f32 {
         self.lines[channel].slope()
+    }
+
+    /// The same of a channel that may be open, without what noise alone can give.
+    fn bounded_slope(&self, channel: usize) -> f32 {
+        self.slope(channel).clamp(-1.0, 2.0)
     }
 
     /// Standard deviation of a channel's slope.
@@ -198,7 +213,7 @@ impl Inferred {
     #[inline]
     fn measured_and_expected(&self, pixel: &PixelLines, channel: usize) -> (f64, f64) {
         let (share, bare) = self.shares(pixel);
-        let measured = pixel.slope(channel).clamp(-1.0, 2.0) - bare;
+        let measured = pixel.bounded_slope(channel) - bare;
         (
             f64::from(measured),
             f64::from(share * self.plastic[channel]),
@@ -222,12 +237,13 @@ impl Inferred {
     pub(super) fn complete(&self, pixel: &PixelLines) -> PixelFilm {
         let (share, bare) = self.shares(pixel);
         let channels = [0, 1, 2].map(|c| {
-            let (slope, sigma) = (pixel.slope(c), pixel.sigma(c));
+            let sigma = pixel.sigma(c);
             if self.determined[c] {
-                (slope.clamp(0.0, 1.0), sigma)
+                (pixel.slope(c).clamp(0.0, 1.0), sigma)
             } else {
                 let inferred = share * self.plastic[c] + bare;
-                mixed((slope, sigma), inferred, share * self.spread[c])
+                let measured = (pixel.bounded_slope(c), sigma);
+                mixed(measured, inferred, share * self.spread[c])
             }
         });
         PixelFilm::new(pixel, channels)

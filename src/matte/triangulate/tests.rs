@@ -86,6 +86,43 @@ fn two_screens_without_noise_are_exact_where_they_differ() {
 }
 
 #[test]
+fn a_channel_in_which_the_plates_hardly_differ_follows_from_the_others() {
+    let mask = inside();
+    let plates = [(GREEN, 1.0_f32), (BLUE, 1.00001)].map(|(screen, gain)| {
+        let image = Image::from_fn(SIZE.0, SIZE.1, |x, _| {
+            LinearRgb::new(gain * (0.3 + 0.001 * x as f32), screen.g, screen.b)
+        });
+        ScreenPlate {
+            image,
+            ..ScreenPlate::even(screen, SIZE)
+        }
+    });
+    let photos = plates.each_ref().map(|plate| {
+        Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+            let (f, _) = truth(x as f64, y as f64);
+            f + plate.image[(x, y)].scale(1.0 - 0.3 * mask[(x, y)].0)
+        })
+    });
+    let shots = [(&photos[0], &plates[0]), (&photos[1], &plates[1])];
+    let found = triangulate(&shots, &mask, &TriangulateOptions::default()).unwrap();
+    for t in lines::covered_pixels(&found.transmittance, &mask) {
+        assert!((t.r - 0.7).abs() < 0.02, "{t:?}");
+    }
+}
+
+#[test]
+fn a_clipped_screen_is_told_with_its_photo() {
+    let clipped = |second| {
+        let found = solved(&[GREEN, second], [0.0; 2], 0.0).unwrap();
+        let mut diagnostics = found.diagnostics.into_iter();
+        diagnostics.find(|d| d.code == Code::ClippedScreen)
+    };
+    let told = clipped(LinearRgb { b: 1.0, ..BLUE }).unwrap().message;
+    assert!(told.starts_with("photo 2: 100 % of the screen"), "{told}");
+    assert!(clipped(BLUE).is_none());
+}
+
+#[test]
 fn three_screens_determine_every_channel() {
     let found = solved(&[GREEN, BLUE, RED], [0.0; 2], 0.003).unwrap();
     assert_eq!(found.determined, [true; 3]);

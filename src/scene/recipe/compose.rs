@@ -170,7 +170,8 @@ impl Recipe {
         self.surface_albedo.or(background.albedo)
     }
 
-    /// The recipe's, or that of the light where the surface's own colour is known.
+    /// The recipe's, or that of the light where the surface's own colour is known and the recipe's
+    /// is the default.
     fn cast(&self, background: &Background) -> LightTint {
         match (self.albedo_of(background), self.cast) {
             (Some(Albedo::Color(albedo)), LightTint::MatchSurface { share, .. }) => {

@@ -98,7 +98,8 @@ pub struct Recipe {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface_albedo: Option<Albedo>,
     /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's.
-    /// Default: white.
+    /// Where the surface's own colour is known, white stands for all of it; light stays white with
+    /// `{ match_surface = { share = 0 } }`. Default: white.
     pub cast: LightTint,
     /// Where the first light stands: `match_walls` finds it by which walls of the surface the photo
     /// shows bright, within the error of that, `match_walls_exactly` as if it had none. Default:
@@ -241,13 +242,24 @@ impl Recipe {
     pub fn check_room(&self, backgrounds: &[Background], catalog: &[AssetVariant]) -> Result<()> {
         let recipe = self.narrowed();
         recipe.check_selections(catalog)?;
-        for background in recipe.viewpoints.slice_of(backgrounds) {
-            recipe.lens.check_folds(background)?;
+        if recipe.negatives > 0.0 {
+            recipe.check_folds(self.places_of_negatives(backgrounds))?;
+        }
+        let viewpoints = recipe.viewpoints.slice_of(backgrounds);
+        recipe.check_folds(viewpoints)?;
+        for background in viewpoints {
             for variant in catalog.iter().filter(|v| recipe.draws_from(v.role)) {
                 recipe.check_fit(background, variant)?;
             }
         }
         Ok(())
+    }
+
+    /// Fails on the first background whose pictures the lens folds over.
+    fn check_folds(&self, backgrounds: &[Background]) -> Result<()> {
+        backgrounds
+            .iter()
+            .try_for_each(|background| self.lens.check_folds(background))
     }
 
     /// Fails if a photo of an asset at its largest fits between the walls of a background in no

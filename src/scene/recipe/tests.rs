@@ -1,7 +1,8 @@
 use super::*;
 use crate::asset::Role;
+use crate::camera::{Camera, tilted_camera};
 use crate::color::Albedo;
-use crate::geom::{Point3, Vector3};
+use crate::geom::{Point3, Vector2, Vector3};
 use crate::light::irradiance;
 use crate::pixel::LinearRgb;
 use crate::scene::{
@@ -187,6 +188,32 @@ fn negatives_come_from_all_backgrounds_whatever_the_viewpoints() {
 }
 
 #[test]
+fn a_lens_must_not_fold_the_pictures_of_negatives_over_either() {
+    let seen = Background {
+        camera: CameraSource::Known(Camera {
+            focal_px: Vector2::new(150.0, 152.0),
+            ..tilted_camera()
+        }),
+        ..tray("b")
+    };
+    let mut recipe = Recipe {
+        viewpoints: Take::First(1),
+        negatives: 0.1,
+        ..Recipe::default()
+    };
+    recipe.lens.k1 = Range::new(-1.5, 0.0);
+    let places = [tray("a"), seen];
+    let told = recipe.check_room(&places, &catalog(10)).unwrap_err();
+    let told = told.to_string();
+    assert!(
+        told.starts_with("lens.k1: -1.5,") && told.ends_with("(background b)"),
+        "{told}"
+    );
+    recipe.negatives = 0.0;
+    assert!(recipe.check_room(&places, &catalog(10)).is_ok());
+}
+
+#[test]
 fn at_most_once_is_an_error_where_there_are_too_few_assets() {
     let once = |objects: Range| Recipe {
         objects: objects.into(),
@@ -284,6 +311,7 @@ fn a_surface_of_known_colour_tells_that_of_the_light_too() {
     let matched = |share, albedo| LightTint::MatchSurface { share, albedo };
     assert_eq!(cast(LightTint::default()), matched(1.0, albedo));
     assert_eq!(cast(matched(0.5, LinearRgb::WHITE)), matched(0.5, albedo));
+    assert_eq!(cast(matched(0.0, LinearRgb::WHITE)), matched(0.0, albedo));
     let own = LightTint::Known(LinearRgb::new(2.0, 1.0, 0.5));
     assert_eq!(cast(own), own);
 }

@@ -89,7 +89,7 @@ const VARIANTS: [Variant; 5] = [
 ///
 /// # Errors
 /// Those of [`YoloSet::open`] and [`Balance::weights`]; [`Error::Value`] when the two datasets name
-/// other classes.
+/// other classes; [`Error::File`] for an image, or a folder for the kit, whose name is not UTF-8.
 pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     let real = YoloSet::open(&whole_folder(&options.real)?)?;
     let synthetic = open_for_training(&whole_folder(&options.synthetic)?)?;
@@ -99,9 +99,13 @@ pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     let (variants, left_out) = VARIANTS
         .iter()
         .partition::<Vec<_>, _>(|variant| variant.has_validation(&synthetic));
+    let whole = io::absolute(folder)?;
+    let (place, lists) = (io::path_text(&whole)?, lists_of(&real, &synthetic)?);
     io::create_folder(folder)?;
-    write_lists(folder, &real, &synthetic)?;
-    write_variants(folder, &variants, &real.classes)?;
+    for (name, list) in lists {
+        io::write_text(folder.join(format!("{name}.txt")), &list)?;
+    }
+    write_variants(folder, place, &variants, &real.classes)?;
     io::write_json(folder.join("balance.json"), &balance)?;
     let commands = commands_head(options, counts) + &without_validation(&left_out);
     write_scripts(folder, &(commands + &training_commands(options, &variants)))
@@ -113,11 +117,16 @@ fn write_scripts(folder: &Path, commands: &str) -> Result<()> {
     io::write_text(folder.join("commands.sh"), commands)
 }
 
-fn write_variants(folder: &Path, variants: &[&Variant], classes: &[String]) -> Result<()> {
-    let whole = io::absolute(folder)?;
+/// `place` is the folder's whole path.
+fn write_variants(
+    folder: &Path,
+    place: &str,
+    variants: &[&Variant],
+    classes: &[String],
+) -> Result<()> {
     for variant in variants {
         let path = folder.join(format!("{}.yaml", variant.name));
-        io::write_text(path, &variant.to_yaml(&whole, classes))?;
+        io::write_text(path, &variant.to_yaml(place, classes))?;
     }
     Ok(())
 }
@@ -130,17 +139,18 @@ fn balance_document(balance: &Balance, [real, synthetic]: [u64; 2]) -> Result<se
     }))
 }
 
-/// A list of the images of each part of both datasets.
-fn write_lists(folder: &Path, real: &YoloSet, synthetic: &YoloSet) -> Result<()> {
-    for (name, images) in [
+/// A list of the images of each part of both datasets, with its name.
+fn lists_of(real: &YoloSet, synthetic: &YoloSet) -> Result<Vec<(&'static str, String)>> {
+    let parts = [
         ("real_train", &real.train),
         ("real_val", &real.val),
         ("synthetic_train", &synthetic.train),
         ("synthetic_val", &synthetic.val),
-    ] {
-        write_list(&folder.join(format!("{name}.txt")), images)?;
-    }
-    Ok(())
+    ];
+    let lists = parts.into_iter();
+    lists
+        .map(|(name, images)| Ok((name, list_of(images)?)))
+        .collect()
 }
 
 /// Fails where two datasets that are trained on together, in these folders, name other classes.
@@ -158,12 +168,11 @@ pub fn check_classes([real, synthetic]: [&YoloSet; 2], folders: [&Path; 2]) -> R
     Err(Error::value("classes", what))
 }
 
-fn write_list(path: &Path, images: &[PathBuf]) -> Result<()> {
-    let lines: String = images
-        .iter()
-        .map(|path| format!("{}\n", path.display()))
-        .collect();
-    io::write_text(path, &lines)
+fn list_of(images: &[PathBuf]) -> Result<String> {
+    let lines = images.iter();
+    lines
+        .map(|path| Ok(format!("{}\n", io::path_text(path)?)))
+        .collect()
 }
 
 fn whole_folder(folder: &Path) -> Result<PathBuf> {
@@ -191,8 +200,8 @@ impl Variant {
     }
 
     /// With a string of JSON for the kit's folder, which is one of YAML too.
-    fn to_yaml(&self, folder: &Path, classes: &[String]) -> String {
-        let path = serde_json::json!(folder.to_string_lossy());
+    fn to_yaml(&self, folder: &str, classes: &[String]) -> String {
+        let path = serde_json::json!(folder);
         let (count, train, val) = (classes.len(), yaml_list(self.train), yaml_list(self.val));
         let names = yaml_names(classes);
         format!(
@@ -344,6 +353,24 @@ mod tests {
             let set = YoloSet::open(&elsewhere).unwrap();
             assert!(set.train.iter().chain(&set.val).all(|image| image.exists()));
         }
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn names_that_no_list_can_hold_are_refused_before_anything_is_written() {
+        use std::os::unix::ffi::OsStrExt;
+        let root = tempfile::tempdir().unwrap();
+        let [real, made] = ["real", "made"].map(|name| dataset(root.path(), name, [2, 1], "[cap]"));
+        let odd = std::ffi::OsStr::from_bytes(b"kit\xff");
+        let refused = |kit: &Path| {
+            let told = write(kit, &KitOptions::new(&real, &made)).unwrap_err();
+            assert!(told.to_string().contains("not UTF-8"), "{told}");
+            assert!(!kit.exists());
+        };
+        refused(&root.path().join(odd));
+        let images = real.join("images/train");
+        std::fs::rename(images.join("0.png"), images.join(odd).with_extension("png")).unwrap();
+        refused(&root.path().join("kit"));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! `petcomp camera init` and `markers`: labels for photos.
 
-use crate::documents::stem_of;
+use super::outside::warn_of_outside;
+use crate::documents::{shell_word, stem_of};
 use crate::global::GlobalArgs;
 use crate::values::{parse_corners, parse_metres};
 use petcomp::camera::{self, Label};
@@ -44,15 +45,16 @@ pub(crate) struct MarkersArgs {
 
 pub(super) fn init_label(args: &InitLabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let path = args.output_path();
-    let shown = path.display();
     args.check_is_free(&path)?;
     io::check_distinct(args.like.iter().chain([&args.photo]), [&path])?;
     let label = args.with_markers(args.known_label(&path)?)?;
     io::write_text(&path, &camera::commented(&label)?)?;
+    warn_of_outside(path.display(), &label);
     let corners = args.describe_corners(marker_corners(&label));
+    let word = shell_word(&path);
     global.print_written(
         &path,
-        format_args!("{corners}; then `petcomp camera solve {shown}`"),
+        format_args!("{corners}; then `petcomp camera solve {word}`"),
     );
     Ok(())
 }

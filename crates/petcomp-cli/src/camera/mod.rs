@@ -2,6 +2,7 @@
 
 mod export;
 mod label;
+mod outside;
 mod rectify;
 mod solve;
 

@@ -1,5 +1,6 @@
 //! `petcomp camera solve`, `joint` and `doctor`: cameras from labels.
 
+use super::outside::warn_of_outside;
 use crate::batch::FileBatch;
 use crate::diagnostics::report_diagnostics;
 use crate::global::GlobalArgs;
@@ -131,6 +132,9 @@ pub(super) fn solve_joint(args: &JointArgs, global: &GlobalArgs) -> anyhow::Resu
 
 /// Solves photos of one camera, and reports those that contradict the others.
 fn solve_together(members: &[LabelledPhoto]) -> petcomp::Result<Vec<JointOutcome>> {
+    for member in members {
+        warn_of_outside(member, &member.label);
+    }
     let joint = camera::solve_joint(&labels_of(members), &SolveOptions::default())
         .map_err(|e| located(e, &members[0]))?;
     for outlier in &joint.outliers {
@@ -175,6 +179,7 @@ pub(super) fn explain_each(args: &LabelFileArgs) -> anyhow::Result<()> {
 }
 
 fn solve_label(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
+    warn_of_outside(labelled, &labelled.label);
     let solution = camera::solve(&labelled.label, &SolveOptions::default());
     solution.map_err(|e| located(e, labelled))
 }

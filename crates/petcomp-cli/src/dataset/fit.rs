@@ -1,8 +1,10 @@
 //! `petcomp dataset fit`: a recipe comes nearer to the real place.
 
+use crate::documents::check_folder_of;
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
 use crate::print;
+use petcomp::dataset::YoloSet;
 use petcomp::dataset::fit::{Fit, FitOptions, FitPlan, FittedKey, fit};
 use petcomp::io;
 use std::path::PathBuf;
@@ -28,6 +30,7 @@ pub(crate) struct FitArgs {
 }
 
 pub(crate) fn run(args: &FitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    args.check_targets()?;
     let display = global.start_progress("falls and pictures");
     let plan = args.plan();
     let fitted = fit(&plan, &|done, of| display.update(done, of), interruption())?;
@@ -51,6 +54,20 @@ impl FitArgs {
                 ..FitOptions::default()
             },
         }
+    }
+
+    /// Fails where something that is read would be written over, or a folder to write into is
+    /// missing: the work in between takes long.
+    fn check_targets(&self) -> petcomp::Result<()> {
+        let targets = [self.output.clone(), self.page_path()];
+        let mut read = vec![self.recipe.clone()];
+        for target in &targets {
+            check_folder_of(target)?;
+            if let Some(real) = &self.real {
+                read.extend(YoloSet::files_like(real, target)?);
+            }
+        }
+        io::check_distinct(read, targets)
     }
 
     fn page_path(&self) -> PathBuf {

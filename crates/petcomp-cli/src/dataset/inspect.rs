@@ -5,7 +5,7 @@ use crate::exit::NeedsReview;
 use crate::global::GlobalArgs;
 use crate::print::{self, counted};
 use petcomp::dataset::page::DatasetReportOptions;
-use petcomp::dataset::{self, Checked, JOURNAL, contact_sheet_of};
+use petcomp::dataset::{self, Checked, JOURNAL, YoloSet, contact_sheet_of};
 use petcomp::io;
 use std::path::{Path, PathBuf};
 
@@ -114,6 +114,9 @@ fn page_folder(page: &Path) -> &Path {
     folder.unwrap_or(Path::new("."))
 }
 
+/// Folders of what is joined from the files of many samples, which the journal does not list.
+const JOINED: [&str; 4] = ["annotations", "mot", "voc", "webdataset"];
+
 /// Fails where a file of the dataset would be written over.
 fn check_dataset_stays(folder: &Path, output: &Path) -> petcomp::Result<()> {
     // A file that is not there yet is none of the dataset's.
@@ -125,12 +128,22 @@ fn check_dataset_stays(folder: &Path, output: &Path) -> petcomp::Result<()> {
     let listed = dataset::listed_files(folder).unwrap_or_default();
     let listed = listed.into_iter();
     let alike = listed.filter(|file| file.file_name() == real.file_name());
-    io::check_distinct(own.into_iter().chain(alike), [output])
+    let lists = YoloSet::choosing_files(folder).unwrap_or_default();
+    let joined = is_joined(folder, &real).then_some(real.clone());
+    let files = own.into_iter().chain(alike).chain(lists).chain(joined);
+    io::check_distinct(files, [output])
+}
+
+fn is_joined(folder: &Path, file: &Path) -> bool {
+    let folder = folder.canonicalize().unwrap_or_default();
+    let below = file.strip_prefix(folder);
+    below.is_ok_and(|below| JOINED.iter().any(|name| below.starts_with(name)))
 }
 
 fn write_report(args: &ReportArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let output = args.page_path();
     check_dataset_stays(&args.folder, &output)?;
+    args.check_beside_stays(&output)?;
     let page = dataset::page::page(&args.folder, &args.options_for(&output))?;
     io::write_text(&output, &page.document())?;
     global.print_look_at(&output);
@@ -138,6 +151,14 @@ fn write_report(args: &ReportArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 }
 
 impl ReportArgs {
+    /// Fails where a file of the user's own pictures would be written over.
+    fn check_beside_stays(&self, output: &Path) -> petcomp::Result<()> {
+        match &self.beside {
+            Some(beside) => io::check_distinct(YoloSet::files_like(beside, output)?, [output]),
+            None => Ok(()),
+        }
+    }
+
     fn options_for(&self, page: &Path) -> DatasetReportOptions {
         DatasetReportOptions {
             most: self.most,

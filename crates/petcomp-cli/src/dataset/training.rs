@@ -10,7 +10,7 @@ use petcomp::eval::{YoloTruth, read_yolo_truth_of};
 use petcomp::io;
 use petcomp::train::kit::KitOptions;
 use petcomp::train::{self, Anchors, Balance, Batch, BatchOptions, Source, Weights};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum TrainingCommand {
@@ -105,12 +105,12 @@ pub(super) fn run(command: &TrainingCommand, global: &GlobalArgs) -> anyhow::Res
 
 fn plan_batches(args: &BatchesArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let sets = MixedSets::open(&args.sets)?;
-    args.check_sets_stay(&sets)?;
+    args.check_sets_stay()?;
     let options = BatchOptions {
         size: args.sets.batch,
         seed: args.seed,
     };
-    let lines = sets.lines(args.epochs, &options);
+    let lines = sets.lines(args.epochs, &options)?;
     io::write_text(&args.output, &lines.concat())?;
     let (batches, weights) = (lines.len(), sets.describe_weights());
     global.print_written(&args.output, format_args!("{batches} batches; {weights}"));
@@ -119,19 +119,10 @@ fn plan_batches(args: &BatchesArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 
 impl BatchesArgs {
     /// Fails where a file of the sets would be written over.
-    fn check_sets_stay(&self, sets: &MixedSets) -> petcomp::Result<()> {
-        // A file that is not there yet is none of theirs, which may have very many.
-        let Ok(real) = self.output.canonicalize() else {
-            return Ok(());
-        };
+    fn check_sets_stay(&self) -> petcomp::Result<()> {
         let folders = [&self.sets.real, &self.sets.synthetic].into_iter();
-        let choosing = folders.map(|folder| YoloSet::choosing_files(folder));
-        let mut files = choosing.collect::<petcomp::Result<Vec<_>>>()?.concat();
-        let images = [&sets.real, &sets.synthetic].map(YoloSet::series).concat();
-        let theirs = images
-            .into_iter()
-            .flat_map(|image| [YoloSet::label_of(&image), image]);
-        files.extend(theirs.filter(|file| file.file_name() == real.file_name()));
+        let files = folders.map(|folder| YoloSet::files_like(folder, &self.output));
+        let files = files.collect::<petcomp::Result<Vec<_>>>()?.concat();
         io::check_distinct(files, [&self.output])
     }
 }
@@ -161,18 +152,14 @@ impl MixedSets {
         format!("weights real {real:.4}, synthetic {synthetic:.4}")
     }
 
-    fn lines(&self, epochs: u64, options: &BatchOptions) -> Vec<String> {
-        let epochs = 0..epochs;
-        epochs
-            .flat_map(|epoch| self.epoch_lines(epoch, options))
-            .collect()
-    }
-
-    fn epoch_lines(&self, epoch: u64, options: &BatchOptions) -> Vec<String> {
-        let batches = self.batches(epoch, options).into_iter();
-        batches
-            .map(|batch| self.batch_line(epoch, &batch))
-            .collect()
+    fn lines(&self, epochs: u64, options: &BatchOptions) -> petcomp::Result<Vec<String>> {
+        let mut lines = Vec::new();
+        for epoch in 0..epochs {
+            for batch in self.batches(epoch, options) {
+                lines.push(self.batch_line(epoch, &batch)?);
+            }
+        }
+        Ok(lines)
     }
 
     fn batches(&self, epoch: u64, options: &BatchOptions) -> Vec<Batch> {
@@ -181,13 +168,14 @@ impl MixedSets {
     }
 
     /// A line of JSON: epoch, source, weight of the loss, images.
-    fn batch_line(&self, epoch: u64, batch: &Batch) -> String {
+    fn batch_line(&self, epoch: u64, batch: &Batch) -> petcomp::Result<String> {
         let (list, weight) = self.images_and_weight(batch.source);
-        let images: Vec<&Path> = batch.images.iter().map(|&i| &*list[i]).collect();
+        let images = batch.images.iter().map(|&i| io::path_text(&list[i]));
+        let images: Vec<&str> = images.collect::<petcomp::Result<_>>()?;
         let line = serde_json::json!({
             "epoch": epoch, "source": batch.source, "weight": weight, "images": images
         });
-        format!("{line}\n")
+        Ok(format!("{line}\n"))
     }
 
     fn images_and_weight(&self, source: Source) -> (&[PathBuf], f64) {

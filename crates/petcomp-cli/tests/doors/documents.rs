@@ -321,11 +321,12 @@ fn scene(world: &World, file: &str) {
     }
     let setup: DatasetConfig = toml::from_str("").unwrap();
     let folders = |folder: &str| world.path(folder);
-    let setup = DatasetConfig {
+    let mut setup = DatasetConfig {
         assets: folders("assets"),
         backgrounds: folders("backgrounds"),
         ..setup
     };
+    setup.scene.image = scene.image;
     let Some(pipeline) = ends(Pipeline::open_for(setup, &scene)) else {
         return;
     };

@@ -6,25 +6,23 @@ use exr::prelude::{LayerAttributes, Text};
 /// Start of the first attribute: behind the magic number and the version.
 pub(super) const FIRST_ATTRIBUTE: usize = 8;
 
-/// A text that an EXR can hold.
-pub(super) fn latin_text(text: &str) -> Result<Text, String> {
-    Text::new_or_none(text).ok_or_else(|| format!("{text:?} cannot stand in an EXR (not Latin-1)"))
+/// A text as OpenEXR's own library takes it: UTF-8, where the `exr` crate would write Latin-1.
+pub(super) fn utf8_text(text: &str) -> Text {
+    Text::from_slice_unchecked(text.as_bytes())
+}
+
+/// What a text of a file says: Latin-1 where it is not UTF-8.
+pub(super) fn string_of(text: &Text) -> String {
+    let utf8 = std::str::from_utf8(text.as_slice());
+    utf8.map_or_else(|_| text.to_string(), str::to_owned)
 }
 
 /// Adds texts to a layer's own attributes.
-pub(super) fn add_texts(
-    attributes: &mut LayerAttributes,
-    metadata: &[(String, String)],
-) -> Result<(), String> {
+pub(super) fn add_texts(attributes: &mut LayerAttributes, metadata: &[(String, String)]) {
     for (key, value) in metadata {
-        let value = text_attribute(value)?;
-        attributes.other.insert(latin_text(key)?, value);
+        let value = AttributeValue::Text(utf8_text(value));
+        attributes.other.insert(utf8_text(key), value);
     }
-    Ok(())
-}
-
-fn text_attribute(text: &str) -> Result<AttributeValue, String> {
-    latin_text(text).map(AttributeValue::Text)
 }
 
 /// An attribute among the bytes of a file: name, kind, length and value.
@@ -74,4 +72,16 @@ pub(super) fn sort_attributes(file: &mut [u8], start: usize) -> Option<usize> {
     attributes.sort();
     file[start..at].copy_from_slice(&attributes.concat());
     Some(at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_that_is_not_utf_8_is_latin_1() {
+        for bytes in ["grün".as_bytes(), b"gr\xfcn"] {
+            assert_eq!(string_of(&Text::from_slice_unchecked(bytes)), "grün");
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! EXR files of several parts: pictures of one size, each with channels of its own.
 
-use super::attributes::{FIRST_ATTRIBUTE, add_texts, latin_text, sort_attributes};
+use super::attributes::{FIRST_ATTRIBUTE, add_texts, sort_attributes, utf8_text};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
     LayerAttributes, SmallVec, Vec2, WritableImage,
@@ -83,10 +83,10 @@ fn part_layer(
     for (name, samples) in &part.channels {
         let samples = samples.to_flat();
         check_count(&samples, (width, height)).map_err(|e| part.error_in(name, &e))?;
-        list.push(AnyChannel::new(latin_text(name)?, samples));
+        list.push(AnyChannel::new(utf8_text(name), samples));
     }
-    let mut attributes = LayerAttributes::named(latin_text(&part.name)?);
-    add_texts(&mut attributes, &part.metadata)?;
+    let mut attributes = LayerAttributes::named(utf8_text(&part.name));
+    add_texts(&mut attributes, &part.metadata);
     let (encoding, channels) = (Encoding::SMALL_LOSSLESS, AnyChannels::sort(list));
     Ok(Layer::new(
         Vec2(width, height),

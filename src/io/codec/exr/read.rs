@@ -1,5 +1,6 @@
 //! Headers and pixels of EXR files.
 
+use super::attributes::string_of;
 use super::blocks::{PartReader, SampleOrder};
 use super::chroma::{LUMINANCE_CHROMA, Sampling, to_rgb};
 use crate::color::RgbSpace;
@@ -117,7 +118,7 @@ impl<'a> CheckedFile<'a> {
     fn is_finished(&self, part: usize) -> bool {
         let name = &self.meta.headers[part].own_attributes.layer_name;
         name.as_ref()
-            .is_some_and(|name| is_finished(&name.to_string()))
+            .is_some_and(|name| is_finished(&string_of(name)))
     }
 
     fn channel_names(&self, part: usize) -> Vec<String> {
@@ -126,7 +127,7 @@ impl<'a> CheckedFile<'a> {
 
     fn picked_names(&self, part: usize, picked: &[usize]) -> Vec<String> {
         let list = &self.meta.headers[part].channels.list;
-        picked.iter().map(|&i| list[i].name.to_string()).collect()
+        picked.iter().map(|&i| string_of(&list[i].name)).collect()
     }
 
     /// What all parts are shown in.
@@ -301,7 +302,7 @@ fn first_bytes(file: &mut impl Read) -> Result<Vec<u8>, exr::error::Error> {
 
 fn listed_names(channels: &ChannelList) -> Vec<String> {
     let list = channels.list.iter();
-    list.map(|channel| channel.name.to_string()).collect()
+    list.map(|channel| string_of(&channel.name)).collect()
 }
 
 /// Bytes of the largest kind of sample.
@@ -341,7 +342,7 @@ fn text_attributes(header: &exr::meta::header::Header) -> Notes {
     let all = own.chain(&header.shared_attributes.other);
     let mut notes: Notes = all
         .filter_map(|(name, value)| match value {
-            AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
+            AttributeValue::Text(text) => Some((string_of(name), string_of(text))),
             _ => None,
         })
         .collect();
@@ -448,6 +449,23 @@ mod tests {
         let text = String::from_utf8_lossy(&file()).into_owned();
         assert!(text.find("channels").unwrap() < text.find("compression").unwrap());
         assert!(text.find("petcomp:3").unwrap() < text.find("petcomp:4").unwrap());
+    }
+
+    #[test]
+    fn texts_are_utf_8() {
+        let (channel, key, value) = ("grün.Z", "petcomp:größe", "grün, 瓶子");
+        let notes = vec![(key.to_owned(), value.to_owned())];
+        let planes = vec![(channel, float_samples(vec![1.0]))];
+        let file = encode((1, 1), planes, Compression::None, &notes).unwrap();
+        for text in [channel, key, value] {
+            let mut places = file.windows(text.len());
+            assert!(places.any(|bytes| bytes == text.as_bytes()), "{text}");
+        }
+        let read = header(file.as_slice(), 10_000, &Limits::default()).unwrap();
+        assert_eq!(
+            (read.channels, read.metadata),
+            (vec![channel.to_owned()], notes)
+        );
     }
 
     #[test]

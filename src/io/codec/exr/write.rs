@@ -1,6 +1,6 @@
 //! EXR files of one part.
 
-use super::attributes::{FIRST_ATTRIBUTE, add_texts, latin_text, sort_attributes};
+use super::attributes::{FIRST_ATTRIBUTE, add_texts, sort_attributes, utf8_text};
 use super::parts::check_count;
 use exr::prelude::Compression as Method;
 use exr::prelude::{
@@ -40,7 +40,7 @@ pub(crate) fn encode(
 ) -> Result<Vec<u8>, String> {
     let mut attributes = LayerAttributes::default();
     let channels = channel_list(size, planes)?;
-    add_texts(&mut attributes, metadata)?;
+    add_texts(&mut attributes, metadata);
     let encoding = Encoding {
         compression: compression.method(),
         ..Encoding::SMALL_LOSSLESS
@@ -72,5 +72,5 @@ fn checked_channel(
     size: (usize, usize),
 ) -> Result<AnyChannel<FlatSamples>, String> {
     check_count(&samples, size).map_err(|e| format!("channel {name}: {e}"))?;
-    Ok(AnyChannel::new(latin_text(name)?, samples))
+    Ok(AnyChannel::new(utf8_text(name), samples))
 }
