@@ -3,7 +3,7 @@
 use super::MANIFEST;
 use super::entry::PhotoEntry;
 use super::files;
-use super::folder::{CutOutWriter, is_rejected, lock, read_or_new, refusal};
+use super::folder::{CutOutWriter, is_rejected, lock, read_or_new, refusal, take_out};
 use super::library::{Library, Photo};
 use super::list::{List, check_not_written_over, check_reviews, find_list};
 use super::manifest::{Manifest, PhotoRecord};
@@ -163,7 +163,7 @@ fn record(
     check_goes_on(stop)?;
     let mut manifest = read_or_new(folder)?;
     list.add_classes_to(&mut manifest)?;
-    let taken = take_in(list, outcomes, &mut manifest);
+    let taken = take_in(list, outcomes, folder, &mut manifest);
     if !taken.removed.is_empty() || !taken.photos.is_empty() {
         manifest.write(folder)?;
     }
@@ -180,23 +180,26 @@ struct TakenIn {
     refused: Vec<String>,
     /// How many of these a person rejected.
     rejected: usize,
-    /// Earlier cut-outs of the rejected ones that the manifest had.
+    /// Earlier cut-outs of them that went.
     removed: Vec<String>,
     /// The first that could not be read or written, or fits no asset.
     failed: Option<Error>,
 }
 
-/// Puts the cut-outs of a list into a manifest, and takes out those that a person rejected.
-fn take_in(list: &List, outcomes: Vec<Result<Photo>>, manifest: &mut Manifest) -> TakenIn {
+/// Puts the cut-outs of a list into the manifest of a folder, and takes out those that go.
+fn take_in(
+    list: &List,
+    outcomes: Vec<Result<Photo>>,
+    folder: &Path,
+    manifest: &mut Manifest,
+) -> TakenIn {
     let mut taken = TakenIn::default();
     for (i, (outcome, entry)) in outcomes.into_iter().zip(&list.photos).enumerate() {
         match outcome.and_then(|photo| inserted(photo, entry, manifest)) {
             Ok(photo) => taken.photos.push(photo),
             Err(error @ Error::Photo { .. }) => {
-                let (file, rejected) = (entry.cut_out_file(), is_rejected(entry));
-                if rejected && manifest.remove(&file) {
-                    taken.removed.push(file);
-                }
+                let rejected = is_rejected(entry);
+                taken.removed.extend(take_out(entry, folder, manifest));
                 let error = refusal(error, entry, manifest);
                 taken.refused.push(error.to_string());
                 taken.rejected += usize::from(rejected);

@@ -62,9 +62,11 @@ pub fn add_photo(
     let outcome = writer.write(entry);
     let _alone = lock(folder)?;
     let mut manifest = read_or_new(folder)?;
-    if outcome.is_err() && is_rejected(entry) && manifest.remove(&entry.cut_out_file()) {
+    if let Err(Error::Photo { .. }) = &outcome
+        && let Some(file) = take_out(entry, folder, &mut manifest)
+    {
         manifest.write(folder)?;
-        files::remove(folder, &entry.cut_out_file())?;
+        files::remove(folder, &file)?;
     }
     let photo = outcome.map_err(|e| refusal(e, entry, &manifest))?;
     manifest.add_classes(classes, entry.label_class().into_iter())?;
@@ -89,6 +91,18 @@ pub(super) fn lock(folder: &Path) -> Result<Option<File>> {
 pub(super) fn is_rejected(entry: &PhotoEntry) -> bool {
     let review = Review::of_photo(&entry.file).ok().flatten();
     review.is_some_and(|review| review.is_rejected())
+}
+
+/// Takes the earlier cut-out of a photo that gives none out of the manifest, where a person rejected
+/// it or the file is not the manifest's, as after a build that was broken off; the file that goes.
+pub(super) fn take_out(
+    entry: &PhotoEntry,
+    folder: &Path,
+    manifest: &mut Manifest,
+) -> Option<String> {
+    let file = entry.cut_out_file();
+    let goes = is_rejected(entry) || !manifest.is_file_of(folder, &file);
+    (goes && manifest.remove(&file)).then_some(file)
 }
 
 /// Why a photo gave no cut-out, and that an earlier one stays: it may be a slip in an option.

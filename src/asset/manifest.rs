@@ -7,7 +7,7 @@ use super::{DEFAULT_THICKNESS, MANIFEST};
 use crate::bounds::{Bounds, MASS, OBJECT, PX_PER_METRE, THICKNESS, WIDTH};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
-use crate::io;
+use crate::io::{self, Checksum};
 use crate::matte::MatteMethod;
 use crate::pixel::LinearRgb;
 use serde::de::IgnoredAny;
@@ -284,6 +284,16 @@ impl Manifest {
     pub(super) fn has(&self, file: &str) -> bool {
         let mut photos = self.assets.iter().flat_map(|asset| &asset.photos);
         photos.any(|photo| photo.file == file)
+    }
+
+    /// The file of a cut-out is the one that it tells of; where it has no checksum any is.
+    pub(super) fn is_file_of(&self, folder: &Path, file: &str) -> bool {
+        let mut photos = self.assets.iter().flat_map(|asset| &asset.photos);
+        let told = photos.find(|photo| photo.file == file);
+        told.and_then(|photo| photo.crc32).is_none_or(|crc32| {
+            let found = Checksum::from_file(folder.join(file));
+            found.is_ok_and(|found| found.crc32 == crc32)
+        })
     }
 
     /// Takes classes into the list: those that are declared, in that order, or else those in use,

@@ -68,6 +68,7 @@ pub use moments::{Moments, Piece};
 #[doc(hidden)]
 pub use open_photo::OpenPhoto;
 pub use panorama::Panorama;
+pub(crate) use panorama::warn_of_bits;
 pub use review::{Review, Verdict};
 #[doc(hidden)]
 pub use role::Role;

@@ -34,7 +34,7 @@ impl Panorama {
         })
     }
 
-    /// Reads a panorama from a file, an HDR or EXR as a rule: one of 8 bits is warned of.
+    /// Reads a panorama from a file, an HDR or EXR as a rule.
     ///
     /// # Errors
     /// Those of [`io::read`]; those of [`new`](Self::new), and [`Error::Field`] for a picture that
@@ -43,7 +43,6 @@ impl Panorama {
         let path = path.as_ref();
         let image: Image<LinearRgb> = io::read(path)?;
         check_shape(image.size()).map_err(|e| e.in_file(path))?;
-        warn_of_bits(path)?;
         Self::new(image).map_err(|e| e.in_file(path))
     }
 
@@ -106,7 +105,7 @@ fn check_shape((width, height): (usize, usize)) -> Result<()> {
 }
 
 /// Of 8 bits the brightest are cut off, and with them most of the light of lamps and of the sun.
-fn warn_of_bits(path: &Path) -> Result<()> {
+pub(crate) fn warn_of_bits(path: &Path) -> Result<()> {
     let header = io::read_header(path)?;
     if header.bits == 8 && header.format != Format::Hdr {
         let path = path.display();

@@ -363,11 +363,17 @@ fn unlabelled_photos(folder: &Path, labelled: &BTreeSet<&OsStr>) -> Vec<String> 
     names
 }
 
-/// A picture that is neither hidden nor an overlay or a mask of a photo.
+/// A picture that is neither hidden, nor an overlay or a mask of a photo, nor of a kind that
+/// environment maps have.
 fn is_photo(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let is_made = name.ends_with(".overlay.png") || name.ends_with(".front.png");
-    !name.starts_with('.') && !is_made && Format::from_extension(path).is_some()
+    // Light of the surroundings may lie beside photos.
+    let is_other = matches!(
+        Format::from_extension(path),
+        None | Some(Format::Exr | Format::Hdr)
+    );
+    !name.starts_with('.') && !is_made && !is_other
 }
 
 /// The walls of a surface of this size, as its label says.
@@ -462,6 +468,8 @@ mod tests {
             "B.JPG",
             "._a2.jpg",
             ".hidden.png",
+            "sky.exr",
+            "sky.hdr",
             "notes.txt",
         ];
         for file in files {

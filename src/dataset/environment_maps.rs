@@ -1,6 +1,6 @@
 //! Pictures of the surroundings that recipes and scenes name, decoded once.
 
-use crate::asset::Panorama;
+use crate::asset::{Panorama, warn_of_bits};
 use crate::dataset::DatasetConfig;
 use crate::error::{Error, Result};
 use crate::io;
@@ -54,8 +54,9 @@ impl EnvironmentMaps {
         }
         // Decoded before the list is locked: the work is parallel, and a thread that waits may come
         // back here.
-        let picture = Panorama::read(self.path(name)?)?;
-        Ok(self.keep(name, picture))
+        let path = self.path(name)?;
+        let picture = Panorama::read(&path)?;
+        self.keep(name, picture, &path)
     }
 
     /// What a recipe lists may lie anywhere; what a scene names beside that, in the recipe's
@@ -77,15 +78,16 @@ impl EnvironmentMaps {
         kept.last().map(|(_, picture)| picture.clone())
     }
 
-    fn keep(&self, name: &str, picture: Panorama) -> Arc<Panorama> {
+    fn keep(&self, name: &str, picture: Panorama, path: &Path) -> Result<Arc<Panorama>> {
         if let Some(known) = self.find(name) {
-            return known;
+            return Ok(known);
         }
+        warn_of_bits(path)?;
         let picture = Arc::new(picture);
         let mut kept = self.kept();
         kept.push((name.to_owned(), picture.clone()));
         drop_oldest(&mut kept);
-        picture
+        Ok(picture)
     }
 
     fn kept(&self) -> MutexGuard<'_, Vec<(String, Arc<Panorama>)>> {

@@ -147,7 +147,7 @@ fn leave_out_formats(settings: &mut Table) {
 fn check_override(given: &io::Override) -> Result<()> {
     let path = given.path();
     let counts = |key: &&str| path.starts_with(*key);
-    if path.starts_with("scene.") && !KEYS_BESIDE_A_SCENE.iter().any(counts) {
+    if (path == "scene" || path.starts_with("scene.")) && !KEYS_BESIDE_A_SCENE.iter().any(counts) {
         return Err(only_drawn(path));
     }
     Ok(())
@@ -349,6 +349,8 @@ mod tests {
         let expected =
             "scene.gain_ev: decides how scenes are drawn, expected a change of the scene itself";
         assert_eq!(told, expected);
+        let whole = given("scene={gain_ev=5}").unwrap_err();
+        assert!(whole.starts_with("scene: decides"), "{whole}");
         for counts in ["scene.settle.attempts=3", "pictures.jpeg_quality=5"] {
             assert!(given(counts).is_ok(), "{counts}");
         }

@@ -51,11 +51,19 @@ pub fn read_yolo_truth(
 
 /// A dataset's folder has the labels of all its parts, and texts that are none.
 fn refuse_dataset(folder: &Path) -> Result<()> {
-    let is_there = |name: &&str| folder.join(name).is_file();
-    let Some(file) = ["data.yaml", "dataset.json"].into_iter().find(is_there) else {
+    let is_file = |name: &&str| folder.join(name).is_file();
+    let file = ["data.yaml", "dataset.json"].into_iter().find(is_file);
+    let parts = [
+        "labels/val",
+        "labels",
+        "valid/labels",
+        "val/labels",
+        "train/labels",
+    ];
+    let mut parts = parts.into_iter().map(|part| folder.join(part));
+    let (Some(file), Some(labels)) = (file, parts.find(|part| part.is_dir())) else {
         return Ok(());
     };
-    let labels = folder.join("labels/val");
     let what = format!(
         "a dataset (it has {file}), expected a folder of labels, such as {}",
         labels.display()
@@ -478,7 +486,9 @@ mod tests {
     #[test]
     fn a_whole_dataset_is_no_folder_of_labels() {
         for file in ["data.yaml", "dataset.json"] {
-            let set = folder(&[(file, ""), ("labels/train/a.txt", BOX)]);
+            let flat = folder(&[(file, ""), ("a.txt", BOX)]);
+            assert!(read_yolo_truth(flat.path(), None, Some([9, 9])).is_ok());
+            let set = folder(&[(file, ""), ("labels/val/a.txt", BOX)]);
             let told = read_yolo_truth(set.path(), None, Some([9, 9])).unwrap_err();
             let (told, labels) = (told.to_string(), set.path().join("labels/val"));
             assert!(told.contains(file), "{told}");

@@ -319,7 +319,7 @@ fn write_sheet(folder: &Path, library: &Library, global: &GlobalArgs) -> anyhow:
 }
 
 /// Draws the contact sheet of a folder whose manifest is another than before, though photos failed:
-/// earlier cut-outs of them may be gone.
+/// others may be new, and cut-outs of rejected ones gone.
 fn refresh_sheet(folder: &Path, before: Option<&Manifest>, global: &GlobalArgs) {
     if Manifest::read(folder).ok().as_ref() == before {
         return;

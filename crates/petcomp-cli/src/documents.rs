@@ -25,7 +25,7 @@ pub(crate) struct RecipeArgs {
     /// Recipe file (TOML): names the folders of assets and backgrounds, and what to draw
     #[arg(value_name = "RECIPE")]
     pub(crate) path: PathBuf,
-    /// Replace a value of the recipe: scene.objects=[4,12]
+    /// Replace a value of the recipe: render.subsamples=8
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<Override>,
 }

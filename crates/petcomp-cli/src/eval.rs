@@ -118,13 +118,10 @@ impl EvalArgs {
         check_companion("--size", self.size.is_some(), yolo, is_yolo)?;
         match self.images.as_ref().filter(|folder| !folder.is_dir()) {
             None => Ok(()),
-            Some(folder) => {
-                let what = format!(
-                    "no folder {}, expected that of the images",
-                    folder.display()
-                );
-                Err(Error::value("--images", what))
-            }
+            Some(folder) => Err(Error::file(
+                folder,
+                "no such folder, expected that of the images",
+            )),
         }
     }
 

@@ -499,7 +499,7 @@ fn corners_of_a_larger_size_of_the_photo_are_asked_about() {
         corners,
     ];
     let said = desk.ok(&init).concat();
-    let question = "3 of 4 corners lie outside of the 640 x 480 picture";
+    let question = "3 of 4 corners lie outside the 640 x 480 picture";
     assert!(said.contains(question), "{said}");
     // The command that is proposed is one for the shell.
     let command = "then `petcomp camera solve 'bg/a b.label.json'`";

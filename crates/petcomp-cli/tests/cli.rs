@@ -934,7 +934,7 @@ fn an_evaluation_takes_no_option_in_vain() {
     );
     let told = desk.refused(&eval("--images nowhere"));
     assert!(
-        told.contains("--images: no folder nowhere, expected"),
+        told.contains("nowhere: no such folder, expected that of the images"),
         "{told}"
     );
     let output = desk.run(&eval("--rounds 0"));

@@ -97,7 +97,7 @@ fn address(path: &Path) -> String {
         .map(percent_encoded)
         .collect();
     // Before a colon would stand a scheme.
-    if text.starts_with('/') {
+    if text.starts_with('/') || text.starts_with("./") {
         text
     } else {
         format!("./{text}")

@@ -219,15 +219,18 @@ pub fn relative(to: &Path, from: &Path) -> PathBuf {
 
 /// The relative path from a folder to a file or folder as the disk has them: the system climbs by
 /// `..` from where a link leads to, not from where it stands. A link that is the last step of `to`
-/// stays, and what is not there is taken as it is named.
+/// stays, unless it leads to a folder around `from`, and what is not there is taken as it is named.
 ///
 /// # Errors
 /// As [`absolute`].
 pub fn relative_on_disk(to: &Path, from: &Path) -> Result<PathBuf> {
     let (to, from) = (absolute(to)?, resolved(&absolute(from)?));
+    let real = resolved(&to);
     let place = match (to.parent(), to.file_name()) {
+        // The way to a folder around `from` needs no link.
+        _ if from.starts_with(&real) => real,
         (Some(folder), Some(name)) => resolved(folder).join(name),
-        _ => resolved(&to),
+        _ => real,
     };
     Ok(relative(&place, &from))
 }
@@ -302,6 +305,8 @@ mod tests {
         assert_eq!(deeper, Path::new("../../../../data"));
         assert_eq!(beside(&link.join("../x"), &folder), Path::new("../x"));
         assert_eq!(beside(&link, dir.path()), Path::new("l"));
+        assert_eq!(beside(&link, &link).as_os_str(), ".");
+        assert_eq!(beside(&link, &link.join("out")), Path::new(".."));
     }
 
     #[cfg(unix)]

@@ -111,16 +111,17 @@ fn add_to<const N: usize>(sums: &mut [f64; N], values: [f64; N]) {
 }
 
 /// The factor per channel from the second picture's cells to the first's: the median of their
-/// quotients, or 1 in a channel without light; none without cells that both have.
+/// quotients, or 1 in a channel without light; none where no channel has any, or without cells that
+/// both have.
 pub(super) fn gain(photo: &[Cell], plate: &[Cell]) -> Option<LinearRgb> {
-    pairs(photo, plate).next()?;
     let gains = [0, 1, 2].map(|c| {
         let quotients = pairs(photo, plate)
-            .filter(|(_, b)| b.color[c] > 0.0)
+            .filter(|(_, b)| b.color[c] != 0.0)
             .map(|(a, b)| a.color[c] / b.color[c]);
-        median(quotients, f64::total_cmp).unwrap_or(1.0) as f32
+        median(quotients, f64::total_cmp)
     });
-    Some(gains.into())
+    let has_light = gains.iter().any(Option::is_some);
+    has_light.then(|| gains.map(|gain| gain.unwrap_or(1.0) as f32).into())
 }
 
 /// Median over the cells of the largest difference between the channels, as a share of the

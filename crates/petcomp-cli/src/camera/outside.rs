@@ -19,7 +19,7 @@ fn question_of_outside(label: &Label) -> Option<String> {
     let is_before = corners.iter().flatten().any(|&at| at < 0.0);
     (count > 1 && !is_before).then(|| {
         format!(
-            "{count} of 4 corners lie outside of the {w} x {h} picture; were they marked in another size of it?"
+            "{count} of 4 corners lie outside the {w} x {h} picture; were they marked in another size of it?"
         )
     })
 }
@@ -38,7 +38,7 @@ mod tests {
             [290.0, 890.0],
         ];
         let told = asked(larger).unwrap_or_default();
-        assert!(told.starts_with("3 of 4 corners lie outside of the 640 x 480 picture;"));
+        assert!(told.starts_with("3 of 4 corners lie outside the 640 x 480 picture;"));
         let one = [[10.0, 10.0], [600.0, 10.0], [700.0, 500.0], [10.0, 400.0]];
         assert_eq!(asked(one), None);
         // A surface that fills more than the picture.
