@@ -9,10 +9,15 @@ use super::list::{List, check_not_written_over, check_reviews, find_list};
 use super::manifest::{Manifest, PhotoRecord};
 use super::screen_source::EmptyScreens;
 use crate::error::{Error, Result};
+use crate::io;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Memory that a photo takes for each of its pixels while it is cut out: 130 bytes, measured with
+/// photos of 12 and 24 megapixels.
+const BYTES_PER_PIXEL: u64 = 140;
 
 /// What [`build`] did.
 #[derive(Clone, Debug)]
@@ -140,15 +145,39 @@ fn cut_out_all(
         options: &list.cut_out,
         empty_screens: EmptyScreens::shared_by(list.photos.iter().map(|photo| &photo.screen)),
     };
-    list.photos
-        .par_iter()
-        .map(|entry| {
-            check_goes_on(stop)?;
-            let photo = writer.write(entry);
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
-            photo
-        })
-        .collect()
+    let write = |entry: &PhotoEntry| {
+        check_goes_on(stop)?;
+        let photo = writer.write(entry);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
+        photo
+    };
+    let mut outcomes = Vec::with_capacity(count);
+    for photos in list.photos.chunks(photos_at_once(&list.photos)) {
+        outcomes.par_extend(photos.par_iter().map(write));
+    }
+    outcomes
+}
+
+/// How many of these photos are worked on at once: all, if there is memory for one on each thread.
+fn photos_at_once(photos: &[PhotoEntry]) -> usize {
+    let headers = photos
+        .iter()
+        .filter_map(|photo| io::read_header(&photo.file).ok());
+    let pixels = headers.map(|header| (header.width * header.height) as u64);
+    let fitting = fitting_photos(io::machine_bytes(), pixels.max().unwrap_or(0));
+    if fitting < rayon::current_num_threads() {
+        fitting
+    } else {
+        photos.len().max(1)
+    }
+}
+
+/// How many photos of so many pixels half of the machine's memory holds while they are cut out, one
+/// at least; any number where the memory is not known.
+fn fitting_photos(machine_bytes: Option<u64>, pixels: u64) -> usize {
+    let need = pixels.saturating_mul(BYTES_PER_PIXEL).max(1);
+    let fitting = machine_bytes.map_or(u64::MAX, |bytes| bytes / 2 / need);
+    usize::try_from(fitting.max(1)).unwrap_or(usize::MAX)
 }
 
 /// Takes the cut-outs of a list into the manifest as it is by now: another process may have changed
@@ -236,7 +265,6 @@ mod tests {
     use crate::diagnostic::{Code, Diagnostic};
     use crate::geom::Point2;
     use crate::image::Image;
-    use crate::io;
     use crate::matte::{Claim, CutOutOptions, MatteMethod, Stroke};
     use crate::pixel::{Film, LinearRgb};
 
@@ -651,6 +679,16 @@ mod tests {
         let expected = "no cut-out: px_per_metre: 2, makes what is in two.png 30";
         assert!(told.starts_with(expected), "{told}");
         assert!(told.ends_with("; is it pixels for a centimetre?"), "{told}");
+    }
+
+    #[test]
+    fn large_photos_are_cut_out_as_many_at_once_as_memory_holds() {
+        let (laptop, phone) = (16_u64 << 30, 12_000_000);
+        assert_eq!(fitting_photos(Some(laptop), phone), 5);
+        assert_eq!(fitting_photos(Some(laptop), 1_000_000_000), 1);
+        assert!(fitting_photos(Some(laptop), 100_000) > 500);
+        assert_eq!(fitting_photos(Some(laptop), 0), (8 << 30) as usize);
+        assert_eq!(fitting_photos(None, phone), usize::MAX);
     }
 
     #[test]

@@ -294,7 +294,7 @@ pub(super) fn saturating_product<const N: usize>(sizes: [u64; N]) -> u64 {
 
 /// The memory of this machine, or of the control group that this process is confined to; none where
 /// the system does not report it. Asked once.
-pub(super) fn machine_bytes() -> Option<u64> {
+pub(crate) fn machine_bytes() -> Option<u64> {
     static BYTES: OnceLock<Option<u64>> = OnceLock::new();
     *BYTES.get_or_init(usable_bytes)
 }

@@ -124,6 +124,7 @@ pub use header::Header;
 #[doc(hidden)]
 pub use header::Window;
 #[doc(hidden)]
+pub(crate) use limits::machine_bytes;
 pub use limits::{LimitOverride, Limits};
 #[doc(hidden)]
 pub use options::Fallback;
