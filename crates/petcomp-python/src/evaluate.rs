@@ -13,6 +13,7 @@ use petcomp::geom::BBox;
 use petcomp::{Error, Result};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
+use std::slice;
 
 /// Files of predictions and of the truth.
 struct Files {
@@ -62,23 +63,30 @@ pub(crate) fn evaluate_files(
 
 impl Files {
     fn evaluate(&self, mut options: EvalReportOptions, output: Option<&Path>) -> Result<String> {
+        let name = page::run_name(&self.predictions);
+        if let Some(folder) = output {
+            let inputs = [&self.predictions, &self.truth];
+            page::check_inputs_stay(inputs, folder, slice::from_ref(&name))?;
+        }
         let sheets = if self.truth.extension().is_some_and(|e| e == "json") {
             self.read_coco(&mut options)?
         } else {
             self.read_yolo(&mut options)?
         };
-        let stem = self.predictions.file_stem().unwrap_or_default();
-        let run = Run {
-            name: stem.to_string_lossy().into_owned(),
-            sheets,
-        };
+        let run = Run { name, sheets };
         if let Some(folder) = output {
-            page::write(folder, std::slice::from_ref(&run), &options)?;
+            page::write(folder, slice::from_ref(&run), &options)?;
         }
-        metrics_json(&run, &options)
+        let metrics = Metrics::of(&run, &options);
+        page::warn_of_empty_truth(&self.truth, slice::from_ref(&metrics));
+        metrics_json(&metrics, &options)
     }
 
     fn read_coco(&self, options: &mut EvalReportOptions) -> Result<Vec<EvalImage>> {
+        if self.size.is_some() {
+            let what = "given without a folder of YOLO labels as truth: COCO tells sizes itself";
+            return Err(Error::value("size", what));
+        }
         let mut all = read_coco_truth(&self.truth)?;
         read_coco_results(&self.predictions, &mut all)?;
         if options.classes.is_empty() {
@@ -108,10 +116,10 @@ fn dataset_classes(labels: &Path) -> Vec<String> {
     })
 }
 
-fn metrics_json(run: &Run, options: &EvalReportOptions) -> Result<String> {
+fn metrics_json(metrics: &Metrics, options: &EvalReportOptions) -> Result<String> {
     text(&serde_json::json!({
         "classes": options.classes,
-        "metrics": Metrics::of(run, options),
+        "metrics": metrics,
     }))
 }
 
@@ -137,7 +145,7 @@ pub(crate) fn evaluate_boxes(
             name: "predictions".into(),
             sheets: sheets.collect(),
         };
-        metrics_json(&run, &options)
+        metrics_json(&Metrics::of(&run, &options), &options)
     })
 }
 

@@ -7,10 +7,11 @@ use crate::sample::{Policy, Sample};
 use crate::scene::{config_of, scene_of};
 use crate::work::{self, Stop};
 use petcomp::dataset::{self, DatasetConfig};
-use petcomp::io::Override;
+use petcomp::io::{self, Override};
 use petcomp::{Quality, Result, Scene};
 use pyo3::prelude::*;
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 /// Everything that pictures are made from, opened once.
@@ -27,20 +28,38 @@ pub(crate) struct Opened {
     policy: Policy,
 }
 
-/// What a pipeline is opened from: a recipe file, or a document and values to be changed.
+/// What a pipeline is opened from, and values to be changed.
 struct RecipeSource {
-    path: Option<PathBuf>,
+    /// The recipe file; of a document, the folder that its environment maps are named from.
+    path: PathBuf,
     json: Option<String>,
     overrides: Vec<String>,
     quality: Option<String>,
 }
 
 impl RecipeSource {
+    /// The recipe with paths from the root: files are read late, whatever the working folder is then.
     fn config(&self) -> Result<DatasetConfig> {
+        let mut config = self.read()?;
+        for path in [
+            &mut config.folder,
+            &mut config.assets,
+            &mut config.backgrounds,
+        ] {
+            // An empty path is the working folder, too.
+            *path = io::absolute(&Path::new(".").join(path.as_path()))?;
+        }
+        Ok(config)
+    }
+
+    fn read(&self) -> Result<DatasetConfig> {
         let overrides = self.overrides_at_quality()?;
-        match (&self.path, &self.json) {
-            (Some(path), _) => DatasetConfig::read(path, &overrides),
-            (None, json) => config_of(json.as_deref().unwrap_or("{}"), &overrides),
+        match &self.json {
+            None => DatasetConfig::read(&self.path, &overrides),
+            Some(json) => Ok(DatasetConfig {
+                folder: self.path.clone(),
+                ..config_of(json, &overrides)?
+            }),
         }
     }
 
@@ -91,7 +110,7 @@ impl Pipeline {
     #[pyo3(signature = (path, json, overrides, quality))]
     fn new(
         py: Python<'_>,
-        path: Option<PathBuf>,
+        path: PathBuf,
         json: Option<String>,
         overrides: Vec<String>,
         quality: Option<String>,
@@ -123,6 +142,12 @@ impl Pipeline {
 
     fn config_json(&self) -> PyResult<String> {
         text(self.opened()?.pipeline.config()).map_err(to_python)
+    }
+
+    /// The folder that environment maps are named from.
+    fn folder(&self) -> PyResult<OsString> {
+        let folder = self.opened()?.pipeline.config().folder.clone();
+        Ok(folder.into_os_string())
     }
 
     fn sample(&self, py: Python<'_>, seed: u64, k: u64) -> PyResult<Sample> {

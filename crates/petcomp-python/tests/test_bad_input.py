@@ -1,10 +1,12 @@
 """Whatever comes in: an answer or a clear exception, never a crash."""
 
 import json
+import logging
 import math
 import os
 import random
 import re
+from pathlib import Path
 
 import numpy as np
 import petcomp
@@ -268,6 +270,28 @@ def test_evaluation_of_what_cannot_be_is_refused():
     for argument in ({"output": "folder"}, {"size": (9, 9)}, {"rounds": 10**9}):
         with pytest.raises(errors.InvalidValueError, match=next(iter(argument))):
             petcomp.evaluate([found], [truth], **argument)
+
+
+def test_evaluation_of_files_takes_nothing_in_vain(tmp_path, monkeypatch, caplog):
+    monkeypatch.chdir(tmp_path)
+    Path("truth.json").write_text('{"images": [{"id": 1, "file_name": "a.png"}], "annotations": [], "categories": []}')
+    Path("metrics.json").write_text("[]")
+    for options, says in (
+        ({"output": "."}, "metrics.json: is read and would be written over"),
+        ({"size": (64, 48)}, "size: given without a folder of YOLO labels"),
+        ({"output": "s3://bucket/page"}, "output: s3://bucket/page is a URL, expected a folder"),
+    ):
+        with pytest.raises(petcomp.Error, match=says):
+            petcomp.evaluate("metrics.json", "truth.json", **options)
+    assert Path("metrics.json").read_text() == "[]"
+    caplog.set_level(logging.WARNING, logger="petcomp")
+    petcomp.evaluate("metrics.json", "truth.json")
+    assert "truth.json: no object" in caplog.text
+
+
+def test_assets_go_into_a_folder(world):
+    with pytest.raises(errors.InvalidValueError, match="folder: s3://bucket/assets is a URL, expected a folder"):
+        petcomp.asset.build(world / "photos.csv", "s3://bucket/assets")
 
 
 @pytest.mark.parametrize("classes", ["bottle", ["a", "a"], ["a", 1], 3])

@@ -3,6 +3,7 @@
 import concurrent.futures
 import logging
 import multiprocessing
+import os
 import pickle
 import signal
 import subprocess
@@ -54,6 +55,29 @@ def test_a_pickled_pipeline_is_the_same(recipe, monkeypatch):
     for pipeline in pipelines:
         again = pickle.loads(pickle.dumps(pipeline))
         assert again.config["scene"] == pipeline.config["scene"]
+
+
+def test_an_open_pipeline_does_not_follow_the_working_folder(recipe, monkeypatch):
+    want = picture_of(recipe, 0)
+    document = petcomp.Pipeline(recipe).config
+    document["assets"] = "assets"
+    document["backgrounds"] = os.path.relpath(document["backgrounds"], recipe.parent)
+    monkeypatch.chdir(recipe.parent)
+    pipelines = [petcomp.Pipeline(recipe.name), petcomp.Pipeline(document)]
+    monkeypatch.chdir("/")
+    for pipeline in pipelines:
+        assert (pipeline[0].image == want).all()
+        assert (pickle.loads(pickle.dumps(pipeline))[0].image == want).all()
+
+
+def test_a_pickled_pipeline_is_the_recipe_that_was_read(recipe):
+    own = recipe.with_name("own.toml")
+    own.write_text(recipe.read_text())
+    pipeline = petcomp.Pipeline(own, set={"render.subsamples": 2}, quality="draft")
+    own.write_text(recipe.read_text().replace("objects = [2, 3]", "objects = 9"))
+    again = pickle.loads(pickle.dumps(pipeline))
+    assert (again[0].image == pipeline[0].image).all()
+    assert again.config == pipeline.config and repr(again) == repr(pipeline)
 
 
 def test_threads_share_a_pipeline(recipe):

@@ -199,19 +199,20 @@ def test_a_card_above_covers_the_one_below():
 def test_evaluation_in_memory_is_that_of_files(tmp_path, program):
     random = np.random.default_rng(0)
     truth, found = [], []
-    for folder in ("truth", "found"):
-        (tmp_path / folder).mkdir()
+    for folder in ("truth", "found/labels"):
+        (tmp_path / folder).mkdir(parents=True)
     for i in range(6):
         corner = random.uniform(0, 50, (3, 2))
         boxes = np.c_[corner, corner + random.uniform(10, 40, (3, 2))]
         moved = boxes + random.uniform(-3, 3, (3, 1))
         classes, scores = random.integers(0, 2, 3), random.uniform(0.3, 1, 3)
         write(tmp_path / f"truth/{i:06}.txt", classes, boxes)
-        write(tmp_path / f"found/{i:06}.txt", classes, moved, scores)
+        write(tmp_path / f"found/labels/{i:06}.txt", classes, moved, scores)
         truth.append({"boxes": boxes, "classes": classes})
         found.append({"boxes": moved, "classes": classes, "scores": scores})
-    files = petcomp.evaluate(tmp_path / "found", tmp_path / "truth", size=(100, 100), output=tmp_path / "page")
-    program("eval", tmp_path / "found", tmp_path / "truth", "--size", "100x100", "-o", tmp_path / "theirs")
+    labels = tmp_path / "found/labels"
+    files = petcomp.evaluate(labels, tmp_path / "truth", size=(100, 100), output=tmp_path / "page")
+    program("eval", labels, tmp_path / "truth", "--size", "100x100", "-o", tmp_path / "theirs")
     metrics = json.loads((tmp_path / "theirs/metrics.json").read_text())
     assert files.to_dict() == (metrics[0] if isinstance(metrics, list) else metrics)
     assert (tmp_path / "page/eval.html").exists()

@@ -14,6 +14,14 @@ def digest(sample):
     return hashlib.sha256(sample.image.tobytes() + sample.boxes.tobytes() + sample.classes.tobytes()).hexdigest()
 
 
+def itself(sample):
+    return sample
+
+
+def digests(samples):
+    return [digest(sample) for sample in samples]
+
+
 def dataset(recipe, **options):
     from petcomp.torch import Dataset
 
@@ -29,6 +37,16 @@ def test_workers_make_the_same_samples(recipe, context):
     )
     assert list(loader) == want
     assert list(loader) == want, "a second epoch"
+
+
+def test_a_sample_stays_in_its_worker(recipe):
+    data = dataset(recipe, transform=itself)
+    options = {"num_workers": 1, "timeout": 120}
+    inside = torch.utils.data.DataLoader(data, batch_size=COUNT, collate_fn=digests, **options)
+    assert list(inside) == [digests(data[k] for k in range(COUNT))]
+    outside = torch.utils.data.DataLoader(data, batch_size=None, **options)
+    with pytest.raises(petcomp.errors.ArgumentTypeError, match="transform: a Sample, which stays"):
+        list(outside)
 
 
 def test_samples_are_the_programs_files(recipe, tmp_path, program):

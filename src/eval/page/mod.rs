@@ -2,8 +2,10 @@
 
 mod earlier;
 mod mistakes;
+mod run_names;
 mod spread;
 
+pub use run_names::{run_name, run_names};
 pub use spread::Spread;
 
 use crate::error::Result;
@@ -203,8 +205,32 @@ fn metrics_names(runs: &[&str]) -> Vec<String> {
     }
 }
 
+/// Fails where a file that [`write`] makes in its folder for runs of these names would replace one
+/// that it is made from.
+///
+/// # Errors
+/// [`Error::File`](crate::Error::File) for the first such file.
+pub fn check_inputs_stay(
+    inputs: impl IntoIterator<Item = impl AsRef<Path>>,
+    folder: &Path,
+    runs: &[String],
+) -> Result<()> {
+    let runs: Vec<&str> = runs.iter().map(String::as_str).collect();
+    let written = file_names(&runs).into_iter();
+    io::check_distinct(inputs, written.map(|name| folder.join(name)))
+}
+
+/// Warns where no run could find anything, for the truth is empty.
+pub fn warn_of_empty_truth(truth: &Path, runs: &[Metrics]) {
+    let is_empty = |metrics: &Metrics| metrics.yolov5.classes.is_empty();
+    if runs.iter().all(is_empty) {
+        let truth = truth.display();
+        log::warn!("{truth}: no object, so there was nothing to be found in any image");
+    }
+}
+
 /// Names of the files that [`write`] may make in its folder for runs of these names.
-pub fn file_names(runs: &[&str]) -> Vec<String> {
+fn file_names(runs: &[&str]) -> Vec<String> {
     let names = FILES.into_iter().map(String::from);
     names.chain(metrics_names(runs)).collect()
 }

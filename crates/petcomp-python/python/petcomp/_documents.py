@@ -10,7 +10,7 @@ from typing import Any
 
 from .errors import ArgumentTypeError, InvalidValueError
 
-__all__ = ["check_count", "class_names", "dumped", "loaded", "overrides", "path_of", "plain"]
+__all__ = ["check_count", "class_names", "dumped", "folder_of", "loaded", "overrides", "path_of", "plain"]
 
 _MOST_LEVELS = 60
 #: An array that only says that it is large must not be written out.
@@ -121,4 +121,12 @@ def path_of(name: str, value: Any) -> str:
     path = os.fsdecode(path)
     if "\0" in path:
         raise InvalidValueError(f"{name}: a zero in a path, expected none")
+    return path
+
+
+def folder_of(name: str, value: Any) -> str:
+    """A folder to write into, which is on this machine."""
+    path = path_of(name, value)
+    if "://" in path:
+        raise InvalidValueError(f"{name}: {path} is a URL, expected a folder")
     return path

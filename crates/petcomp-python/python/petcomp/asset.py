@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import _petcomp
-from ._documents import loaded, path_of
+from ._documents import folder_of, loaded, path_of
 
 __all__ = ["Built", "build", "list_folder"]
 
@@ -45,7 +45,7 @@ def build(
     ``progress`` is called with the photos done and their number, in the calling thread. What it raises ends
     the run, as Ctrl-C does: the photos in hand may still be written, but no others, and not the manifest.
     """
-    report = _petcomp.build_assets(path_of("list", list), path_of("folder", folder), progress)
+    report = _petcomp.build_assets(path_of("list", list), folder_of("folder", folder), progress)
     record = loaded(report)
     record["lengths"] = [tuple(pair) for pair in record["lengths"]]
     return Built(**record)

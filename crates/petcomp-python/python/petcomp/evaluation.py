@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _petcomp
-from ._documents import check_count, class_names, loaded, path_of
+from ._documents import check_count, class_names, folder_of, loaded, path_of
 from ._show import table
 from .errors import ArgumentTypeError, InvalidValueError
 from .pipeline import _number
@@ -77,8 +77,8 @@ def evaluate(
 ) -> Metrics:
     """Scores of predictions against the truth, as ``petcomp eval`` gives them.
 
-    Both are folders of YOLO labels or COCO JSON files; ``size`` (width and height, pixels) is needed for
-    YOLO labels without images beside them, ``output`` is a folder for the whole report. Or both are
+    Both are folders of YOLO labels or COCO JSON files; ``size`` (width and height, pixels) is for YOLO
+    labels alone, which need it without images beside them, ``output`` is a folder for the whole report. Or both are
     lists, one mapping for each image: ``boxes`` (n x 4: left, top, right, bottom, pixels) and ``classes``
     (n), of predictions ``scores`` (n), and of the truth, where some are neither to be found nor missed,
     ``ignored`` (n, as of a ``Sample``). ``rounds`` of the bootstrap: 0 to 100000; fewer than
@@ -87,7 +87,7 @@ def evaluate(
     question = class_names(classes), _number("rounds", rounds), _number("seed", seed)
     if isinstance(predictions, (str, os.PathLike)) and isinstance(truth, (str, os.PathLike)):
         shape = None if size is None else [_number("size", side) for side in size]
-        place = None if output is None else path_of("output", output)
+        place = None if output is None else folder_of("output", output)
         paths = path_of("predictions", predictions), path_of("truth", truth)
         text = _petcomp.evaluate_files(*paths, shape, place, question)
     else:

@@ -35,8 +35,8 @@ class Pipeline:
     ``recipe`` is a recipe file, or the same as plain data (its paths then relative to the working
     folder). ``set`` changes values of it: ``{"scene.objects": 3}``. ``quality`` is ``draft``, ``normal``
     or ``reference``. Picture ``k`` depends on nothing but the recipe, ``seed`` and ``k``, and is that of
-    ``petcomp dataset generate``. May be used from any thread, sent to other processes (which open it
-    anew), and is a context manager.
+    ``petcomp dataset generate``. May be used from any thread, sent to other processes (which open the
+    same recipe anew, as it was read here), and is a context manager.
     """
 
     def __init__(
@@ -49,14 +49,13 @@ class Pipeline:
     ) -> None:
         self._seed = _number("seed", seed)
         is_data = isinstance(recipe, Mapping)
-        # Other processes open the same, whatever becomes of the caller's data; a file's path is whole.
-        source = plain("recipe", recipe) if is_data else os.path.abspath(path_of("recipe", recipe))
-        values = plain("set", set or {})
-        self._source = (source, values, quality)
+        # Data is named from the working folder.
+        path = "" if is_data else path_of("recipe", recipe)
+        self._name = "recipe" if is_data else os.path.abspath(path)
         self._native = _petcomp.Pipeline(
-            None if is_data else path_of("recipe", recipe),
-            dumped("recipe", source) if is_data else None,
-            overrides(values),
+            path,
+            dumped("recipe", recipe) if is_data else None,
+            overrides(plain("set", set or {})),
             quality,
         )
 
@@ -116,14 +115,15 @@ class Pipeline:
     __iter__ = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        recipe, set, quality = self._source
-        return _pipeline, (recipe, self._seed, set, quality)
+        # What was read, whatever became of the file.
+        return _opened_anew, (self._name, self._native.folder(), self._native.config_json(), self._seed)
 
     def __repr__(self) -> str:
-        recipe = self._source[0]
-        shown = "recipe" if isinstance(recipe, dict) else recipe
-        return f"Pipeline({shown!r}, seed={self._seed})"
+        return f"Pipeline({self._name!r}, seed={self._seed})"
 
 
-def _pipeline(recipe: Any, seed: int, set: dict[str, Any], quality: str | None) -> Pipeline:
-    return Pipeline(recipe, seed=seed, set=set, quality=quality)
+def _opened_anew(name: str, folder: str, recipe: str, seed: int) -> Pipeline:
+    pipeline = Pipeline.__new__(Pipeline)
+    pipeline._name, pipeline._seed = name, seed
+    pipeline._native = _petcomp.Pipeline(folder, recipe, [], None)
+    return pipeline

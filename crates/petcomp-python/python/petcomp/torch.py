@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import os
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import torch
 from torch.utils.data import Dataset as _Dataset
 
+from .errors import ArgumentTypeError
 from .pipeline import Pipeline, _number
 from .sample import Sample
 
@@ -42,7 +44,8 @@ class Dataset(_Dataset[Any]):
     Sample ``k`` is that of ``petcomp dataset generate``, whichever worker makes it, forked or spawned.
     Each worker opens the recipe once and computes with ``threads`` threads (1 where there are workers,
     which share the processors already). ``transform`` gets the ``Sample``; by default ``to_tensors``, whose
-    target then has ``k`` as its ``image_id``.
+    target then has ``k`` as its ``image_id``. What leaves a worker must hold no ``Sample``, which stays in the
+    process that made it.
     """
 
     def __init__(
@@ -75,20 +78,30 @@ class Dataset(_Dataset[Any]):
         k = index + self._count if index < 0 else index
         if not 0 <= k < self._count:
             raise IndexError(f"sample {index} of {self._count}")
-        self._set_threads()
+        self._settle_in()
         made = self._transform(self._pipeline[k])
         if self._transform is to_tensors:
             made[1]["image_id"] = k
         return made
 
-    def _set_threads(self) -> None:
+    def _settle_in(self) -> None:
         """In a worker, once."""
         from . import set_threads
 
         process = os.getpid()
         if torch.utils.data.get_worker_info() is not None and self._worker_process != process:
             set_threads(self._threads)
+            copyreg.pickle(Sample, _stays)
             self._worker_process = process
+
+
+def _stays(sample: Sample) -> tuple[Any, ...]:
+    """A sample on its way out of a worker: an error here would be lost, and the loader wait for ever."""
+    return _refuse_sample, ()
+
+
+def _refuse_sample() -> None:
+    raise ArgumentTypeError("transform: a Sample, which stays in the process that made it; expected its arrays")
 
 
 def collate(batch: list[tuple[Any, Any]]) -> tuple[list[Any], list[Any]]:
