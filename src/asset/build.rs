@@ -687,7 +687,7 @@ mod tests {
         assert_eq!(fitting_photos(Some(laptop), phone), 5);
         assert_eq!(fitting_photos(Some(laptop), 1_000_000_000), 1);
         assert!(fitting_photos(Some(laptop), 100_000) > 500);
-        assert_eq!(fitting_photos(Some(laptop), 0), (8 << 30) as usize);
+        assert_eq!(fitting_photos(Some(laptop), 0), 8_usize << 30);
         assert_eq!(fitting_photos(None, phone), usize::MAX);
     }
 
