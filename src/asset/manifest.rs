@@ -280,17 +280,17 @@ impl Manifest {
         was_there
     }
 
-    /// It tells of a cut-out in this file.
+    /// It has a cut-out in this file.
     pub(super) fn has(&self, file: &str) -> bool {
         let mut photos = self.assets.iter().flat_map(|asset| &asset.photos);
         photos.any(|photo| photo.file == file)
     }
 
-    /// The file of a cut-out is the one that it tells of; where it has no checksum any is.
+    /// The file of a cut-out has the checksum that it records; where it records none any file does.
     pub(super) fn is_file_of(&self, folder: &Path, file: &str) -> bool {
         let mut photos = self.assets.iter().flat_map(|asset| &asset.photos);
-        let told = photos.find(|photo| photo.file == file);
-        told.and_then(|photo| photo.crc32).is_none_or(|crc32| {
+        let record = photos.find(|photo| photo.file == file);
+        record.and_then(|photo| photo.crc32).is_none_or(|crc32| {
             let found = Checksum::from_file(folder.join(file));
             found.is_ok_and(|found| found.crc32 == crc32)
         })

@@ -113,7 +113,7 @@ impl EvalArgs {
     /// Fails for an option that the truth has no use for, and for pictures that are nowhere.
     fn check_options(&self) -> petcomp::Result<()> {
         let is_yolo = self.paths.last().is_some_and(|truth| !is_coco(truth));
-        let yolo = "a folder of YOLO labels as TRUTH: COCO tells sizes itself";
+        let yolo = "a folder of YOLO labels as TRUTH: COCO has sizes itself";
         check_companion("--size", self.size.is_some(), yolo, is_yolo)?;
         match self.images.as_ref().filter(|folder| !folder.is_dir()) {
             None => Ok(()),

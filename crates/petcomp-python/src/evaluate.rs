@@ -84,7 +84,7 @@ impl Files {
 
     fn read_coco(&self, options: &mut EvalReportOptions) -> Result<Vec<EvalImage>> {
         if self.size.is_some() {
-            let what = "given without a folder of YOLO labels as truth: COCO tells sizes itself";
+            let what = "given without a folder of YOLO labels as truth: COCO has sizes itself";
             return Err(Error::value("size", what));
         }
         let mut all = read_coco_truth(&self.truth)?;
