@@ -1,8 +1,7 @@
 //! The file that a dataset is made from.
 
-use crate::dataset::environment_maps::seen_from;
 use crate::dataset::mot::no_sequence;
-use crate::dataset::paths::folder_of;
+use crate::dataset::paths::{folder_of, seen_from};
 use crate::dataset::yolo::MIN_SIDE_PX;
 use crate::dataset::{Format, LabelConfig, Pictures, Preset, Split};
 use crate::error::{Error, Result};
@@ -162,7 +161,7 @@ impl DatasetConfig {
         config.assets = io::relative_on_disk(&config.assets, folder)?;
         config.backgrounds = io::relative_on_disk(&config.backgrounds, folder)?;
         for file in &mut config.scene.environment.files {
-            *file = seen_from(folder, &self.folder, file)?;
+            *file = seen_from(folder, &self.folder.join(&*file))?;
         }
         toml::to_string_pretty(&config).map_err(|e| Error::file(path, e))
     }

@@ -114,12 +114,6 @@ fn total_bytes(kept: &[(String, Arc<Panorama>)]) -> usize {
     pictures.map(|image| size_of_val(image.pixels())).sum()
 }
 
-/// A name in a recipe as it is seen from another folder.
-pub(crate) fn seen_from(folder: &Path, own: &Path, name: &str) -> Result<String> {
-    let file = io::relative_on_disk(&own.join(name), folder)?;
-    Ok(file.to_string_lossy().into_owned())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -10,6 +10,12 @@ pub(super) fn folder_of(file: &Path) -> &Path {
     file.parent().unwrap_or(Path::new(""))
 }
 
+/// A file or folder as a recipe in some folder names it.
+pub(super) fn seen_from(folder: &Path, path: &Path) -> Result<String> {
+    let seen = io::relative_on_disk(path, folder)?;
+    io::path_text(&seen).map(str::to_owned)
+}
+
 /// Creates a folder for each part below a folder of the dataset.
 pub(super) fn create_part_folders(folder: &Path, kind: &str) -> Result<()> {
     Part::ALL

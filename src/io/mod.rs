@@ -113,8 +113,8 @@ pub use document::{read_document, write_document};
 pub use format::Format;
 #[doc(hidden)]
 pub use fs::{
-    Checksum, absolute, below, check_distinct, copy, create_folder, inside, path_text, relative,
-    relative_on_disk,
+    Checksum, absolute, below, check_distinct, check_folder_of, copy, create_folder, inside,
+    path_text, relative, relative_on_disk,
 };
 pub(crate) use fs::{
     files_below, is_apple_double, natural_key, refuse_links, stem_text, with_last_step,

@@ -125,21 +125,10 @@ pub(crate) fn check_scene_target(path: &Path) -> Result<()> {
 
 fn check_target(path: &Path, known: &[&str], expected: &str) -> Result<()> {
     if known.iter().any(|end| io::has_extension(path, end)) {
-        return check_folder_of(path);
+        return io::check_folder_of(path);
     }
     let what = format!("no format for this extension, expected {expected}");
     Err(Error::file(path, what))
-}
-
-/// Fails on a file to write whose folder is not there.
-pub(crate) fn check_folder_of(path: &Path) -> Result<()> {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
-            let what = format!("cannot be written: no folder {}", folder.display());
-            Err(Error::file(path, what))
-        }
-        _ => Ok(()),
-    }
 }
 
 /// The file's name without its extension.

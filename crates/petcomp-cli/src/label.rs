@@ -1,6 +1,6 @@
 //! `petcomp label`: scene -> outlines, boxes, visibility.
 
-use crate::documents::{SceneArgs, check_folder_of, check_picture_target};
+use crate::documents::{SceneArgs, check_picture_target};
 use crate::global::GlobalArgs;
 use petcomp::dataset::Pipeline;
 use petcomp::label::{self, Labels};
@@ -42,7 +42,7 @@ impl LabelArgs {
         let mut pictures = self.overlay.iter();
         pictures.try_for_each(|path| check_picture_target(path))?;
         let mut lists = self.polygons.iter().chain([&self.output]);
-        lists.try_for_each(|path| check_folder_of(path))
+        lists.try_for_each(|path| io::check_folder_of(path))
     }
 
     /// The files to write.

@@ -1,6 +1,6 @@
 //! `petcomp settle`: dropped objects come to rest.
 
-use crate::documents::{check_folder_of, check_picture_target, check_scene_target};
+use crate::documents::{check_picture_target, check_scene_target};
 use crate::global::GlobalArgs;
 use petcomp::dataset::DatasetConfig;
 use petcomp::settle::{SettleOptions, Settled, preview, settle_traced, trace_csv};
@@ -59,7 +59,7 @@ impl SettleArgs {
         let mut pictures = self.preview.iter();
         pictures.try_for_each(|path| check_picture_target(path))?;
         let mut texts = self.trace.iter();
-        texts.try_for_each(|path| check_folder_of(path))
+        texts.try_for_each(|path| io::check_folder_of(path))
     }
 
     /// What is written.

@@ -1,7 +1,7 @@
 //! What names files in a recipe, once it lies in another folder.
 
 use crate::dataset::DatasetConfig;
-use crate::dataset::paths::folder_of;
+use crate::dataset::paths::{folder_of, seen_from};
 use crate::dataset::recipe_text::KeyEdit;
 use crate::error::Result;
 use crate::io;
@@ -42,9 +42,7 @@ fn environment_files(config: &DatasetConfig, to: &Path) -> Result<Option<KeyEdit
 
 /// A path as it is seen from a folder, as TOML.
 fn moved(path: &Path, to: &Path) -> Result<String> {
-    let path = io::relative_on_disk(path, to)?;
-    let text = io::path_text(&path)?;
-    Ok(toml::Value::String(text.into()).to_string())
+    Ok(toml::Value::String(seen_from(to, path)?).to_string())
 }
 
 #[cfg(test)]

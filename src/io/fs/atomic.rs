@@ -83,6 +83,19 @@ fn folder_of(path: &Path) -> &Path {
     parent.unwrap_or(Path::new("."))
 }
 
+/// Fails on a file to write whose folder is not there, as writing it would.
+///
+/// # Errors
+/// [`Error::File`], naming both.
+pub fn check_folder_of(path: &Path) -> Result<()> {
+    let folder = folder_of(path);
+    if folder.is_dir() {
+        Ok(())
+    } else {
+        Err(no_folder(path, folder))
+    }
+}
+
 fn no_folder(path: &Path, folder: &Path) -> Error {
     let what = format!("cannot be written: no folder {}", folder.display());
     Error::file(path, what)

@@ -1,6 +1,5 @@
 //! `petcomp dataset fit`: a recipe comes nearer to the real place.
 
-use crate::documents::check_folder_of;
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
 use crate::print;
@@ -62,7 +61,7 @@ impl FitArgs {
         let targets = [self.output.clone(), self.page_path()];
         let mut read = vec![self.recipe.clone()];
         for target in &targets {
-            check_folder_of(target)?;
+            io::check_folder_of(target)?;
             if let Some(real) = &self.real {
                 read.extend(YoloSet::files_like(real, target)?);
             }
