@@ -72,6 +72,8 @@ pub mod io;
 pub mod label;
 #[cfg(feature = "pipeline")]
 pub mod light;
+#[cfg(feature = "pipeline")]
+mod lru;
 pub mod matte;
 mod names;
 mod pixel;

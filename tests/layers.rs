@@ -11,6 +11,7 @@ const FLOORS: &[&[&str]] = &[
         "diagnostic",
         "error",
         "geom",
+        "lru",
         "names",
         "pixel",
         "quality",

@@ -4,7 +4,7 @@ use super::MANIFEST;
 use super::entry::PhotoEntry;
 use super::files;
 use super::folder::{CutOutWriter, is_rejected, lock, read_or_new, refusal, take_out};
-use super::library::{Library, Photo};
+use super::library::Library;
 use super::list::{List, check_not_written_over, check_reviews, find_list};
 use super::manifest::{Manifest, PhotoRecord};
 use super::screen_source::EmptyScreens;
@@ -14,6 +14,8 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 /// Memory that a photo takes for each of its pixels while it is cut out: 130 bytes, measured with
 /// photos of 12 and 24 megapixels.
@@ -24,8 +26,10 @@ const BYTES_PER_PIXEL: u64 = 140;
 pub struct Built {
     /// All that the folder holds now, as [`Library::open`] would read it.
     pub library: Library,
-    /// Photos that were cut out.
+    /// Photos that are cut out.
     pub photos: usize,
+    /// How many of these cut-outs were there before.
+    pub kept: usize,
     /// Lengths of the objects that were cut out, with their standard errors, metres, in the order
     /// of the list.
     pub lengths: Vec<[f64; 2]>,
@@ -48,9 +52,9 @@ pub struct Built {
 ///
 /// `progress` is called with the photos done and their number, at the start and after each photo,
 /// from several threads. What the folder has of other photos stays ([`Built::unlisted`]); a photo
-/// that it already has is replaced. The manifest is written last and does not depend on threads.
-/// Once `stop` is true, photos in hand are finished, no more are begun, and the manifest stays as it
-/// was.
+/// that it already has is replaced. The manifest does not depend on threads; it takes in what is
+/// done every 10 s, so that [`resume`] need not begin anew. Once `stop` is true, photos in hand are
+/// finished and no more are begun.
 ///
 /// # Errors
 /// A list that cannot be read or be right, or a photo that is missing or lies where a file of the
@@ -64,30 +68,74 @@ pub fn build(
     progress: &(dyn Fn(usize, usize) + Sync),
     stop: &AtomicBool,
 ) -> Result<Built> {
-    let (path, folder) = (find_list(list.as_ref())?, folder.as_ref());
+    build_beside(
+        &Manifest::default(),
+        list.as_ref(),
+        folder.as_ref(),
+        progress,
+        stop,
+    )
+}
+
+/// The same, but cut-outs that the folder has already stay as they are: those of the same photo,
+/// entry, options and version of the program.
+///
+/// # Errors
+/// As [`build`].
+pub fn resume(
+    list: impl AsRef<Path>,
+    folder: impl AsRef<Path>,
+    progress: &(dyn Fn(usize, usize) + Sync),
+    stop: &AtomicBool,
+) -> Result<Built> {
+    let folder = folder.as_ref();
+    build_beside(&read_or_new(folder)?, list.as_ref(), folder, progress, stop)
+}
+
+/// Builds what is not in a manifest of the folder.
+fn build_beside(
+    known: &Manifest,
+    list: &Path,
+    folder: &Path,
+    progress: &(dyn Fn(usize, usize) + Sync),
+    stop: &AtomicBool,
+) -> Result<Built> {
+    let path = find_list(list)?;
     let list = List::read(&path)?;
     let list = checked(list, &path, &mut read_or_new(folder)?)?;
     check_not_written_over(&list.photos, folder)?;
-    let outcomes = cut_out_all(&list, folder, progress, stop);
-    let recorded = record(&list, outcomes, folder, stop);
+    let (outcomes, journal) = cut_out_all(known, &list, folder, progress, stop);
+    if stop.load(Ordering::Relaxed) {
+        journal.write()?;
+        return Err(interrupted(&outcomes));
+    }
+    let recorded = record(&list, outcomes, folder);
     let (manifest, mut taken) = recorded.map_err(|e| e.in_file(&path))?;
     if let Some(error) = taken.failed.take() {
         return Err(error.in_file(&path));
     }
-    if taken.photos.is_empty() && taken.refused.len() > taken.rejected {
+    if taken.records.is_empty() && taken.refused.len() > taken.rejected {
         return Err(no_cut_out(&path, &taken.refused));
     }
-    let library = Library::from_manifest(folder, manifest, &taken.photos)?;
-    Ok(Built::new(library, taken, &list))
+    let library = Library::from_manifest(folder, manifest)?;
+    let is_known = |record: &&PhotoRecord| known.record(&record.file) == Some(*record);
+    let kept = taken.records.iter().filter(is_known).count();
+    Ok(Built {
+        kept,
+        ..Built::new(library, taken, &list)
+    })
 }
 
-/// Fails once nothing more is to be begun or told in the manifest.
-fn check_goes_on(stop: &AtomicBool) -> Result<()> {
-    if !stop.load(Ordering::Relaxed) {
-        return Ok(());
-    }
-    let what = format!("{MANIFEST} tells of no new cut-out; the same call begins anew");
-    Err(Error::Interrupted { what })
+/// What becomes of a photo after a stop.
+fn not_begun() -> Error {
+    let what = "stopped before this photo".into();
+    Error::Interrupted { what }
+}
+
+fn interrupted(outcomes: &[Result<PhotoRecord>]) -> Error {
+    let (done, count) = (outcomes.iter().flatten().count(), outcomes.len());
+    let what = format!("{MANIFEST} has {done} of {count} photos; resume goes on with the others");
+    Error::Interrupted { what }
 }
 
 fn no_cut_out(list: &Path, refused: &[String]) -> Error {
@@ -97,15 +145,19 @@ fn no_cut_out(list: &Path, refused: &[String]) -> Error {
 
 impl Built {
     fn new(library: Library, taken: TakenIn, list: &List) -> Self {
-        let photos = taken.photos;
+        let records = taken.records;
         Self {
             unlisted: unlisted(&library, list),
             library,
-            photos: photos.len(),
-            lengths: photos.iter().map(length_and_error).collect(),
+            photos: records.len(),
+            kept: 0,
+            lengths: records.iter().map(length_and_error).collect(),
             refused: taken.refused,
             rejected: taken.rejected,
-            needs_review: photos.iter().filter_map(record_to_review).collect(),
+            needs_review: records
+                .into_iter()
+                .filter(PhotoRecord::needs_review)
+                .collect(),
         }
     }
 }
@@ -131,13 +183,15 @@ fn checked(list: List, path: &Path, manifest: &mut Manifest) -> Result<List> {
     Ok(list)
 }
 
-/// Cuts out and writes the photos of a list, until there is a stop.
-fn cut_out_all(
-    list: &List,
-    folder: &Path,
+/// Cuts out and writes the photos of a list that a manifest does not have, until there is a stop;
+/// what the manifest does not tell of yet is in the journal.
+fn cut_out_all<'a>(
+    known: &Manifest,
+    list: &'a List,
+    folder: &'a Path,
     progress: &(dyn Fn(usize, usize) + Sync),
     stop: &AtomicBool,
-) -> Vec<Result<Photo>> {
+) -> (Vec<Result<PhotoRecord>>, Journal<'a>) {
     let (done, count) = (AtomicUsize::new(0), list.photos.len());
     progress(0, count);
     let writer = CutOutWriter {
@@ -145,17 +199,87 @@ fn cut_out_all(
         options: &list.cut_out,
         empty_screens: EmptyScreens::shared_by(list.photos.iter().map(|photo| &photo.screen)),
     };
-    let write = |entry: &PhotoEntry| {
-        check_goes_on(stop)?;
-        let photo = writer.write(entry);
+    let journal = Journal::new(list, folder);
+    let write = |entry: &'a PhotoEntry| {
+        if stop.load(Ordering::Relaxed) {
+            return Err(not_begun());
+        }
+        let record = match writer.find(entry, known) {
+            Some(record) => Ok(record),
+            None => journal.add(entry, writer.write(entry)),
+        };
         progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
-        photo
+        record
     };
     let mut outcomes = Vec::with_capacity(count);
     for photos in list.photos.chunks(photos_at_once(&list.photos)) {
         outcomes.par_extend(photos.par_iter().map(write));
     }
-    outcomes
+    (outcomes, journal)
+}
+
+/// From one writing of the manifest to the next.
+const JOURNAL_INTERVAL: Duration = Duration::from_secs(10);
+
+/// Cut-outs that are written, on their way into the manifest.
+struct Journal<'a> {
+    list: &'a List,
+    folder: &'a Path,
+    waiting: Mutex<Waiting<'a>>,
+}
+
+struct Waiting<'a> {
+    since: Instant,
+    cut_outs: Vec<(&'a PhotoEntry, PhotoRecord)>,
+}
+
+impl<'a> Journal<'a> {
+    fn new(list: &'a List, folder: &'a Path) -> Self {
+        let (since, cut_outs) = (Instant::now(), Vec::new());
+        let waiting = Mutex::new(Waiting { since, cut_outs });
+        Self {
+            list,
+            folder,
+            waiting,
+        }
+    }
+
+    /// Takes a cut-out in where there is one, and writes the manifest from time to time.
+    fn add(&self, entry: &'a PhotoEntry, record: Result<PhotoRecord>) -> Result<PhotoRecord> {
+        let record = record?;
+        let mut waiting = self.waiting();
+        waiting.cut_outs.push((entry, record.clone()));
+        if waiting.since.elapsed() >= JOURNAL_INTERVAL {
+            self.write_waiting(&mut waiting)?;
+        }
+        Ok(record)
+    }
+
+    /// Writes the manifest with all that was taken in.
+    fn write(&self) -> Result<()> {
+        self.write_waiting(&mut self.waiting())
+    }
+
+    fn write_waiting(&self, waiting: &mut Waiting) -> Result<()> {
+        if waiting.cut_outs.is_empty() {
+            return Ok(());
+        }
+        let _alone = lock(self.folder)?;
+        let mut manifest = read_or_new(self.folder)?;
+        self.list.add_classes_to(&mut manifest)?;
+        for (entry, record) in &waiting.cut_outs {
+            manifest.insert(entry.asset_with(record.clone()))?;
+        }
+        manifest.write(self.folder)?;
+        waiting.cut_outs.clear();
+        waiting.since = Instant::now();
+        Ok(())
+    }
+
+    fn waiting(&self) -> MutexGuard<'_, Waiting<'a>> {
+        // Every change is whole, even where a thread panicked afterwards.
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// How many of these photos are worked on at once: all, if there is memory for one on each thread.
@@ -184,16 +308,14 @@ fn fitting_photos(machine_bytes: Option<u64>, pixels: u64) -> usize {
 /// it meanwhile.
 fn record(
     list: &List,
-    outcomes: Vec<Result<Photo>>,
+    outcomes: Vec<Result<PhotoRecord>>,
     folder: &Path,
-    stop: &AtomicBool,
 ) -> Result<(Manifest, TakenIn)> {
     let _alone = lock(folder)?;
-    check_goes_on(stop)?;
     let mut manifest = read_or_new(folder)?;
     list.add_classes_to(&mut manifest)?;
     let taken = take_in(list, outcomes, folder, &mut manifest);
-    if !taken.removed.is_empty() || !taken.photos.is_empty() {
+    if !taken.removed.is_empty() || !taken.records.is_empty() {
         manifest.write(folder)?;
     }
     let mut removed = taken.removed.iter();
@@ -204,7 +326,7 @@ fn record(
 /// What became of the photos of a list.
 #[derive(Default)]
 struct TakenIn {
-    photos: Vec<Photo>,
+    records: Vec<PhotoRecord>,
     /// Why the others gave no cut-out.
     refused: Vec<String>,
     /// How many of these a person rejected.
@@ -218,14 +340,14 @@ struct TakenIn {
 /// Puts the cut-outs of a list into the manifest of a folder, and takes out those that go.
 fn take_in(
     list: &List,
-    outcomes: Vec<Result<Photo>>,
+    outcomes: Vec<Result<PhotoRecord>>,
     folder: &Path,
     manifest: &mut Manifest,
 ) -> TakenIn {
     let mut taken = TakenIn::default();
     for (i, (outcome, entry)) in outcomes.into_iter().zip(&list.photos).enumerate() {
-        match outcome.and_then(|photo| inserted(photo, entry, manifest)) {
-            Ok(photo) => taken.photos.push(photo),
+        match outcome.and_then(|record| inserted(record, entry, manifest)) {
+            Ok(record) => taken.records.push(record),
             Err(error @ Error::Photo { .. }) => {
                 let rejected = is_rejected(entry);
                 taken.removed.extend(take_out(entry, folder, manifest));
@@ -242,23 +364,23 @@ fn take_in(
     taken
 }
 
-/// A photo that is now in the manifest.
-fn inserted(photo: Photo, entry: &PhotoEntry, manifest: &mut Manifest) -> Result<Photo> {
-    manifest.insert(entry.asset_with(photo.record.clone()))?;
-    Ok(photo)
+/// A record that is now in the manifest.
+fn inserted(
+    record: PhotoRecord,
+    entry: &PhotoEntry,
+    manifest: &mut Manifest,
+) -> Result<PhotoRecord> {
+    manifest.insert(entry.asset_with(record.clone()))?;
+    Ok(record)
 }
 
-fn length_and_error(photo: &Photo) -> [f64; 2] {
-    [photo.record.object_m[0], photo.record.error_m]
-}
-
-fn record_to_review(photo: &Photo) -> Option<PhotoRecord> {
-    let record = &photo.record;
-    record.needs_review().then(|| record.clone())
+fn length_and_error(record: &PhotoRecord) -> [f64; 2] {
+    [record.object_m[0], record.error_m]
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::pixels::PixelChecksums;
     use super::super::{MANIFEST, PhotoRecord, Review, Scale, Texture, Verdict};
     use super::super::{add_photo, contact_sheet};
     use super::*;
@@ -308,7 +430,7 @@ mod tests {
     }
 
     /// All that distinguishes two libraries.
-    fn in_brief(library: &Library) -> Vec<(String, PhotoRecord, u32, Vec<Point2<f64>>)> {
+    fn in_brief(library: &Library) -> Vec<(String, PhotoRecord, PixelChecksums, Vec<Point2<f64>>)> {
         let photos = library
             .assets
             .iter()
@@ -318,7 +440,7 @@ mod tests {
                 (
                     format!("{} {} {}", asset.name, asset.class, asset.mass),
                     photo.record.clone(),
-                    photo.texture.checksum(),
+                    photo.checksums(),
                     photo.outline_uv.to_vec(),
                 )
             })
@@ -796,10 +918,10 @@ mod tests {
         assert_eq!(methods, [MatteMethod::Physical, MatteMethod::Outline]);
         let is_guess = |d: &Diagnostic| d.code == Code::GreyScreen;
         assert!(!two.record.diagnostics.iter().any(is_guess));
-        let Texture::Rgba(pyramid) = &two.texture else {
+        let Texture::Rgba(pyramid) = two.pixels().unwrap().texture else {
             panic!("one alpha for all channels")
         };
-        let (w, h) = two.texture.size();
+        let (w, h) = pyramid.base().size();
         let middle = pyramid.level(0)[(w / 2, h / 2)];
         assert_eq!(middle.a, 1.0);
         assert!((middle.r - 0.25).abs() < 0.01, "{middle:?}");
@@ -866,7 +988,7 @@ mod tests {
             .iter_mut()
             .flat_map(|asset| &mut asset.photos)
             .for_each(|photo| change(&mut photo.record));
-        contact_sheet(&library).height()
+        contact_sheet(&library).unwrap().height()
     }
 
     #[test]
@@ -917,7 +1039,7 @@ mod tests {
         let crc32 = crc32fast::hash(&std::fs::read(&file).unwrap());
         assert_eq!(photo.record.crc32, Some(crc32));
         // As a build leaves it that was interrupted before it wrote the manifest.
-        let (w, h) = photo.texture.size();
+        let (w, h) = photo.pixels().unwrap().texture.size();
         io::write(&file, &Image::filled(w, h, Film::default())).unwrap();
         let told = Library::open(&out).unwrap_err().to_string();
         let expected =
@@ -934,7 +1056,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stop_ends_a_build_before_the_next_photo_and_before_the_manifest() {
+    fn a_build_that_was_stopped_is_resumed() {
         let folder = folder_with(TWO);
         let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
         let stop = AtomicBool::new(false);
@@ -943,9 +1065,24 @@ mod tests {
         let stopped = alone
             .unwrap()
             .install(|| super::build(&list, &out, &after_one, &stop));
-        assert!(matches!(stopped, Err(Error::Interrupted { .. })));
+        let told = stopped.unwrap_err().to_string();
+        let expected = "assets.toml has 1 of 2 photos; resume goes on with the others";
+        assert!(told.contains(expected), "{told}");
         let is_there = |file: &str| out.join(file).exists();
-        assert!(is_there("a/one.exr") && !is_there("a/two.exr") && !is_there(MANIFEST));
+        assert!(is_there("a/one.exr") && !is_there("a/two.exr"));
+        let resumed = || super::resume(&list, &out, &|_, _| (), &AtomicBool::new(false)).unwrap();
+        let built = resumed();
+        assert_eq!([built.photos, built.kept], [2, 1]);
+        let manifest = io::read_text(out.join(MANIFEST)).unwrap();
+        let anew = folder.path().join("anew");
+        build(&list, &anew, &|_, _| ()).unwrap();
+        assert_eq!(io::read_text(anew.join(MANIFEST)).unwrap(), manifest);
+        // A lost file, another length: these are cut out again.
+        std::fs::remove_file(out.join("a/two.exr")).unwrap();
+        assert_eq!(resumed().kept, 1);
+        std::fs::write(&list, TWO.replace("0.3", "0.4")).unwrap();
+        assert_eq!(resumed().kept, 1);
+        assert_eq!(resumed().kept, 2);
     }
 
     #[test]

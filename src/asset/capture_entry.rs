@@ -69,16 +69,19 @@ impl CaptureEntry {
         }
     }
 
+    /// The file about the display of a photo.
+    pub(super) fn display_file(&self, photo: &Path) -> PathBuf {
+        let display = self.display.clone();
+        display.unwrap_or_else(|| photo.with_file_name(DISPLAY))
+    }
+
     /// The display, and its width, metres.
     ///
     /// # Errors
     /// Those of reading `display.toml`; [`Error::Value`] (`captured.width`) where nothing tells the
     /// width.
     pub(super) fn display(&self, beside: &Path) -> Result<(Display, f64)> {
-        let path = self
-            .display
-            .clone()
-            .unwrap_or_else(|| beside.with_file_name(DISPLAY));
+        let path = self.display_file(beside);
         let display: Display = io::read_toml(&path)?;
         display.check().map_err(|e| e.in_file(&path))?;
         let width = self.width.or(display.width).ok_or_else(|| {

@@ -4,10 +4,12 @@
 use super::flow_sheet;
 use super::library::{Library, Photo};
 use super::manifest::{CaptureRecord, PhotoRecord};
+use super::pixels::Pixels;
 use super::texture::Texture;
 use super::thumbnail::{checkerboard, fitted_size};
 use crate::color::to_srgb8;
 use crate::draw::{self, TextSize};
+use crate::error::Result;
 use crate::filter;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, Mix, Srgb8};
@@ -44,10 +46,13 @@ const COLUMN_WIDTH_PX: usize = STRIP_WIDTH_PX + 2 * GAP_PX;
 
 /// Every cut-out over a checkerboard, black, white and green, with its size, the confidence in
 /// outline and colour, and why it needs a review.
-pub fn contact_sheet(library: &Library) -> Image<Srgb8> {
+///
+/// # Errors
+/// Those of [`Photo::pixels`].
+pub fn contact_sheet(library: &Library) -> Result<Image<Srgb8>> {
     let photos = photos_of(library);
-    let strips: Vec<_> = photos.par_iter().map(|photo| strip(photo)).collect();
-    in_columns(&strips)
+    let strips = photos.par_iter().map(|photo| strip(photo));
+    Ok(in_columns(&strips.collect::<Result<Vec<_>>>()?))
 }
 
 fn photos_of(library: &Library) -> Vec<&Photo> {
@@ -84,11 +89,12 @@ fn row_height(strips: &[Image<Srgb8>]) -> usize {
 }
 
 /// One cut-out over all backgrounds under lines of text.
-fn strip(photo: &Photo) -> Image<Srgb8> {
-    let cutout = small(&photo.texture);
+fn strip(photo: &Photo) -> Result<Image<Srgb8>> {
+    let pixels = photo.pixels_once()?;
+    let cutout = small(&pixels.texture);
     let lines = lines_of(&photo.record);
     let text_height = lines.len() * TextSize::Small.height() + GAP_PX / 2;
-    let rows = tile_rows(photo, &cutout);
+    let rows = tile_rows(&photo.record, &pixels, &cutout);
     let row_height = cutout.height() + GAP_PX;
     let height = text_height + rows.len() * row_height - GAP_PX;
     let mut canvas = Image::filled(STRIP_WIDTH_PX, height, PAPER);
@@ -96,16 +102,21 @@ fn strip(photo: &Photo) -> Image<Srgb8> {
     for (j, row) in rows.iter().enumerate() {
         paste_tiles(&mut canvas, text_height + j * row_height, row);
     }
-    canvas
+    Ok(canvas)
 }
 
 /// A cut-out over all backgrounds; below, what was measured on a display.
-fn tile_rows(photo: &Photo, cutout: &Image<Film>) -> Vec<Vec<Image<Srgb8>>> {
+fn tile_rows(
+    record: &PhotoRecord,
+    pixels: &Pixels,
+    cutout: &Image<Film>,
+) -> Vec<Vec<Image<Srgb8>>> {
     let over = BACKGROUNDS
         .iter()
         .map(|background| over_background(cutout, *background));
-    let measured = photo.record.captured.is_some();
-    let measured = measured.then(|| flow_sheet::tiles(photo, cutout));
+    let measured = record.captured.is_some();
+    let flow = pixels.flow.as_deref();
+    let measured = measured.then(|| flow_sheet::tiles(flow, cutout));
     [over.collect()].into_iter().chain(measured).collect()
 }
 
@@ -202,7 +213,7 @@ mod tests {
 
     #[test]
     fn an_empty_cut_out_shows_the_four_backgrounds() {
-        let sheet = contact_sheet(&library(&[], 1));
+        let sheet = contact_sheet(&library(&[], 1)).unwrap();
         let y = sheet.height() - 3 * GAP_PX;
         let at = |i: usize| sheet[(GAP_PX + i * (CUT_OUT_SIDE_PX + GAP_PX) + 2, y)];
         assert_eq!(
@@ -215,11 +226,11 @@ mod tests {
     #[test]
     fn diagnostics_are_written_and_make_room() {
         let heights = [&[][..], &["two objects"], &["two objects", "blurred"]]
-            .map(|d| contact_sheet(&library(d, 1)).height());
+            .map(|d| contact_sheet(&library(d, 1)).unwrap().height());
         assert!(heights[0] < heights[1] && heights[1] < heights[2]);
         assert!(
-            contact_sheet(&library(&[], 3)).height() > heights[0]
-                && contact_sheet(&library(&[], 0)).height() > 0
+            contact_sheet(&library(&[], 3)).unwrap().height() > heights[0]
+                && contact_sheet(&library(&[], 0)).unwrap().height() > 0
         );
     }
 }

@@ -1,12 +1,12 @@
 //! A flow as a file beside its cut-out.
 
-use super::manifest::{CaptureRecord, PhotoRecord};
+use super::manifest::PhotoRecord;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::io;
 use crate::io::exr::Channel;
 use crate::matte::{Flow, LightPath};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Name of the channel that is 1 where the others are known.
 const KNOWN: &str = "known";
@@ -29,8 +29,8 @@ fn path_of([x, y, haze, sx, sy, scatter_width]: [f32; 6]) -> LightPath {
     }
 }
 
-/// Writes a flow as an EXR of half floats, and returns it as it will be read back.
-pub(super) fn write(path: &Path, flow: &Flow) -> Result<Flow> {
+/// Writes a flow as an EXR of half floats.
+pub(super) fn write(path: &Path, flow: &Flow) -> Result<()> {
     let known = flow.known.map(|known| if known { 1.0 } else { 0.0 });
     let planes: [Vec<f32>; 6] = std::array::from_fn(|k| {
         let pixels = flow.paths.pixels().iter();
@@ -39,17 +39,17 @@ pub(super) fn write(path: &Path, flow: &Flow) -> Result<Flow> {
     let samples = planes.iter().map(Vec::as_slice);
     let channels = CHANNELS.into_iter().zip(samples);
     let channels: Vec<_> = channels.chain([(KNOWN, known.pixels())]).collect();
-    io::exr::write_half_channels(path, flow.paths.size(), &channels, &[])?;
-    Ok(Flow {
-        paths: flow
-            .paths
-            .map(|path| path_of(values(path).map(through_half))),
-        ..flow.clone()
-    })
+    io::exr::write_half_channels(path, flow.paths.size(), &channels, &[])
 }
 
-fn through_half(value: f32) -> f32 {
-    half::f16::from_f32(value).to_f32()
+/// The file of a record's flow, where it has one.
+///
+/// # Errors
+/// Those of [`io::inside`].
+pub(super) fn path(folder: &Path, record: &PhotoRecord) -> Result<Option<PathBuf>> {
+    let captured = record.captured.as_ref();
+    let file = captured.and_then(|captured| captured.flow.as_deref());
+    file.map(|file| io::inside(folder, file)).transpose()
 }
 
 /// Reads the flow of a record, where it has one.
@@ -62,20 +62,13 @@ pub(super) fn read(
     record: &PhotoRecord,
     size: (usize, usize),
 ) -> Result<Option<Flow>> {
-    let Some(CaptureRecord {
-        flow: Some(file),
-        height,
-        ..
-    }) = &record.captured
-    else {
+    let (Some(path), Some(captured)) = (path(folder, record)?, &record.captured) else {
         return Ok(None);
     };
-    let path = io::inside(folder, file)?;
-    let flow = decoded(&path, size)?;
     Ok(Some(Flow {
         width: record.size_m[0],
-        height: *height,
-        ..flow
+        height: captured.height,
+        ..decoded(&path, size)?
     }))
 }
 
@@ -119,6 +112,7 @@ fn plane(
 
 #[cfg(test)]
 mod tests {
+    use super::super::manifest::CaptureRecord;
     use super::super::manifest::tests::photo;
     use super::*;
 
@@ -154,9 +148,17 @@ mod tests {
     fn a_flow_is_read_as_it_was_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.flow.exr");
-        let written = write(&path, &flow()).unwrap();
+        write(&path, &flow()).unwrap();
         let read = |size| read(folder.path(), &record(), size);
-        assert_eq!(read((4, 3)).unwrap(), Some(written));
+        let through_half = |v: f32| half::f16::from_f32(v).to_f32();
+        let stored = flow()
+            .paths
+            .map(|path| path_of(values(path).map(through_half)));
+        let stored = Flow {
+            paths: stored,
+            ..flow()
+        };
+        assert_eq!(read((4, 3)).unwrap(), Some(stored));
         let size = read((5, 3)).unwrap_err().to_string();
         assert!(
             size.ends_with("4 x 3 pixels, expected the cut-out's 5 x 3"),

@@ -6,11 +6,12 @@ use super::captured::{CapturedObject, captured_object};
 use super::entry::PhotoEntry;
 use super::files;
 use super::flow_file;
-use super::library::{Photo, check_pixels};
+use super::inputs::inputs_crc32;
 use super::list::check_not_written_over;
 use super::manifest::{Manifest, PhotoRecord};
 use super::measure::MeasuredSize;
 use super::open_photo::OpenPhoto;
+use super::pixels::check_pixels;
 use super::rectified::RectifiedPhoto;
 use super::review::Review;
 use super::screen_source::EmptyScreens;
@@ -23,7 +24,6 @@ use crate::pixel::{Film, LinearRgb};
 use crate::stopwatch::Stopwatch;
 use std::fs::File;
 use std::path::Path;
-use std::sync::Arc;
 
 /// Held by whoever changes the manifest. The file stays: a lock on one that is about to be deleted
 /// would lock nothing.
@@ -47,7 +47,7 @@ pub fn add_photo(
     entry: &PhotoEntry,
     classes: &[String],
     options: &CutOutOptions,
-) -> Result<Photo> {
+) -> Result<PhotoRecord> {
     let folder = folder.as_ref();
     let mut manifest = read_or_new(folder)?;
     manifest.add_classes(classes, entry.label_class().into_iter())?;
@@ -68,11 +68,11 @@ pub fn add_photo(
         manifest.write(folder)?;
         files::remove(folder, &file)?;
     }
-    let photo = outcome.map_err(|e| refusal(e, entry, &manifest))?;
+    let record = outcome.map_err(|e| refusal(e, entry, &manifest))?;
     manifest.add_classes(classes, entry.label_class().into_iter())?;
-    manifest.insert(entry.asset_with(photo.record.clone()))?;
+    manifest.insert(entry.asset_with(record.clone()))?;
     manifest.write(folder)?;
-    Ok(photo)
+    Ok(record)
 }
 
 /// Waits until no other process changes the manifest of a folder, and makes the next ones wait; in
@@ -132,37 +132,47 @@ pub(super) struct CutOutWriter<'a> {
 }
 
 impl CutOutWriter<'_> {
-    /// Writes the cut-out and the thumbnail of one photo, and returns the photo as it would be read
-    /// back.
-    pub(super) fn write(&self, entry: &PhotoEntry) -> Result<Photo> {
-        let mut photo = match &entry.captured {
+    /// The record of a cut-out that is in the folder and would be made just so again.
+    pub(super) fn find(&self, entry: &PhotoEntry, manifest: &Manifest) -> Option<PhotoRecord> {
+        let record = manifest.record(&entry.cut_out_file())?;
+        let inputs = inputs_crc32(entry, self.options).ok()?;
+        let is_same = record.inputs_crc32 == Some(inputs);
+        let is_whole = |file| self.folder.join(file).exists();
+        let is_there =
+            record.files().all(is_whole) && manifest.is_file_of(self.folder, &record.file);
+        (is_same && is_there).then(|| record.clone())
+    }
+
+    /// Writes the cut-out and the thumbnail of one photo.
+    pub(super) fn write(&self, entry: &PhotoEntry) -> Result<PhotoRecord> {
+        let record = match &entry.captured {
             Some(captured) => self.write_captured(entry, captured),
             None => self.write_cut_out(entry),
         }?;
-        photo.record.source_crc32 = Some(Checksum::from_file(&entry.file)?.crc32);
-        Ok(photo)
+        Ok(PhotoRecord {
+            source_crc32: Some(Checksum::from_file(&entry.file)?.crc32),
+            inputs_crc32: Some(inputs_crc32(entry, self.options)?),
+            ..record
+        })
     }
 
     /// Measures an object that was captured on a display.
-    fn write_captured(&self, entry: &PhotoEntry, captured: &CaptureEntry) -> Result<Photo> {
+    fn write_captured(&self, entry: &PhotoEntry, captured: &CaptureEntry) -> Result<PhotoRecord> {
         let review = review_of(&entry.file)?;
         check_unpainted(&review, &entry.file)?;
         let CapturedObject { film, flow, record } = captured_object(entry, captured, self.options)?;
         let record = record.reviewed(review.verdict);
         // A display shines through the object once: nothing of what is seen is its shadow.
         let passed = film.map(Film::transmittance);
-        let photo = self.write_film(&film, &passed, record)?;
-        let path = self.folder.join(files::flow_file(&photo.record.file));
-        let flow = flow
-            .map(|flow| flow_file::write(&path, &flow))
-            .transpose()?;
-        Ok(Photo {
-            flow: flow.map(Arc::new),
-            ..photo
-        })
+        let record = self.write_film(&film, &passed, record)?;
+        if let Some(flow) = flow {
+            let path = self.folder.join(files::flow_file(&record.file));
+            flow_file::write(&path, &flow)?;
+        }
+        Ok(record)
     }
 
-    fn write_cut_out(&self, entry: &PhotoEntry) -> Result<Photo> {
+    fn write_cut_out(&self, entry: &PhotoEntry) -> Result<PhotoRecord> {
         let mut watch = Stopwatch::start();
         let review = review_of(&entry.file)?;
         let photo = OpenPhoto::beside(entry, &self.empty_screens, self.options)?;
@@ -173,10 +183,10 @@ impl CutOutWriter<'_> {
         watch.lap("cut out");
         let record = new_record(&cut, entry, &photo.rectified)?.reviewed(review.verdict);
         watch.lap("measure");
-        let photo = self.write_film(&cut.film, &cut.transmittance, record)?;
+        let record = self.write_film(&cut.film, &cut.transmittance, record)?;
         watch.lap("write");
         watch.log(entry.file.display());
-        Ok(photo)
+        Ok(record)
     }
 
     /// Writes film and thumbnail, and notes the checksum of the film.
@@ -185,13 +195,13 @@ impl CutOutWriter<'_> {
         film: &Image<Film>,
         transmittance: &Image<LinearRgb>,
         record: PhotoRecord,
-    ) -> Result<Photo> {
+    ) -> Result<PhotoRecord> {
         let path = self.folder.join(&record.file);
         io::create_folder(path.parent().unwrap_or(self.folder))?;
         let film = files::write(&path, film, transmittance)?;
         check_pixels(&film).map_err(|what| Error::file(&path, what))?;
         let crc32 = Some(Checksum::from_file(&path)?.crc32);
-        Ok(Photo::new(film, PhotoRecord { crc32, ..record }))
+        Ok(PhotoRecord { crc32, ..record })
     }
 }
 

@@ -1,16 +1,13 @@
-//! An asset folder in memory, ready to be put into scenes.
+//! An asset folder as scenes use it: what the manifest says, and pixels that are read when they are
+//! first shown.
 
 use super::MANIFEST;
 use super::flow_file;
 use super::manifest::{Asset, Manifest, PhotoRecord, class_number};
-use super::surface::SurfaceCache;
-use super::texture::Texture;
+use super::pixels::{BYTES_PER_PIXEL, CutOutFiles, PixelChecksums, Pixels, most_bytes};
 use crate::error::{Error, Result};
 use crate::geom::Point2;
-use crate::image::Image;
-use crate::io;
-use crate::matte::Flow;
-use crate::pixel::Film;
+use crate::io::{self, Checksum};
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
@@ -24,31 +21,33 @@ pub struct Library {
     pub assets: Vec<Asset<Photo>>,
 }
 
-/// One cut-out of an object.
+/// One cut-out of an object. Clones share its pixels.
 #[derive(Clone, Debug)]
 pub struct Photo {
-    /// The cut-out, premultiplied, scene-linear.
-    pub texture: Texture,
     /// The object's convex hull in texture coordinates (0 to 1, right and down), in order.
     pub outline_uv: Arc<[Point2<f64>]>,
-    /// How it bends what is seen through it; none where that was not measured.
-    #[doc(hidden)]
-    pub flow: Option<Arc<Flow>>,
-    /// What its texels are of.
-    #[doc(hidden)]
-    pub surface: SurfaceCache,
     /// Its entry in the manifest.
     pub record: PhotoRecord,
+    source: Source,
+}
+
+/// Where the pixels of a cut-out are.
+#[derive(Clone, Debug)]
+enum Source {
+    Memory(Pixels),
+    Files(Arc<CutOutFiles>, PixelChecksums),
 }
 
 impl Library {
-    /// Opens an asset folder: checks its manifest and loads its cut-outs, several at a time.
+    /// Opens an asset folder: checks its manifest and that its cut-outs are what the manifest says,
+    /// several at a time. Their pixels are read when they are first needed; those used last stay in
+    /// memory, up to a quarter of the machine's.
     ///
     /// # Errors
     /// Those of [`Manifest::read`]; [`Error::File`] for a cut-out that cannot be read, has another
-    /// checksum than in the manifest, or holds values that no picture has; [`Error::Field`]
-    /// (`size_m`) for one of another size than in the manifest. Of several the first in the
-    /// manifest's order.
+    /// checksum than in the manifest, or, where that has none, holds values that no picture has;
+    /// [`Error::Field`] (`size_m`) for one of another size than in the manifest. Of several the
+    /// first in the manifest's order.
     pub fn open(folder: impl AsRef<Path>) -> Result<Self> {
         Self::open_some(folder, |_| true)
     }
@@ -61,26 +60,12 @@ impl Library {
     pub fn open_some(folder: impl AsRef<Path>, wanted: impl Fn(&str) -> bool) -> Result<Self> {
         let mut manifest = Manifest::read(&folder)?;
         manifest.assets.retain(|asset| wanted(&asset.name));
-        Self::from_manifest(folder.as_ref(), manifest, &[])
+        Self::from_manifest(folder.as_ref(), manifest)
     }
 
-    /// The same with photos that were just [added](super::add_photo), which need not be read.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open).
-    pub fn open_with(folder: impl AsRef<Path>, added: Vec<Photo>) -> Result<Self> {
-        let manifest = Manifest::read(&folder)?;
-        Self::from_manifest(folder.as_ref(), manifest, &added)
-    }
-
-    /// The library of a manifest that was read or written just now, with photos that need not be
-    /// read.
-    pub(super) fn from_manifest(
-        folder: &Path,
-        manifest: Manifest,
-        added: &[Photo],
-    ) -> Result<Self> {
-        let mut photos = load_all(folder, &manifest, added).into_iter();
+    /// The library of a manifest that was read or written just now.
+    pub(super) fn from_manifest(folder: &Path, manifest: Manifest) -> Result<Self> {
+        let mut photos = open_all(folder, &manifest).into_iter();
         let assets = manifest.assets.into_iter().map(|asset| {
             let own = photos.by_ref().take(asset.photos.len());
             let own = own.collect::<Result<_>>()?;
@@ -90,6 +75,33 @@ impl Library {
             assets: assets.collect::<Result<_>>()?,
             classes: manifest.classes,
         })
+    }
+
+    /// Warns where the cut-outs take more memory than there is for them, since pictures will then
+    /// read them again and again.
+    pub(crate) fn warn_of_size(&self) {
+        let photos = self.assets.iter().flat_map(|asset| &asset.photos);
+        let needed: f64 = photos.map(Photo::bytes_in_files).sum();
+        let kept = most_bytes() as f64;
+        if needed > kept {
+            log::warn!(
+                "cut-outs take {:.1} GB in memory, {:.1} GB of them are kept and others read anew for each picture:                  a smaller longest_side in [cut_out] of their list makes this faster",
+                needed / 1e9,
+                kept / 1e9
+            );
+        }
+    }
+
+    /// Reads the pixels of every cut-out, as a picture that shows it would.
+    ///
+    /// # Errors
+    /// As [`Photo::pixels`], for the first in the manifest's order.
+    #[doc(hidden)]
+    pub fn check_pixels(&self) -> Result<()> {
+        let photos: Vec<_> = self.assets.iter().flat_map(|a| &a.photos).collect();
+        let read = |photo: &&Photo| photo.pixels_once().map(drop);
+        let checked: Vec<_> = photos.par_iter().map(read).collect();
+        checked.into_iter().collect()
     }
 
     /// The asset of a name.
@@ -107,15 +119,13 @@ impl Library {
     }
 }
 
-/// The photos of a manifest in its order: those just added, and the others from their files.
-fn load_all(folder: &Path, manifest: &Manifest, added: &[Photo]) -> Vec<Result<Photo>> {
+/// The photos of a manifest in its order.
+fn open_all(folder: &Path, manifest: &Manifest) -> Vec<Result<Photo>> {
+    let files = Arc::new(CutOutFiles::in_folder(folder));
     let records: Vec<(String, &PhotoRecord)> = places_and_records(manifest).collect();
     records
         .par_iter()
-        .map(|(at, record)| {
-            let added = added.iter().find(|photo| photo.record == **record);
-            added.map_or_else(|| load(folder, record, at), |photo| Ok(photo.clone()))
-        })
+        .map(|(at, record)| open(folder, record, at, &files))
         .collect()
 }
 
@@ -131,18 +141,26 @@ fn places_and_records(manifest: &Manifest) -> impl Iterator<Item = (String, &Pho
 /// rounding.
 const ROUNDING_PX: f64 = 0.5;
 
-/// Reads the cut-out of a record that stands at a place of the manifest.
-fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
+/// The photo of a record that stands at a place of the manifest; what its checksum does not cover
+/// is read once.
+fn open(folder: &Path, record: &PhotoRecord, at: &str, files: &Arc<CutOutFiles>) -> Result<Photo> {
     let path = io::inside(folder, &record.file).map_err(|e| in_manifest(e, folder, at))?;
-    let image: Image<Film> = io::read_checked(&path, |bytes| check_bytes(bytes, record))?;
-    check_size(&image, record).map_err(|e| in_manifest(e, folder, at))?;
-    check_pixels(&image).map_err(|what| Error::file(path, what))?;
-    let flow =
-        flow_file::read(folder, record, image.size()).map_err(|e| in_manifest(e, folder, at))?;
-    Ok(Photo {
-        flow: flow.map(Arc::new),
-        ..Photo::new(image, record.clone())
-    })
+    let texture = Checksum::from_file(&path)?.crc32;
+    check_crc32(texture, record).map_err(|what| Error::file(&path, what))?;
+    let header = io::read_header(&path)?;
+    let size = (header.width, header.height);
+    check_size(size, record).map_err(|e| in_manifest(e, folder, at))?;
+    let flow = flow_file::path(folder, record).map_err(|e| in_manifest(e, folder, at))?;
+    let flow = flow.map(Checksum::from_file).transpose()?;
+    let checksums = PixelChecksums {
+        texture,
+        flow: flow.map(|found| found.crc32),
+    };
+    if record.crc32.is_none() || flow.is_some() {
+        files.read(record, checksums)?;
+    }
+    let source = Source::Files(Arc::clone(files), checksums);
+    Ok(Photo::from_source(source, size, record.clone()))
 }
 
 fn in_manifest(error: Error, folder: &Path, at: &str) -> Error {
@@ -151,19 +169,18 @@ fn in_manifest(error: Error, folder: &Path, at: &str) -> Error {
 
 /// Fails where a file is another than the manifest tells of, as a build leaves it that was
 /// interrupted: its size and outline would be those of another cut-out.
-fn check_bytes(bytes: &[u8], record: &PhotoRecord) -> std::result::Result<(), String> {
-    let is_same = |crc32: u32| crc32 == crc32fast::hash(bytes);
-    if record.crc32.is_none_or(is_same) {
+fn check_crc32(found: u32, record: &PhotoRecord) -> std::result::Result<(), String> {
+    if record.crc32.is_none_or(|crc32| crc32 == found) {
         return Ok(());
     }
     let advice = "build or add its photo again";
     Err(format!("not the file that {MANIFEST} tells of: {advice}"))
 }
 
-fn check_size(image: &Image<Film>, record: &PhotoRecord) -> Result<()> {
-    let [w, h] = [image.width() as f64, image.height() as f64];
+fn check_size((w, h): (usize, usize), record: &PhotoRecord) -> Result<()> {
     let [expected_w, expected_h] = record.size_px();
-    if (expected_w - w).abs() <= ROUNDING_PX && (expected_h - h).abs() <= ROUNDING_PX {
+    let is_near = |expected: f64, found: usize| (expected - found as f64).abs() <= ROUNDING_PX;
+    if is_near(expected_w, w) && is_near(expected_h, h) {
         return Ok(());
     }
     let what = format!(
@@ -173,32 +190,55 @@ fn check_size(image: &Image<Film>, record: &PhotoRecord) -> Result<()> {
     Err(Error::value("size_m", what))
 }
 
-/// What is wrong with the first pixel that no picture has.
-pub(super) fn check_pixels(image: &Image<Film>) -> std::result::Result<(), String> {
-    let unsound = image.pixels().iter().position(|p| !p.is_sound());
-    unsound.map_or(Ok(()), |i| {
-        let at = (i % image.width(), i / image.width());
-        Err(unsound_pixel(&image[at], at))
-    })
-}
-
-fn unsound_pixel(film: &Film, (x, y): (usize, usize)) -> String {
-    let [color, opacity] = [film.color, film.opacity].map(<[f32; 3]>::from);
-    format!(
-        "colour {color:?} and opacity {opacity:?} at ({x}, {y}), expected finite colour and opacity from 0 to 1"
-    )
-}
-
 impl Photo {
-    /// A cut-out and its entry in the manifest.
-    pub fn new(cut_out: impl Into<Texture>, record: PhotoRecord) -> Self {
-        let texture = cut_out.into();
+    /// A cut-out in memory and its entry in the manifest.
+    pub fn new(cut_out: impl Into<Pixels>, record: PhotoRecord) -> Self {
+        let pixels = cut_out.into();
+        let size = pixels.texture.size();
+        Self::from_source(Source::Memory(pixels), size, record)
+    }
+
+    fn from_source(source: Source, size: (usize, usize), record: PhotoRecord) -> Self {
         Self {
-            outline_uv: texture_coordinates(&record.outline_px, texture.size()),
-            texture,
-            flow: None,
-            surface: SurfaceCache::default(),
+            outline_uv: texture_coordinates(&record.outline_px, size),
             record,
+            source,
+        }
+    }
+
+    /// Memory that its pixels take once they are read from files and shown.
+    fn bytes_in_files(&self) -> f64 {
+        let [w, h] = self.record.size_px();
+        match self.source {
+            Source::Memory(_) => 0.0,
+            Source::Files(..) => BYTES_PER_PIXEL * w * h,
+        }
+    }
+
+    /// What a card shows of it, read from its file where it is not in memory.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a file that cannot be read, or has changed since its folder was opened.
+    pub fn pixels(&self) -> Result<Pixels> {
+        match &self.source {
+            Source::Memory(pixels) => Ok(pixels.clone()),
+            Source::Files(files, checksums) => files.pixels(&self.record, *checksums),
+        }
+    }
+
+    /// The same for a single look: what is read is not kept.
+    pub(super) fn pixels_once(&self) -> Result<Pixels> {
+        match &self.source {
+            Source::Memory(pixels) => Ok(pixels.clone()),
+            Source::Files(files, checksums) => files.read(&self.record, *checksums),
+        }
+    }
+
+    /// Checksums of its pixels: of its files, where it has some.
+    pub(crate) fn checksums(&self) -> PixelChecksums {
+        match &self.source {
+            Source::Memory(pixels) => pixels.checksums(),
+            Source::Files(_, checksums) => *checksums,
         }
     }
 
@@ -220,6 +260,7 @@ mod tests {
     use super::super::manifest::tests::photo;
     use super::super::role::Role;
     use super::*;
+    use crate::image::Image;
     use crate::pixel::PremulRgba;
 
     fn folder_with(picture: Option<(usize, usize)>) -> tempfile::TempDir {
@@ -257,7 +298,7 @@ mod tests {
             (Some(2), 1)
         );
         assert_eq!(
-            asset.photos[0].texture.texel(3, 3),
+            asset.photos[0].pixels().unwrap().texture.texel(3, 3),
             PremulRgba::new(0.25, 0.5, 0.125, 0.75).into()
         );
         assert_eq!(
@@ -267,24 +308,20 @@ mod tests {
     }
 
     #[test]
-    fn photos_in_memory_are_not_read() {
-        let folder = folder_with(None);
-        let record = Manifest::read(folder.path())
-            .unwrap()
-            .assets
-            .remove(0)
-            .photos
-            .remove(0);
-        let film = Image::filled(40, 20, Film::from(PremulRgba::new(0.25, 0.5, 0.125, 0.75)));
-        let library =
-            Library::open_with(folder.path(), vec![Photo::new(film, record.clone())]).unwrap();
-        assert_eq!(library.assets[0].photos[0].texture.size(), (40, 20));
-        let other = PhotoRecord {
-            file: "b.exr".into(),
-            ..record
-        };
-        let stranger = Photo::new(Image::filled(40, 20, Film::default()), other);
-        assert!(Library::open_with(folder.path(), vec![stranger]).is_err());
+    fn a_cut_out_that_changes_is_refused_unless_it_was_read() {
+        let [read, unread] = [(); 2].map(|()| folder_with(Some((40, 20))));
+        let [kept, changed] = [&read, &unread].map(|folder| Library::open(folder).unwrap());
+        let before = kept.assets[0].photos[0].pixels().unwrap();
+        for folder in [&read, &unread] {
+            let other = Image::filled(40, 20, PremulRgba::TRANSPARENT);
+            io::write(folder.path().join("a.exr"), &other).unwrap();
+        }
+        let after = kept.assets[0].photos[0].pixels().unwrap();
+        assert_eq!(after.texture.checksum(), before.texture.checksum());
+        let refused = changed.assets[0].photos[0].pixels().unwrap_err();
+        let expected = "a.exr: has other bytes than when its folder was opened";
+        assert!(refused.to_string().ends_with(expected), "{refused}");
+        assert!(changed.check_pixels().is_err() && kept.check_pixels().is_err());
     }
 
     #[test]

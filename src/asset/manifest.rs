@@ -64,6 +64,10 @@ pub struct PhotoRecord {
     /// CRC-32 of that photo; missing in older manifests.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source_crc32: Option<u32>,
+    /// CRC-32 of all that it was made from: version of the program, options, entry of the list, bytes
+    /// of the files that it names; missing in older manifests.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inputs_crc32: Option<u32>,
     /// Pixels of the cut-out for a metre.
     pub px_per_metre: f64,
     /// Width and height of the whole cut-out, metres.
@@ -282,14 +286,18 @@ impl Manifest {
 
     /// It has a cut-out in this file.
     pub(super) fn has(&self, file: &str) -> bool {
+        self.record(file).is_some()
+    }
+
+    /// The record of the cut-out in this file.
+    pub(super) fn record(&self, file: &str) -> Option<&PhotoRecord> {
         let mut photos = self.assets.iter().flat_map(|asset| &asset.photos);
-        photos.any(|photo| photo.file == file)
+        photos.find(|photo| photo.file == file)
     }
 
     /// The file of a cut-out has the checksum that it records; where it records none any file does.
     pub(super) fn is_file_of(&self, folder: &Path, file: &str) -> bool {
-        let mut photos = self.assets.iter().flat_map(|asset| &asset.photos);
-        let record = photos.find(|photo| photo.file == file);
+        let record = self.record(file);
         record.and_then(|photo| photo.crc32).is_none_or(|crc32| {
             let found = Checksum::from_file(folder.join(file));
             found.is_ok_and(|found| found.crc32 == crc32)
@@ -480,6 +488,7 @@ impl PhotoRecord {
             crc32: None,
             source: String::new(),
             source_crc32: None,
+            inputs_crc32: None,
             px_per_metre,
             size_m,
             object_m: size_m,

@@ -23,6 +23,7 @@ mod flow_file;
 mod flow_sheet;
 mod folder;
 mod inpaint;
+mod inputs;
 mod library;
 mod list;
 mod manifest;
@@ -30,6 +31,7 @@ mod measure;
 mod moments;
 mod open_photo;
 mod panorama;
+mod pixels;
 mod rectified;
 mod review;
 mod role;
@@ -45,7 +47,7 @@ mod top_view;
 
 #[doc(hidden)]
 pub use build::Built;
-pub use build::build;
+pub use build::{build, resume};
 #[doc(hidden)]
 pub use capture_entry::CaptureEntry;
 #[doc(hidden)]
@@ -69,6 +71,7 @@ pub use moments::{Moments, Piece};
 pub use open_photo::OpenPhoto;
 pub use panorama::Panorama;
 pub(crate) use panorama::warn_of_bits;
+pub use pixels::Pixels;
 pub use review::{Review, Verdict};
 #[doc(hidden)]
 pub use role::Role;

@@ -449,8 +449,7 @@ mod tests {
             &entry,
             &[],
             &CutOutOptions::default(),
-        )?
-        .record;
+        )?;
         Ok([record.object_m[0], record.object_m[1], record.error_m])
     }
 

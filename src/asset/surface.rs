@@ -6,7 +6,7 @@ use crate::filter::{Pyramid, depth};
 use crate::image::{Image, Mask};
 use crate::pixel::{Film, Mix};
 use std::collections::VecDeque;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, OnceLock, Weak};
 
 /// Opacity up to which a texel may be beside the object.
 const EMPTY_OPACITY: f32 = 0.02;
@@ -42,7 +42,23 @@ impl Mix for SurfaceTexel {
 #[derive(Clone, Debug, Default)]
 pub struct SurfaceCache(Arc<OnceLock<Pyramid<SurfaceTexel>>>);
 
+/// A map while somebody uses it.
+pub(super) type WeakSurface = Weak<OnceLock<Pyramid<SurfaceTexel>>>;
+
 impl SurfaceCache {
+    pub(super) fn downgrade(&self) -> WeakSurface {
+        Arc::downgrade(&self.0)
+    }
+
+    pub(super) fn upgrade(weak: &WeakSurface) -> Option<Self> {
+        weak.upgrade().map(Self)
+    }
+
+    /// Bytes of the map by now.
+    pub(super) fn bytes(&self) -> usize {
+        self.0.get().map_or(0, Pyramid::bytes)
+    }
+
     /// The map; `texture` is the same at every call.
     pub fn of(&self, texture: &Texture) -> &Pyramid<SurfaceTexel> {
         if let Some(map) = self.0.get() {

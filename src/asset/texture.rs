@@ -4,7 +4,7 @@ use crate::filter::Pyramid;
 use crate::image::Image;
 use crate::pixel::{Film, PremulRgba};
 use bytemuck::NoUninit;
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 /// A cut-out at all its levels of detail, shared by all that show it. Scene-linear, premultiplied.
 ///
@@ -18,7 +18,30 @@ pub enum Texture {
     Film(Arc<Pyramid<Film>>),
 }
 
+/// A texture while somebody shows it.
+#[derive(Debug)]
+pub(super) enum WeakTexture {
+    Rgba(Weak<Pyramid<PremulRgba>>),
+    Film(Weak<Pyramid<Film>>),
+}
+
+impl WeakTexture {
+    pub(super) fn upgrade(&self) -> Option<Texture> {
+        match self {
+            Self::Rgba(pyramid) => pyramid.upgrade().map(Texture::Rgba),
+            Self::Film(pyramid) => pyramid.upgrade().map(Texture::Film),
+        }
+    }
+}
+
 impl Texture {
+    pub(super) fn downgrade(&self) -> WeakTexture {
+        match self {
+            Self::Rgba(pyramid) => WeakTexture::Rgba(Arc::downgrade(pyramid)),
+            Self::Film(pyramid) => WeakTexture::Film(Arc::downgrade(pyramid)),
+        }
+    }
+
     /// Columns and rows at full detail.
     pub fn size(&self) -> (usize, usize) {
         match self {
@@ -38,6 +61,14 @@ impl Texture {
         match self {
             Self::Rgba(pyramid) => pyramid.levels(),
             Self::Film(pyramid) => pyramid.levels(),
+        }
+    }
+
+    /// Bytes of the levels that exist by now.
+    pub(super) fn bytes(&self) -> usize {
+        match self {
+            Self::Rgba(pyramid) => pyramid.bytes(),
+            Self::Film(pyramid) => pyramid.bytes(),
         }
     }
 

@@ -4,10 +4,11 @@ use crate::asset::{Panorama, warn_of_bits};
 use crate::dataset::DatasetConfig;
 use crate::error::{Error, Result};
 use crate::io;
+use crate::lru::{LruCache, Shared};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Weak};
 
-/// Bytes of pictures that are kept; those used last stay, and one of any size.
+/// Bytes of pictures that are kept.
 const KEPT_BYTES: usize = 1 << 30;
 
 /// The environment maps of a recipe.
@@ -17,8 +18,7 @@ pub(crate) struct EnvironmentMaps {
     folder: PathBuf,
     /// What the recipe lists.
     listed: Vec<String>,
-    /// In the order in which they were used last.
-    kept: Mutex<Vec<(String, Arc<Panorama>)>>,
+    kept: LruCache<Arc<Panorama>>,
 }
 
 impl EnvironmentMaps {
@@ -27,7 +27,7 @@ impl EnvironmentMaps {
         Self {
             folder: config.folder.clone(),
             listed,
-            kept: Mutex::default(),
+            kept: LruCache::of_bytes(KEPT_BYTES),
         }
     }
 
@@ -49,11 +49,9 @@ impl EnvironmentMaps {
     /// A name that the recipe does not list and that leads out of its folder; a file that is no
     /// panorama.
     pub(crate) fn picture(&self, name: &str) -> Result<Arc<Panorama>> {
-        if let Some(picture) = self.find(name) {
+        if let Some(picture) = self.kept.get(name) {
             return Ok(picture);
         }
-        // Decoded before the list is locked: the work is parallel, and a thread that waits may come
-        // back here.
         let path = self.path(name)?;
         let picture = Panorama::read(&path)?;
         self.keep(name, picture, &path)
@@ -71,28 +69,28 @@ impl EnvironmentMaps {
         })
     }
 
-    fn find(&self, name: &str) -> Option<Arc<Panorama>> {
-        let mut kept = self.kept();
-        let place = kept.iter().position(|(known, _)| known == name)?;
-        kept[place..].rotate_left(1);
-        kept.last().map(|(_, picture)| picture.clone())
-    }
-
     fn keep(&self, name: &str, picture: Panorama, path: &Path) -> Result<Arc<Panorama>> {
-        if let Some(known) = self.find(name) {
+        if let Some(known) = self.kept.get(name) {
             return Ok(known);
         }
         warn_of_bits(path)?;
-        let picture = Arc::new(picture);
-        let mut kept = self.kept();
-        kept.push((name.to_owned(), picture.clone()));
-        drop_oldest(&mut kept);
-        Ok(picture)
+        Ok(self.kept.insert(name, Arc::new(picture)))
+    }
+}
+
+impl Shared for Arc<Panorama> {
+    type Weak = Weak<Panorama>;
+
+    fn bytes(&self) -> usize {
+        size_of_val(self.image().pixels())
     }
 
-    fn kept(&self) -> MutexGuard<'_, Vec<(String, Arc<Panorama>)>> {
-        // Every change is whole, even where a thread panicked afterwards.
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    fn downgrade(&self) -> Self::Weak {
+        Arc::downgrade(self)
+    }
+
+    fn upgrade(weak: &Self::Weak) -> Option<Self> {
+        weak.upgrade()
     }
 }
 
@@ -100,18 +98,6 @@ fn not_listed(name: &str) -> Error {
     let what =
         "expected one that the recipe lists (scene.environment.files) or that lies in its folder";
     Error::value("environment.file", format!("\"{name}\", {what}"))
-}
-
-/// Drops the pictures that were used longest ago, until the others take little enough memory.
-fn drop_oldest(kept: &mut Vec<(String, Arc<Panorama>)>) {
-    while kept.len() > 1 && total_bytes(kept) > KEPT_BYTES {
-        kept.remove(0);
-    }
-}
-
-fn total_bytes(kept: &[(String, Arc<Panorama>)]) -> usize {
-    let pictures = kept.iter().map(|(_, picture)| picture.image());
-    pictures.map(|image| size_of_val(image.pixels())).sum()
 }
 
 #[cfg(test)]

@@ -5,7 +5,6 @@ use crate::dataset::background_photo::BackgroundPhoto;
 use crate::dataset::environment_maps::EnvironmentMaps;
 use crate::dataset::{DatasetConfig, Inputs};
 use crate::error::Result;
-use crate::matte::Flow;
 use crate::scene::Background;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -60,30 +59,21 @@ fn of_asset(asset: &Asset<Photo>) -> Value {
 }
 
 fn of_photo(photo: &Photo) -> Value {
+    let checksums = photo.checksums();
     let mut told = json!({
         "file": photo.record.file,
         "px_per_metre": photo.record.px_per_metre,
         "size_m": photo.size(),
         "outline_px": digest(&photo.record.outline_px),
-        "pixels": shown(photo.texture.checksum()),
+        "pixels": shown(checksums.texture),
     });
-    if let Some(flow) = &photo.flow {
-        told["flow"] = json!(shown(flow_checksum(flow)));
+    if let Some(flow) = checksums.flow {
+        told["flow"] = json!(shown(flow));
+    }
+    if let Some(captured) = &photo.record.captured {
+        told["height"] = json!(captured.height);
     }
     told
-}
-
-/// CRC-32 of where light goes and of the height over what is seen there; the width is the photo's.
-fn flow_checksum(flow: &Flow) -> u32 {
-    let mut hasher = crc32fast::Hasher::new();
-    hasher.update(&flow.height.to_le_bytes());
-    for (path, known) in flow.paths.pixels().iter().zip(flow.known.pixels()) {
-        let ([x, y], [sx, sy]) = (path.displacement, path.scatter_displacement);
-        let values = [x, y, path.haze, sx, sy, path.scatter_width];
-        hasher.update(bytemuck::bytes_of(&values));
-        hasher.update(&[u8::from(*known)]);
-    }
-    hasher.finalize()
 }
 
 fn of_places(places: &[BackgroundPhoto], inputs: &mut Inputs) -> Result<Vec<Value>> {
@@ -180,9 +170,9 @@ fn shown(crc32: u32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::asset::PhotoRecord;
+    use crate::asset::{PhotoRecord, Pixels};
     use crate::image::Image;
-    use crate::matte::LightPath;
+    use crate::matte::{Flow, LightPath};
     use crate::pixel::PremulRgba;
     use std::sync::Arc;
 
@@ -190,7 +180,7 @@ mod tests {
     fn another_flow_shows() {
         let outline = vec![[0.0, 0.0], [4.0, 0.0], [4.0, 2.0]];
         let record = PhotoRecord::new("a.exr", 10.0, [0.4, 0.2], outline);
-        let plain = Photo::new(Image::filled(4, 2, PremulRgba::TRANSPARENT), record);
+        let clear = Pixels::from(Image::filled(4, 2, PremulRgba::TRANSPARENT));
         let bent = |haze: f32, height: f64, known: bool| {
             let paths = LightPath {
                 haze,
@@ -202,17 +192,18 @@ mod tests {
                 width: 0.4,
                 height,
             };
-            let photo = Photo {
+            let pixels = Pixels {
                 flow: Some(Arc::new(flow)),
-                ..plain.clone()
+                ..clear.clone()
             };
-            of_photo(&photo)["flow"].clone()
+            of_photo(&Photo::new(pixels, record.clone()))["flow"].clone()
         };
         let usual = bent(0.1, 0.03, true);
         assert!(usual.is_string());
         for other in [(0.2, 0.03, true), (0.1, 0.04, true), (0.1, 0.03, false)] {
             assert_ne!(bent(other.0, other.1, other.2), usual);
         }
+        let plain = Photo::new(clear.clone(), record.clone());
         assert!(of_photo(&plain).get("flow").is_none(), "identities stay");
     }
 }

@@ -242,6 +242,7 @@ impl Pipeline {
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
         let (scene, labels) = (&self.config.scene, &self.config.labels);
         self.check_room_with(scene)?;
+        self.library.warn_of_size();
         let folder = folder.into();
         let mut inputs = Inputs::kept(&folder);
         Ok(Plan {

@@ -1,9 +1,12 @@
 //! What recipes and shots can choose from: the assets of a library, and labelled backgrounds.
 
-use crate::asset::{Asset, Library, Photo, Role};
+use crate::asset::{Asset, Library, Photo, Pixels, Role};
 use crate::color::Albedo;
+use crate::error::Result;
+use crate::geom::Point2;
 use crate::scene::hull::prism_outline;
 use crate::scene::{Appearance, CameraSource, Object, Wall};
+use std::sync::Arc;
 
 /// An asset as a recipe sees it: what may be chosen, without its pictures.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,27 +69,43 @@ fn collider_outline(photo: &Photo) -> Vec<[f64; 2]> {
 
 impl Appearance {
     /// What an object looks like by a library; none where it lacks the asset or the photo.
-    pub fn from_library(library: &Library, object: &Object) -> Option<Self> {
-        let asset = library.find(&object.asset)?;
-        let photo = asset.photos.get(object.photo)?;
-        let back = match object.back {
-            Some(i) => Some(asset.photos.get(i)?),
-            None => None,
+    ///
+    /// # Errors
+    /// Those of [`Photo::pixels`].
+    pub fn from_library(library: &Library, object: &Object) -> Result<Option<Self>> {
+        let Some(asset) = library.find(&object.asset) else {
+            return Ok(None);
         };
-        let surfaces = [Some(photo), back].map(|photo| photo.map(|photo| photo.surface.clone()));
-        Some(Self {
-            class: match object.role {
-                Role::Object => library.class_number(asset),
-                Role::Distractor => None,
-            },
-            texture: photo.texture.clone(),
-            back: back.map(|photo| photo.texture.clone()),
-            outline_uv: photo.outline_uv.clone(),
-            flows: [
-                photo.flow.clone(),
-                back.and_then(|photo| photo.flow.clone()),
-            ],
-            surfaces: surfaces.map(Option::unwrap_or_default),
-        })
+        let photos = [Some(object.photo), object.back];
+        let [front, back] = photos.map(|i| i.map(|i| asset.photos.get(i)));
+        let (Some(Some(front)), None | Some(Some(_))) = (front, back) else {
+            return Ok(None);
+        };
+        let outline_uv = front.outline_uv.clone();
+        let front = front.pixels()?;
+        let back = back.flatten().map(Photo::pixels).transpose()?;
+        let class = match object.role {
+            Role::Object => library.class_number(asset),
+            Role::Distractor => None,
+        };
+        Ok(Some(Self::from_pixels(class, outline_uv, front, back)))
+    }
+
+    fn from_pixels(
+        class: Option<u32>,
+        outline_uv: Arc<[Point2<f64>]>,
+        front: Pixels,
+        back: Option<Pixels>,
+    ) -> Self {
+        let flow = back.as_ref().and_then(|back| back.flow.clone());
+        let surface = back.as_ref().map(|back| back.surface.clone());
+        Self {
+            class,
+            outline_uv,
+            texture: front.texture,
+            back: back.map(|back| back.texture),
+            flows: [front.flow, flow],
+            surfaces: [front.surface, surface.unwrap_or_default()],
+        }
     }
 }

@@ -76,7 +76,7 @@ impl Scene {
     /// plate of another size; an environment without its picture.
     pub fn resolve(
         &self,
-        look: impl Fn(&Object) -> Option<Appearance>,
+        look: impl Fn(&Object) -> Result<Option<Appearance>>,
         plate: Option<Arc<Image<LinearRgb>>>,
         panorama: Option<Arc<Panorama>>,
     ) -> Result<Shot> {
@@ -160,7 +160,7 @@ impl Scene {
         self.view.plate(camera, value)
     }
 
-    fn cards(&self, look: impl Fn(&Object) -> Option<Appearance>) -> Result<Vec<Card>> {
+    fn cards(&self, look: impl Fn(&Object) -> Result<Option<Appearance>>) -> Result<Vec<Card>> {
         let numbered = self.objects.iter().enumerate();
         let there = numbered.filter(|(_, object)| object.placement != Placement::Gone);
         there
@@ -273,12 +273,12 @@ fn missing_panorama(file: &str) -> Error {
 fn resting_card(
     i: usize,
     object: &Object,
-    look: impl Fn(&Object) -> Option<Appearance>,
+    look: impl Fn(&Object) -> Result<Option<Appearance>>,
 ) -> Result<Card> {
     let Placement::At(pose) = object.placement else {
         return Err(still_falling(i));
     };
-    let look = look(object).ok_or_else(|| unknown_asset(i, object))?;
+    let look = look(object)?.ok_or_else(|| unknown_asset(i, object))?;
     Ok(look.into_card(ObjectId(object_id(i)?), object, pose))
 }
 
@@ -350,17 +350,17 @@ mod tests {
         }
     }
 
-    fn look(object: &Object) -> Option<Appearance> {
+    fn look(object: &Object) -> Result<Option<Appearance>> {
         let texture = Texture::from(Image::filled(2, 2, PremulRgba::default()));
         let outline_uv: Arc<[Point2<f64>]> = Arc::from([Point2::new(0.0, 0.0)]);
-        (object.asset == "b1").then_some(Appearance {
+        Ok((object.asset == "b1").then_some(Appearance {
             class: Some(3),
             texture,
             back: None,
             outline_uv,
             flows: Default::default(),
             surfaces: Default::default(),
-        })
+        }))
     }
 
     fn complaint(spoil: impl Fn(&mut Scene)) -> String {

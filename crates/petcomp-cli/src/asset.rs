@@ -5,16 +5,16 @@ use crate::diagnostics::{located, report_diagnostics};
 use crate::documents::stem_of;
 use crate::exit::NeedsReview;
 use crate::global::GlobalArgs;
+use crate::interruption::interruption;
 use crate::output::folder_parser;
 use crate::print::{self, counted};
 use crate::values::{check_companion, parse_corners, parse_metres};
 use petcomp::asset::{self, Asset, Built, CONTACT_SHEET, Library, MANIFEST, Manifest};
-use petcomp::asset::{CaptureEntry, Photo, PhotoEntry, PhotoRecord, Role, Scale, ScreenSource};
+use petcomp::asset::{CaptureEntry, PhotoEntry, PhotoRecord, Role, Scale, ScreenSource};
 use petcomp::matte::{CutOutOptions, MatteMethod};
 use petcomp::{Error, Quality, io};
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum AssetCommand {
@@ -29,6 +29,10 @@ pub(crate) enum AssetCommand {
         /// until the folder is deleted
         #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
         output: PathBuf,
+        /// Keep the cut-outs that are there already of the same photo, entry, options and version of
+        /// petcomp, as after an interruption
+        #[arg(long)]
+        resume: bool,
     },
     /// Cut out photos of one object
     Add(Box<AddPhotoArgs>),
@@ -174,7 +178,11 @@ impl ScaleArgs {
 
 pub(crate) fn run(command: &AssetCommand, global: &GlobalArgs) -> anyhow::Result<()> {
     match command {
-        AssetCommand::Build { list, output } => build_all(list, output, global),
+        AssetCommand::Build {
+            list,
+            output,
+            resume,
+        } => build_all(list, output, *resume, global),
         AssetCommand::Add(args) => add_photos(args, global),
         AssetCommand::List { folder } => list_photos(folder),
         AssetCommand::Check { folder, strict } => check_folder(folder, *strict),
@@ -192,11 +200,12 @@ fn draw_sheet(folder: &Path, output: &Path) -> anyhow::Result<()> {
     let read = records_of(&library).flat_map(PhotoRecord::files);
     let read = read.chain([MANIFEST]).map(|file| folder.join(file));
     io::check_distinct(read, [output])?;
-    Ok(io::write(output, &asset::contact_sheet(&library))?)
+    Ok(io::write(output, &asset::contact_sheet(&library)?)?)
 }
 
 fn check_folder(folder: &Path, strict: bool) -> anyhow::Result<()> {
     let library = Library::open(folder)?;
+    library.check_pixels()?;
     let records: Vec<_> = records_of(&library).collect();
     records.iter().for_each(|record| list_capture(record));
     let to_review = list_to_review(&records);
@@ -238,22 +247,26 @@ fn list_capture(record: &PhotoRecord) {
 }
 
 /// Fails where a photo gave no cut-out, unless a person rejected it; the others are done by then.
-fn build_all(list: &Path, folder: &Path, global: &GlobalArgs) -> anyhow::Result<()> {
-    let built = build_library(list, folder, global)?;
+fn build_all(list: &Path, folder: &Path, resume: bool, global: &GlobalArgs) -> anyhow::Result<()> {
+    let built = build_library(list, folder, resume, global)?;
     let failed = built.refused.len() - built.rejected;
     FileBatch::counted(built.photos + failed, failed).finish()
 }
 
-/// Cuts out all photos of a list, showing progress.
+/// Cuts out all photos of a list, showing progress; `resume` keeps what is there already.
 pub(crate) fn build_library(
     list: &Path,
     folder: &Path,
+    resume: bool,
     global: &GlobalArgs,
 ) -> anyhow::Result<Built> {
     let progress = global.start_progress("cut-outs");
     let report = |done: usize, total: usize| progress.update(done as u64, total as u64);
     let before = Manifest::read(folder).ok();
-    let built = asset::build(list, folder, &report, &AtomicBool::new(false));
+    let built = match resume {
+        true => asset::resume(list, folder, &report, interruption()),
+        false => asset::build(list, folder, &report, interruption()),
+    };
     drop(progress);
     let built = built.inspect_err(|_| refresh_sheet(folder, before.as_ref(), global))?;
     report_built(&built, folder, global);
@@ -275,7 +288,11 @@ fn report_built(built: &Built, folder: &Path, global: &GlobalArgs) {
     }
     let photos = counted(built.photos, "photo");
     let assets = counted(built.library.assets.len(), "asset");
-    global.print_written(folder, format_args!("{photos}, {assets}"));
+    let kept = match built.kept {
+        0 => String::new(),
+        kept => format!(" ({kept} as before)"),
+    };
+    global.print_written(folder, format_args!("{photos}{kept}, {assets}"));
     if !built.unlisted.is_empty() {
         global.print_status(describe_unlisted(&built.unlisted));
     }
@@ -313,7 +330,7 @@ fn describe_lengths(metres: &[[f64; 2]]) -> String {
 /// Writes the contact sheet of a folder.
 fn write_sheet(folder: &Path, library: &Library, global: &GlobalArgs) -> anyhow::Result<()> {
     let path = folder.join(CONTACT_SHEET);
-    io::write(&path, &asset::contact_sheet(library))?;
+    io::write(&path, &asset::contact_sheet(library)?)?;
     global.print_look_at(&path);
     Ok(())
 }
@@ -337,10 +354,10 @@ fn add_photos(args: &AddPhotoArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let before = Manifest::read(folder).ok();
     let refresh = || refresh_sheet(folder, before.as_ref(), global);
     let (added, batch) = args.add_each(global).inspect_err(|_| refresh())?;
-    if added.is_empty() {
+    if added == 0 {
         refresh();
     } else {
-        let library = Library::open_with(folder, added)?;
+        let library = Library::open(folder)?;
         show_classes(&library.classes, "--classes", global);
         write_sheet(folder, &library, global)?;
     }
@@ -377,20 +394,23 @@ impl AddPhotoArgs {
         })
     }
 
-    /// The photos that were added. Of several, one that cannot be used does not stop the others; an
+    /// Adds the photos, and counts those that gave a cut-out. Of several, one that cannot be used does not stop the others; an
     /// option that cannot be right does, since it is that of all.
-    fn add_each(&self, global: &GlobalArgs) -> petcomp::Result<(Vec<Photo>, FileBatch)> {
+    fn add_each(&self, global: &GlobalArgs) -> petcomp::Result<(usize, FileBatch)> {
         let options = self.quality.cut_out(CutOutOptions::default());
         let entries = self.entries();
         asset::check_cut_out_files(&entries)?;
         asset::check_not_written_over(&entries, &self.output)?;
-        let (mut added, mut batch) = (Vec::new(), FileBatch::default());
+        let (mut added, mut batch) = (0, FileBatch::default());
         for entry in &entries {
             match self.add_photo(entry, &options, global) {
                 Err(error) if entries.len() == 1 || matches!(error, Error::Value { .. }) => {
                     return Err(error);
                 }
-                outcome => batch.count(outcome.map(|photo| added.push(photo)).map_err(Into::into)),
+                outcome => {
+                    added += usize::from(outcome.is_ok());
+                    batch.count(outcome.map_err(Into::into));
+                }
             }
         }
         Ok((added, batch))
@@ -401,10 +421,10 @@ impl AddPhotoArgs {
         entry: &PhotoEntry,
         options: &CutOutOptions,
         global: &GlobalArgs,
-    ) -> petcomp::Result<Photo> {
-        let added = asset::add_photo(&self.output, entry, &self.classes, options)?;
-        report_added(&added.record, global);
-        Ok(added)
+    ) -> petcomp::Result<()> {
+        let record = asset::add_photo(&self.output, entry, &self.classes, options)?;
+        report_added(&record, global);
+        Ok(())
     }
 
     /// One for each cut-out; all photos of a capture are of one.

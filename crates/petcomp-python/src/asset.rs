@@ -9,14 +9,15 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-/// Cuts out all photos of a list; returns what became of them.
+/// Cuts out all photos of a list, or those that are not there yet; returns what became of them.
 #[pyfunction]
-#[pyo3(signature = (list, folder, progress))]
+#[pyo3(signature = (list, folder, progress, resume))]
 pub(crate) fn build_assets(
     py: Python<'_>,
     list: PathBuf,
     folder: PathBuf,
     progress: Option<Py<PyAny>>,
+    resume: bool,
 ) -> PyResult<String> {
     let steps: Arc<Mutex<Vec<(usize, usize)>>> = Arc::default();
     let own = steps.clone();
@@ -31,13 +32,17 @@ pub(crate) fn build_assets(
     };
     work::run_beside(py, Stop::new(), &mut deliver, move |stop| {
         let report = |done, total| locked(&own).push((done, total));
-        built_json(&asset::build(list, folder, &report, stop)?)
+        built_json(&match resume {
+            true => asset::resume(list, folder, &report, stop)?,
+            false => asset::build(list, folder, &report, stop)?,
+        })
     })
 }
 
 fn built_json(built: &Built) -> Result<String> {
     text(&serde_json::json!({
         "photos": built.photos,
+        "kept": built.kept,
         "lengths": built.lengths,
         "refused": built.refused,
         "rejected": built.rejected,

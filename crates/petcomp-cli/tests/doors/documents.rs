@@ -402,7 +402,7 @@ fn manifest(world: &World) {
     };
     let photos: usize = library.assets.iter().map(|asset| asset.photos.len()).sum();
     if photos < 10 {
-        asset::contact_sheet(&library);
+        ends(asset::contact_sheet(&library));
     }
     if let Some(pipeline) = ends(Pipeline::open(world_setup(world))) {
         ends(pipeline.draw(0, 0));

@@ -17,8 +17,10 @@ __all__ = ["Built", "build", "list_folder"]
 class Built:
     """What became of the photos of a list."""
 
-    #: Photos that were cut out.
+    #: Photos that are cut out.
     photos: int
+    #: How many of these cut-outs were there before.
+    kept: int
     #: Lengths of the objects and their standard errors, metres, in the order of the list.
     lengths: list[tuple[float, float]]
     #: Photos that gave no cut-out, and why.
@@ -39,13 +41,17 @@ def build(
     list: str | os.PathLike[str],
     folder: str | os.PathLike[str],
     progress: Callable[[int, int], object] | None = None,
+    *,
+    resume: bool = False,
 ) -> Built:
     """Cuts out all photos of a list (TOML or CSV, or a folder with one) into an asset folder.
 
-    ``progress`` is called with the photos done and their number, in the calling thread. What it raises ends
-    the run, as Ctrl-C does: the photos in hand may still be written, but no others, and not the manifest.
+    ``resume`` keeps the cut-outs that are there already of the same photo, entry, options and version of
+    petcomp. ``progress`` is called with the photos done and their number, in the calling thread. What it
+    raises ends the run, as Ctrl-C does: the photos in hand may still be written, but no others.
     """
-    report = _petcomp.build_assets(path_of("list", list), folder_of("folder", folder), progress)
+    paths = path_of("list", list), folder_of("folder", folder)
+    report = _petcomp.build_assets(*paths, progress, resume)
     record = loaded(report)
     record["lengths"] = [tuple(pair) for pair in record["lengths"]]
     return Built(**record)

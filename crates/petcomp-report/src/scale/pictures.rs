@@ -52,7 +52,7 @@ impl PictureInputs {
         let plate = Arc::new(plate(case.image));
         let shot = scene
             .resolve(
-                |object| Some(appearance(object, &textures)),
+                |object| Ok(Some(appearance(object, &textures))),
                 Some(plate),
                 None,
             )

@@ -1,0 +1,165 @@
+//! A cache that keeps what was used last, within a number of bytes.
+
+use std::fmt::Debug;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+
+/// A value whose clones share what is large in it.
+pub(crate) trait Shared: Clone {
+    /// What finds the value again while a clone of it lives.
+    type Weak: Debug;
+
+    /// Bytes that it takes by now.
+    fn bytes(&self) -> usize;
+
+    /// A reference that keeps nothing.
+    fn downgrade(&self) -> Self::Weak;
+
+    /// The value, while a clone of it lives.
+    fn upgrade(weak: &Self::Weak) -> Option<Self>;
+}
+
+/// Values by name: those used last stay while they take no more than some bytes, and one of any
+/// size; so do those that somebody else holds, which take no more memory by this.
+#[derive(Debug)]
+pub(crate) struct LruCache<V: Shared> {
+    most_bytes: usize,
+    /// In the order in which they were used last.
+    entries: Mutex<Vec<Entry<V>>>,
+}
+
+#[derive(Debug)]
+struct Entry<V: Shared> {
+    name: String,
+    /// None where somebody else has to hold it.
+    kept: Option<V>,
+    weak: V::Weak,
+}
+
+impl<V: Shared> Entry<V> {
+    fn value(&self) -> Option<V> {
+        self.kept.clone().or_else(|| V::upgrade(&self.weak))
+    }
+}
+
+impl<V: Shared> LruCache<V> {
+    /// An empty one that keeps so many bytes.
+    pub(crate) fn of_bytes(most_bytes: usize) -> Self {
+        Self {
+            most_bytes,
+            entries: Mutex::default(),
+        }
+    }
+
+    /// The value of a name, which is now the one used last.
+    pub(crate) fn get(&self, name: &str) -> Option<V> {
+        let mut entries = self.entries();
+        let place = entries.iter().position(|entry| entry.name == name)?;
+        let value = entries[place].value()?;
+        entries[place].kept = Some(value.clone());
+        entries[place..].rotate_left(1);
+        Some(value)
+    }
+
+    /// Keeps a value, unless another thread was faster: then that one's. It is made before it comes
+    /// here, not under the lock, since the work may be parallel, and a thread that waits may come
+    /// back here.
+    pub(crate) fn insert(&self, name: &str, value: V) -> V {
+        if let Some(known) = self.get(name) {
+            return known;
+        }
+        let mut entries = self.entries();
+        entries.retain(|entry| entry.name != name && entry.value().is_some());
+        entries.push(Entry {
+            name: name.to_owned(),
+            kept: Some(value.clone()),
+            weak: value.downgrade(),
+        });
+        drop_oldest(&mut entries, self.most_bytes);
+        value
+    }
+
+    fn entries(&self) -> MutexGuard<'_, Vec<Entry<V>>> {
+        // Every change is whole, even where a thread panicked afterwards.
+        self.entries.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Drops the values that were used longest ago, until the others take little enough memory.
+fn drop_oldest<V: Shared>(entries: &mut [Entry<V>], most_bytes: usize) {
+    let bytes = |entry: &Entry<V>| entry.kept.as_ref().map_or(0, V::bytes);
+    let mut total: usize = entries.iter().map(bytes).sum();
+    let others = entries.len().saturating_sub(1);
+    for entry in &mut entries[..others] {
+        if total <= most_bytes {
+            break;
+        }
+        total -= bytes(entry);
+        entry.kept = None;
+    }
+}
+
+/// What [`Shared::upgrade`] is for a reference that is there or not.
+pub(crate) fn upgrade_optional<T>(weak: &Option<Weak<T>>) -> Option<Option<Arc<T>>> {
+    match weak {
+        Some(weak) => weak.upgrade().map(Some),
+        None => Some(None),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    impl Shared for Arc<usize> {
+        type Weak = Weak<usize>;
+
+        fn bytes(&self) -> usize {
+            **self
+        }
+
+        fn downgrade(&self) -> Self::Weak {
+            Arc::downgrade(self)
+        }
+
+        fn upgrade(weak: &Self::Weak) -> Option<Self> {
+            weak.upgrade()
+        }
+    }
+
+    fn found(cache: &LruCache<Arc<usize>>, name: &str) -> Option<usize> {
+        cache.get(name).map(|value| *value)
+    }
+
+    #[test]
+    fn what_was_used_last_stays() {
+        let cache = LruCache::of_bytes(10);
+        for (name, bytes) in [("a", 4), ("b", 5)] {
+            assert_eq!(*cache.insert(name, Arc::new(bytes)), bytes);
+        }
+        assert_eq!(found(&cache, "a"), Some(4));
+        cache.insert("c", Arc::new(6));
+        assert_eq!(["b", "a"].map(|name| found(&cache, name)), [None, Some(4)]);
+        cache.insert("d", Arc::new(100));
+        let left = ["a", "c", "d"].map(|name| found(&cache, name));
+        assert_eq!(left, [None, None, Some(100)]);
+    }
+
+    #[test]
+    fn what_somebody_holds_is_not_made_twice() {
+        let cache = LruCache::of_bytes(10);
+        let held = cache.insert("a", Arc::new(8));
+        cache.insert("b", Arc::new(8));
+        let found = cache.get("a").unwrap();
+        assert!(Arc::ptr_eq(&found, &held));
+        drop((found, held));
+        cache.insert("c", Arc::new(8));
+        assert!(cache.get("a").is_none());
+    }
+
+    #[test]
+    fn the_first_of_two_threads_is_right() {
+        let cache = LruCache::of_bytes(10);
+        cache.insert("a", Arc::new(4));
+        assert_eq!(*cache.insert("a", Arc::new(5)), 4);
+    }
+}
