@@ -192,7 +192,7 @@ impl TextSize {
         }
     }
 
-    /// A letter of the font; none beyond ASCII.
+    /// A letter of the font, which has those of European languages with Latin script.
     fn glyph(self, letter: char) -> Option<RasterizedChar> {
         get_raster(letter, FontWeight::Regular, self.raster())
     }
@@ -238,7 +238,7 @@ fn append_word(line: &mut String, word: &[char], room: usize) -> bool {
     true
 }
 
-/// A line of text with its top left corner at a point; characters beyond ASCII become `?`.
+/// A line of text with its top left corner at a point; letters that are not Latin become `?`.
 pub(crate) fn text(
     canvas: &mut Image<Srgb8>,
     [x, y]: [isize; 2],

@@ -20,6 +20,7 @@ mod folder;
 mod mattes;
 mod message;
 mod overview;
+mod photos;
 mod picture;
 mod recipe;
 mod refusal;

@@ -1,7 +1,7 @@
 //! The first page: what is in the folder, and what each page can do with it.
 
 use crate::message::Json;
-use crate::picture::may_be_photo;
+use crate::photos::photos;
 use crate::recipe::is_recipe;
 use crate::refusal::Answer;
 use crate::server::Page;
@@ -58,7 +58,7 @@ impl Overview {
         let called = |name: &str| those(&|file| Path::new(file).ends_with(name));
         Self {
             folder: studio.folder.name(),
-            photos: those(&|file| may_be_photo(Path::new(file))),
+            photos: photos(&studio.folder),
             labels: ending(".label.json"),
             cameras: ending(".camera.json"),
             assets: called(asset::MANIFEST),

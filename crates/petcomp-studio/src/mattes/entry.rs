@@ -142,7 +142,7 @@ fn listed(folder: &Folder, list: &str, read: &List) -> Vec<ListedPhoto> {
 
 /// The photos that have a label beside them.
 fn plates(folder: &Folder) -> Vec<String> {
-    let photos = folder.find(crate::picture::may_be_photo).into_iter();
+    let photos = crate::photos::photos(folder).into_iter();
     let is_labelled = |photo: &String| {
         let label = Path::new(photo).with_extension("label.json");
         folder.file(&label.to_string_lossy()).is_ok()

@@ -4,7 +4,8 @@
 mod photo_list;
 
 use crate::message::{Json, Query};
-use crate::picture::{PhotoName, may_be_photo};
+use crate::photos::photos;
+use crate::picture::PhotoName;
 use crate::refusal::Answer;
 use crate::server::Page;
 use crate::studio::Studio;
@@ -36,7 +37,7 @@ struct ListEntry {
 
 async fn list_photos(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<ListEntry>>> {
     blocking(move || {
-        let photos = studio.folder.find(may_be_photo);
+        let photos = photos(&studio.folder);
         let scaled = photo_list::scaled_photos(&studio.folder, &photos);
         let entries = photos.into_iter().map(|photo| ListEntry {
             scaled: scaled.contains(&photo),
