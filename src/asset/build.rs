@@ -109,6 +109,7 @@ fn build_beside(
         journal.write()?;
         return Err(interrupted(&outcomes));
     }
+    let kept = outcomes.iter().flatten().count() - journal.count();
     let recorded = record(&list, outcomes, folder);
     let (manifest, mut taken) = recorded.map_err(|e| e.in_file(&path))?;
     if let Some(error) = taken.failed.take() {
@@ -118,8 +119,6 @@ fn build_beside(
         return Err(no_cut_out(&path, &taken.refused));
     }
     let library = Library::from_manifest(folder, manifest)?;
-    let is_known = |record: &&PhotoRecord| known.record(&record.file) == Some(*record);
-    let kept = taken.records.iter().filter(is_known).count();
     Ok(Built {
         kept,
         ..Built::new(library, taken, &list)
@@ -229,14 +228,19 @@ struct Journal<'a> {
 }
 
 struct Waiting<'a> {
+    /// Cut-outs that were taken in by now.
+    count: usize,
     since: Instant,
     cut_outs: Vec<(&'a PhotoEntry, PhotoRecord)>,
 }
 
 impl<'a> Journal<'a> {
     fn new(list: &'a List, folder: &'a Path) -> Self {
-        let (since, cut_outs) = (Instant::now(), Vec::new());
-        let waiting = Mutex::new(Waiting { since, cut_outs });
+        let waiting = Mutex::new(Waiting {
+            count: 0,
+            since: Instant::now(),
+            cut_outs: Vec::new(),
+        });
         Self {
             list,
             folder,
@@ -248,11 +252,17 @@ impl<'a> Journal<'a> {
     fn add(&self, entry: &'a PhotoEntry, record: Result<PhotoRecord>) -> Result<PhotoRecord> {
         let record = record?;
         let mut waiting = self.waiting();
+        waiting.count += 1;
         waiting.cut_outs.push((entry, record.clone()));
         if waiting.since.elapsed() >= JOURNAL_INTERVAL {
             self.write_waiting(&mut waiting)?;
         }
         Ok(record)
+    }
+
+    /// How many cut-outs were taken in.
+    fn count(&self) -> usize {
+        self.waiting().count
     }
 
     /// Writes the manifest with all that was taken in.

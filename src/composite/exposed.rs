@@ -32,7 +32,7 @@ impl Exposed {
         let straight = free.undisplaced();
         let soft = defocus(straight.as_ref().unwrap_or(&free), shot, options);
         let seen = soft.or(straight);
-        let moved = moved(seen.as_ref().unwrap_or(&free), shot);
+        let moved = moved(seen.as_ref().unwrap_or(&free), shot, options);
         let holdout = shot.holdout.as_deref();
         Self {
             deep: free.held_out(holdout),

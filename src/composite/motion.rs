@@ -5,7 +5,8 @@
 //! the plate. Plate and camera stand still, so the mean over time is that of `light` and of
 //! `through` alone. Cards and shadows move together along the surface: what a pixel shows at
 //! another time is what lay beside it on the surface, and both are averaged along that way. What
-//! stands high over the surface would move a little farther in the picture.
+//! stands high over the surface would move a little farther in the picture. Cards and shadows beyond
+//! the border move into the picture, too: they are rendered as far as ways reach.
 
 use crate::camera::{Camera, RadialDistortion};
 use crate::deep::{DeepImage, HoldoutSample};
@@ -13,6 +14,7 @@ use crate::filter::{self, sample_cubic_clamped};
 use crate::geom::{Plane, Point2, Point3, Vector2, Vector3};
 use crate::image::{Image, Mask};
 use crate::pixel::{Film, LinearRgb, Mix};
+use crate::render::{RenderOptions, render_beyond};
 use crate::scene::Shot;
 use crate::work::{self, Kind};
 
@@ -22,24 +24,24 @@ const SQUARE_PX: usize = 8;
 const LEAST_WAY_PX: f64 = 0.02;
 /// Places that are read along a way: near the horizon ways have no end.
 const MOST_TAPS: f64 = 256.0;
+/// Pixels beyond the border that are rendered, at most.
+const MOST_BEYOND_PX: usize = 256;
+/// Pixels beside a place that a cubic curve reads.
+const CURVE_PX: f64 = 2.0;
 
 /// What objects and their shadows do to the plate in the mean while the shutter is open, behind what
 /// of the place stands in front and does not move; none where nothing moves.
 ///
-/// `free` are samples that nothing of the place hides yet.
-pub(super) fn moved(free: &DeepImage, shot: &Shot) -> Option<Image<Film>> {
+/// `free` are samples that nothing of the place hides yet; what moves in from beyond the border is
+/// rendered with the same `options`.
+pub(super) fn moved(free: &DeepImage, shot: &Shot, options: &RenderOptions) -> Option<Image<Film>> {
     if shot.motion_m == [0.0; 2] {
         return None;
     }
     work::add(Kind::Filters, 1);
-    // Shadows need something to fall on.
-    let shadows = shot.plate.as_ref().map(|_| free.shadow());
-    let effect = Image::from_fn(free.width(), free.height(), |x, y| {
-        let film = free.flat(x, y);
-        shadows.map_or(film, |shadows| film.shaded(shadows[(x, y)]))
-    });
     let ways = ways(shot);
-    let means = averaged(&effect, &ways);
+    let effect = WideEffect::new(free, shot, margin_px(&ways), options);
+    let means = effect.averaged(&ways);
     Some(match &shot.holdout {
         Some(holdout) => held_out(&means, free, holdout, &ways),
         None => means,
@@ -79,41 +81,92 @@ fn mean_in_front(
     })
 }
 
-/// Means along each pixel's way.
-fn averaged(effect: &Image<Film>, ways: &Image<Vector2<f64>>) -> Image<Film> {
-    let (width, height) = effect.size();
-    let reached = reached(effect, ways);
-    let least = least(effect);
-    Image::from_fn(width, height, |x, y| {
-        let square = (x / SQUARE_PX, y / SQUARE_PX);
-        if !reached[square] {
-            return Film::default();
+/// What objects and their shadows do to the plate, in the picture and in a margin around it.
+struct WideEffect {
+    films: Image<Film>,
+    /// Squares on every side.
+    margin: usize,
+    /// Width and height of the picture.
+    picture: [usize; 2],
+}
+
+impl WideEffect {
+    /// With so many pixels on every side, whole squares.
+    fn new(free: &DeepImage, shot: &Shot, margin_px: usize, options: &RenderOptions) -> Self {
+        let beyond = (margin_px > 0).then(|| render_beyond(shot, margin_px, options));
+        let picture = [free.width(), free.height()];
+        let [width, height] = picture.map(|side| side + 2 * margin_px);
+        // Shadows need something to fall on.
+        let is_shaded = shot.plate.is_some();
+        let film = |deep: &DeepImage, x, y| {
+            let film = deep.flat(x, y);
+            if is_shaded {
+                film.shaded(deep.shadow()[(x, y)])
+            } else {
+                film
+            }
+        };
+        let inside = |at: usize, side: usize| at.checked_sub(margin_px).filter(|at| *at < side);
+        Self {
+            films: Image::from_fn(width, height, |x, y| {
+                match (inside(x, picture[0]), inside(y, picture[1]), &beyond) {
+                    (Some(x), Some(y), _) => film(free, x, y),
+                    (_, _, Some(beyond)) => film(beyond, x, y),
+                    _ => Film::default(),
+                }
+            }),
+            margin: margin_px / SQUARE_PX,
+            picture,
         }
-        let way = along(center(x, y), ways[square]);
-        let mean = mean(way, |p| sample_cubic_clamped(effect, p.x, p.y));
-        // A cubic curve is beyond its neighbours beside edges.
-        Film {
-            color: larger(mean.color, least.color),
-            opacity: smaller(larger(mean.opacity, least.opacity), LinearRgb::WHITE),
-        }
-    })
+    }
+
+    /// Means along each pixel's way, of the picture alone.
+    fn averaged(&self, ways: &Image<Vector2<f64>>) -> Image<Film> {
+        let (reached, least) = (reached(&self.films, ways), least(&self.films));
+        let corner = Vector2::repeat((self.margin * SQUARE_PX) as f64);
+        let [width, height] = self.picture;
+        Image::from_fn(width, height, |x, y| {
+            let square = (x / SQUARE_PX, y / SQUARE_PX);
+            if !reached[(square.0 + self.margin, square.1 + self.margin)] {
+                return Film::default();
+            }
+            let way = along(center(x, y) + corner, ways[square]);
+            let mean = mean(way, |p| sample_cubic_clamped(&self.films, p.x, p.y));
+            // A cubic curve is beyond its neighbours beside edges.
+            Film {
+                color: larger(mean.color, least.color),
+                opacity: smaller(larger(mean.opacity, least.opacity), LinearRgb::WHITE),
+            }
+        })
+    }
+}
+
+/// Pixels beyond the border from which ways lead into the picture, as whole squares.
+fn margin_px(ways: &Image<Vector2<f64>>) -> usize {
+    let longest = longest(ways);
+    if longest == 0.0 {
+        return 0;
+    }
+    let reach = (0.5 * longest + CURVE_PX).min(MOST_BEYOND_PX as f64);
+    (reach.ceil() as usize).next_multiple_of(SQUARE_PX)
+}
+
+fn longest(ways: &Image<Vector2<f64>>) -> f64 {
+    let lengths = ways.pixels().iter().map(|way| way.norm());
+    lengths.fold(0.0, f64::max)
 }
 
 /// Squares that anything reaches while the shutter is open.
 fn reached(effect: &Image<Film>, ways: &Image<Vector2<f64>>) -> Mask {
-    let mut filled = Image::filled(ways.width(), ways.height(), false);
+    let [columns, rows] = [effect.width(), effect.height()].map(|side| side.div_ceil(SQUARE_PX));
+    let mut filled = Image::filled(columns, rows, false);
     for (y, row) in effect.rows().enumerate() {
         for (x, film) in row.iter().enumerate() {
             filled[(x / SQUARE_PX, y / SQUARE_PX)] |= *film != Film::default();
         }
     }
-    let longest = ways
-        .pixels()
-        .iter()
-        .map(|way| way.norm())
-        .fold(0.0, f64::max);
     // Two squares for the curve that is read, and for corners.
-    filter::dilate(&filled, 0.5 * longest / SQUARE_PX as f64 + 2.0)
+    filter::dilate(&filled, 0.5 * longest(ways) / SQUARE_PX as f64 + 2.0)
 }
 
 /// The mean of what is seen at some places.
@@ -234,6 +287,33 @@ mod tests {
         let pairs = a.pixels().iter().zip(b.pixels());
         let squares = pairs.map(|(a, b)| (a.g - b.g).powi(2)).sum::<f32>();
         (squares / a.pixels().len() as f32).sqrt()
+    }
+
+    #[test]
+    fn what_lies_beyond_the_border_moves_in_as_in_a_wider_picture() {
+        let narrow = Shot {
+            plate: None,
+            motion_m: WAY_M,
+            // The opaque card ends a pixel beyond the left border.
+            camera: Camera {
+                principal_px: Point2::new(-3.0, 30.0),
+                ..shot(0.0).camera
+            },
+            lights: Vec::new(),
+            ..shot(0.0)
+        };
+        let wide = Shot {
+            camera: narrow.camera.widened(24),
+            ..narrow.clone()
+        };
+        let [found, expected] = [&narrow, &wide].map(rendered);
+        let mut seen = 0.0_f32;
+        for (x, y) in (0..60).flat_map(|y| [(0, y), (1, y), (5, y)]) {
+            let expected = expected[(x + 24, y + 24)];
+            assert!((found[(x, y)].r - expected.r).abs() < 1e-3, "({x}, {y})");
+            seen = seen.max(expected.a);
+        }
+        assert!(seen > 0.01, "nothing moves in");
     }
 
     #[test]
