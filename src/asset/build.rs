@@ -109,7 +109,11 @@ fn build_beside(
         journal.write()?;
         return Err(interrupted(&outcomes));
     }
-    let kept = outcomes.iter().flatten().count() - journal.count();
+    let kept = outcomes
+        .iter()
+        .flatten()
+        .count()
+        .saturating_sub(journal.count());
     let recorded = record(&list, outcomes, folder);
     let (manifest, mut taken) = recorded.map_err(|e| e.in_file(&path))?;
     if let Some(error) = taken.failed.take() {
