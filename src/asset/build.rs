@@ -396,7 +396,7 @@ fn length_and_error(record: &PhotoRecord) -> [f64; 2] {
 mod tests {
     use super::super::pixels::PixelChecksums;
     use super::super::{MANIFEST, PhotoRecord, Review, Scale, Texture, Verdict};
-    use super::super::{add_photo, contact_sheet};
+    use super::super::{add_photo, contact_sheets};
     use super::*;
     use crate::diagnostic::{Code, Diagnostic};
     use crate::geom::Point2;
@@ -1002,7 +1002,8 @@ mod tests {
             .iter_mut()
             .flat_map(|asset| &mut asset.photos)
             .for_each(|photo| change(&mut photo.record));
-        contact_sheet(&library).unwrap().height()
+        let page = contact_sheets(&library).next().unwrap();
+        page.unwrap().height()
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! A sheet of all cut-outs of a folder over four backgrounds, so that a person sees faults at once;
+//! Sheets of all cut-outs of a folder over four backgrounds, so that a person sees faults at once;
 //! of captured ones what was measured, too.
 
 use super::flow_sheet;
@@ -14,6 +14,7 @@ use crate::filter;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, Mix, Srgb8};
 use rayon::prelude::*;
+use std::path::{Path, PathBuf};
 
 /// Longer side of a cut-out on the sheet, pixels.
 const CUT_OUT_SIDE_PX: usize = 240;
@@ -21,6 +22,8 @@ const CUT_OUT_SIDE_PX: usize = 240;
 const GAP_PX: usize = 8;
 /// Photos beside each other.
 const COLUMNS: usize = 2;
+/// Height that a page has at most, pixels: half of the side of pictures that programs still open.
+const MAX_PAGE_PX: usize = 16_384;
 const PAPER: Srgb8 = draw::rgb(0x1C, 0x1E, 0x22);
 const INK: Srgb8 = draw::rgb(0xF2, 0xF2, 0xF2);
 const WARNING: Srgb8 = draw::rgb(0xFF, 0xB0, 0x40);
@@ -45,19 +48,55 @@ const STRIP_WIDTH_PX: usize = BACKGROUNDS.len() * (CUT_OUT_SIDE_PX + GAP_PX);
 const COLUMN_WIDTH_PX: usize = STRIP_WIDTH_PX + 2 * GAP_PX;
 
 /// Every cut-out over a checkerboard, black, white and green, with its size, the confidence in
-/// outline and colour, and why it needs a review.
+/// outline and colour, and why it needs a review: one page at least, of at most 16,384 pixels
+/// height. A page is drawn when it is asked for, so that memory does not grow with their number.
 ///
 /// # Errors
-/// Those of [`Photo::pixels`].
-pub fn contact_sheet(library: &Library) -> Result<Image<Srgb8>> {
-    let photos = photos_of(library);
-    let strips = photos.par_iter().map(|photo| strip(photo));
-    Ok(in_columns(&strips.collect::<Result<Vec<_>>>()?))
+/// Those of [`Photo::pixels`], for a page that shows it.
+pub fn contact_sheets(library: &Library) -> impl ExactSizeIterator<Item = Result<Image<Srgb8>>> {
+    let pages = in_pages(&photos_of(library)).into_iter();
+    pages.map(|photos| page(&photos))
+}
+
+/// Where a page of a contact sheet lies, counted from 0; the first lies at the given path.
+pub fn contact_sheet_page(first: &Path, page: usize) -> PathBuf {
+    if page == 0 {
+        return first.into();
+    }
+    let mut name = first.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("_{}", page + 1));
+    if let Some(extension) = first.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    first.with_file_name(name)
 }
 
 fn photos_of(library: &Library) -> Vec<&Photo> {
     let assets = library.assets.iter();
     assets.flat_map(|asset| &asset.photos).collect()
+}
+
+/// As many rows on a page as surely fit, and at least one.
+fn in_pages<'a>(photos: &[&'a Photo]) -> Vec<Vec<&'a Photo>> {
+    let (mut pages, mut page, mut height) = (Vec::new(), Vec::new(), GAP_PX);
+    for row in photos.chunks(COLUMNS) {
+        let strips = row.iter().map(|photo| most_height(&photo.record));
+        let row_height = strips.max().unwrap_or(0) + GAP_PX;
+        if height + row_height > MAX_PAGE_PX && !page.is_empty() {
+            pages.push(std::mem::take(&mut page));
+            height = GAP_PX;
+        }
+        page.extend_from_slice(row);
+        height += row_height;
+    }
+    pages.push(page);
+    pages
+}
+
+fn page(photos: &[&Photo]) -> Result<Image<Srgb8>> {
+    let strips = photos.par_iter().map(|photo| strip(photo));
+    Ok(in_columns(&strips.collect::<Result<Vec<_>>>()?))
 }
 
 /// Strips in rows from the top left, each row as high as its highest.
@@ -93,16 +132,30 @@ fn strip(photo: &Photo) -> Result<Image<Srgb8>> {
     let pixels = photo.pixels_once()?;
     let cutout = small(&pixels.texture);
     let lines = lines_of(&photo.record);
-    let text_height = lines.len() * TextSize::Small.height() + GAP_PX / 2;
     let rows = tile_rows(&photo.record, &pixels, &cutout);
-    let row_height = cutout.height() + GAP_PX;
-    let height = text_height + rows.len() * row_height - GAP_PX;
+    let height = strip_height(lines.len(), rows.len(), cutout.height());
     let mut canvas = Image::filled(STRIP_WIDTH_PX, height, PAPER);
     write_lines(&mut canvas, &lines);
     for (j, row) in rows.iter().enumerate() {
-        paste_tiles(&mut canvas, text_height + j * row_height, row);
+        let top = text_height(lines.len()) + j * (cutout.height() + GAP_PX);
+        paste_tiles(&mut canvas, top, row);
     }
     Ok(canvas)
+}
+
+/// Height of lines of text over rows of tiles, pixels.
+fn strip_height(lines: usize, rows: usize, tile_height: usize) -> usize {
+    text_height(lines) + rows * (tile_height + GAP_PX) - GAP_PX
+}
+
+fn text_height(lines: usize) -> usize {
+    lines * TextSize::Small.height() + GAP_PX / 2
+}
+
+/// Height of the strip of a record whose cut-out is as high as any, pixels.
+fn most_height(record: &PhotoRecord) -> usize {
+    let rows = 1 + usize::from(record.captured.is_some());
+    strip_height(lines_of(record).len(), rows, CUT_OUT_SIDE_PX)
 }
 
 /// A cut-out over all backgrounds; below, what was measured on a display.
@@ -191,12 +244,16 @@ mod tests {
     use crate::pixel::PremulRgba;
 
     fn library(warnings: &[&str], count: usize) -> Library {
+        library_of((480, 240), warnings, count)
+    }
+
+    fn library_of((w, h): (usize, usize), warnings: &[&str], count: usize) -> Library {
         let mut record = photo("a.exr");
         record.diagnostics = warnings
             .iter()
             .map(|text| Diagnostic::warning(Code::Uncoded, text))
             .collect();
-        let one = Photo::new(Image::filled(480, 240, PremulRgba::TRANSPARENT), record);
+        let one = Photo::new(Image::filled(w, h, PremulRgba::TRANSPARENT), record);
         let asset = Asset {
             role: Role::Object,
             name: "a".into(),
@@ -211,9 +268,20 @@ mod tests {
         }
     }
 
+    fn pages(library: &Library) -> Vec<Image<Srgb8>> {
+        contact_sheets(library).map(Result::unwrap).collect()
+    }
+
+    /// Height of the only page.
+    fn height(warnings: &[&str], count: usize) -> usize {
+        let pages = pages(&library(warnings, count));
+        assert_eq!(pages.len(), 1);
+        pages[0].height()
+    }
+
     #[test]
     fn an_empty_cut_out_shows_the_four_backgrounds() {
-        let sheet = contact_sheet(&library(&[], 1)).unwrap();
+        let sheet = &pages(&library(&[], 1))[0];
         let y = sheet.height() - 3 * GAP_PX;
         let at = |i: usize| sheet[(GAP_PX + i * (CUT_OUT_SIDE_PX + GAP_PX) + 2, y)];
         assert_eq!(
@@ -226,11 +294,31 @@ mod tests {
     #[test]
     fn diagnostics_are_written_and_make_room() {
         let heights = [&[][..], &["two objects"], &["two objects", "blurred"]]
-            .map(|d| contact_sheet(&library(d, 1)).unwrap().height());
+            .map(|warnings| height(warnings, 1));
         assert!(heights[0] < heights[1] && heights[1] < heights[2]);
+        assert!(height(&[], 3) > heights[0] && height(&[], 0) > 0);
+    }
+
+    #[test]
+    fn pages_are_no_higher_than_programs_open_and_hold_every_cut_out() {
+        let warning = "two objects ".repeat(40);
+        let tall = |count| library_of((4, CUT_OUT_SIDE_PX), &[warning.as_str()], count);
+        let row_height = pages(&tall(1))[0].height() - GAP_PX;
+        let pages = pages(&tall(301));
+        let heights: Vec<usize> = pages.iter().map(Image::height).collect();
+        assert!(heights.len() > 2, "{heights:?}");
         assert!(
-            contact_sheet(&library(&[], 3)).unwrap().height() > heights[0]
-                && contact_sheet(&library(&[], 0)).unwrap().height() > 0
+            heights.iter().all(|height| *height <= MAX_PAGE_PX),
+            "{heights:?}"
         );
+        let rows = heights.iter().map(|height| (height - GAP_PX) / row_height);
+        assert_eq!(rows.sum::<usize>(), 151);
+    }
+
+    #[test]
+    fn further_pages_lie_beside_the_first() {
+        let page = |first: &str, page| contact_sheet_page(Path::new(first), page);
+        assert_eq!(page("a/sheet.png", 0), Path::new("a/sheet.png"));
+        assert_eq!(page("a/sheet.v1.png", 1), Path::new("a/sheet.v1_2.png"));
     }
 }

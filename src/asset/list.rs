@@ -2,6 +2,7 @@
 
 use super::CONTACT_SHEET;
 use super::body::KnownBody;
+use super::contact_sheet::contact_sheet_page;
 use super::entry::PhotoEntry;
 use super::files;
 use super::manifest::{Manifest, check_each};
@@ -185,11 +186,13 @@ pub fn check_cut_out_files(photos: &[PhotoEntry]) -> Result<()> {
 /// [`Error::File`] for the first picture that would be written over.
 pub fn check_not_written_over(photos: &[PhotoEntry], folder: &Path) -> Result<()> {
     let cut_outs = photos.iter().map(PhotoEntry::cut_out_file);
-    let written = cut_outs
-        .flat_map(|file| files::all_of(&file))
-        .chain([CONTACT_SHEET.to_owned()]);
+    let cut_outs = cut_outs.flat_map(|file| files::all_of(&file));
+    let cut_outs = cut_outs.map(|file| folder.join(file));
+    // A page shows at least one cut-out; one behind the last is deleted as an earlier build's.
+    let sheet = folder.join(CONTACT_SHEET);
+    let pages = (0..=photos.len()).map(|page| contact_sheet_page(&sheet, page));
     let pictures = photos.iter().flat_map(PhotoEntry::pictures);
-    io::check_distinct(pictures, written.map(|file| folder.join(file)))
+    io::check_distinct(pictures, cut_outs.chain(pages))
 }
 
 /// No review that is there is that of two photos; their paths are relative to the working folder.
@@ -380,6 +383,7 @@ mod tests {
             ("cup/1.png", "none.png"),
             ("cup/1.exr", "none.png"),
             ("contact_sheet.png", "none.png"),
+            ("contact_sheet_2.png", "none.png"),
             ("1.jpg", "cup/1.png"),
         ] {
             let told = told(photo, screen).unwrap_err().to_string();

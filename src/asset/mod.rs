@@ -51,7 +51,7 @@ pub use build::{build, resume};
 #[doc(hidden)]
 pub use capture_entry::CaptureEntry;
 #[doc(hidden)]
-pub use contact_sheet::contact_sheet;
+pub use contact_sheet::{contact_sheet_page, contact_sheets};
 pub use entry::PhotoEntry;
 #[cfg(test)]
 pub(crate) use equirectangular::direction_to_uv;
@@ -84,7 +84,7 @@ pub use texture::Texture;
 /// Name of the manifest in an asset folder.
 pub const MANIFEST: &str = "assets.toml";
 
-/// Name of the contact sheet that the program draws in an asset folder.
+/// Name of the contact sheet that the program draws in an asset folder: of its first page.
 #[doc(hidden)]
 pub const CONTACT_SHEET: &str = "contact_sheet.png";
 

@@ -3,7 +3,7 @@
 use crate::dataset::{
     Coco, CocoMask, Format, LabelConfig, Layers, Mot, Pipeline, Voc, WebDataset, Yolo, YoloTask,
 };
-use crate::scene::{Background, Recipe, Wall};
+use crate::scene::{Background, EnvironmentRanges, LensRanges, Recipe, Wall};
 
 /// Most names in a message.
 const MAX_SHOWN_NAMES: usize = 5;
@@ -14,6 +14,7 @@ impl Pipeline {
     pub fn idle_keys(&self) -> Vec<String> {
         let mut idle = idle_labels(&self.config().labels);
         idle.extend(self.idle_light_direction());
+        idle.extend(idle_partners(&self.config().scene));
         idle
     }
 
@@ -72,6 +73,49 @@ fn has_polygons(labels: &LabelConfig) -> bool {
         Format::Coco => labels.coco.masks == CocoMask::Polygon,
         Format::Voc | Format::Mot | Format::Layers | Format::WebDataset => false,
     })
+}
+
+/// Settings of a depth of field and of a picture of the surroundings where there is none.
+fn idle_partners(recipe: &Recipe) -> Vec<String> {
+    let mut idle = Vec::new();
+    if recipe.lens.f_number.is_none() {
+        idle.extend(idle_focus(&recipe.lens));
+    }
+    if recipe.environment.files.is_empty() {
+        idle.extend(idle_surroundings(&recipe.environment));
+    }
+    idle
+}
+
+fn idle_focus(lens: &LensRanges) -> Vec<String> {
+    let told = |key: &str, value: String| {
+        format!("scene.lens.{key}: {value}, but without scene.lens.f_number all is sharp")
+    };
+    let focus = lens.focus_m;
+    let focus = focus.map(|metres| told("focus_m", serde_json::json!(metres).to_string()));
+    let is_set = lens.sensor_mm != LensRanges::default().sensor_mm;
+    let sensor = is_set.then(|| told("sensor_mm", lens.sensor_mm.to_string()));
+    focus.into_iter().chain(sensor).collect()
+}
+
+fn idle_surroundings(environment: &EnvironmentRanges) -> Vec<String> {
+    let default = EnvironmentRanges::default();
+    let keys = [
+        (
+            "rotation_deg",
+            environment.rotation_deg,
+            default.rotation_deg,
+        ),
+        ("strength", environment.strength, default.strength),
+    ];
+    let set = keys
+        .into_iter()
+        .filter(|(_, range, default)| range != default);
+    set.map(|(key, range, _)| {
+        let value = serde_json::json!(range);
+        format!("scene.environment.{key}: {value}, but scene.environment.files names no picture")
+    })
+    .collect()
 }
 
 fn idle_light_direction<'a>(
@@ -156,6 +200,28 @@ mod tests {
         assert_eq!(told("coco = { masks = 'rle' }"), [""; 0]);
         let simplified = told("simplify = 1");
         assert!(simplified[0].starts_with("labels.simplify: 1, but no layout of labels.formats: "));
+    }
+
+    #[test]
+    fn settings_of_what_is_not_there_are_named() {
+        let told = |recipe: &str| idle_partners(&toml::from_str(recipe).unwrap());
+        assert_eq!(
+            told("lens = { focus_m = [0.5, 0.8], sensor_mm = 6 }"),
+            [
+                "scene.lens.focus_m: [0.5,0.8], but without scene.lens.f_number all is sharp",
+                "scene.lens.sensor_mm: 6, but without scene.lens.f_number all is sharp",
+            ]
+        );
+        assert_eq!(
+            told("environment = { rotation_deg = 30, strength = 2 }"),
+            [
+                "scene.environment.rotation_deg: 30.0, but scene.environment.files names no picture",
+                "scene.environment.strength: 2.0, but scene.environment.files names no picture",
+            ]
+        );
+        let complete = "lens = { f_number = 2.8, focus_m = 0.5 }\nenvironment = { files = ['a.exr'], strength = 2 }";
+        assert_eq!(told(complete), [""; 0]);
+        assert_eq!(told(""), [""; 0]);
     }
 
     #[test]

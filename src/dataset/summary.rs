@@ -203,6 +203,16 @@ impl Summary {
         })
     }
 
+    /// The share in the recipe of what happens by chance, 0 to 1; none for a key that is drawn
+    /// otherwise.
+    ///
+    /// What is drawn of it is uniform from 0 to 1, and it happens where that lies below the share.
+    pub fn chance(&self, key: &str) -> Option<f64> {
+        let [_, share] = CHANCES.iter().find(|[drawn, _]| *drawn == key)?;
+        let recipe = self.narrowed_recipe()?;
+        recipe.pointer(&json_pointer(share))?.as_f64()
+    }
+
     /// As JSON, without what is switched off.
     fn narrowed_recipe(&self) -> Option<Value> {
         let recipe = self.identity["recipe"]["scene"].clone();
@@ -304,6 +314,13 @@ impl SampleSummary {
         }
     }
 }
+
+/// The keys of draws that decide whether something happens, each with that of its share in the
+/// recipe.
+const CHANCES: [[&str; 2]; 2] = [
+    ["start.face_down", "start.face_down"],
+    ["negative", "negatives"],
+];
 
 /// Records that are read at a time.
 const RECORDS_PER_BATCH: usize = 256;

@@ -13,6 +13,9 @@ pub(crate) const MAX_LIGHTS: usize = 64;
 pub(super) const SHARE: Bounds = Bounds::new(0.0, 1.0, "a share");
 pub(super) const SCALE: Bounds = Bounds::new(0.01, 100.0, "a factor on objects of 5 mm to 5 m");
 pub(super) const EV: Bounds = Bounds::new(-32.0, 32.0, "what 32-bit pictures hold");
+/// The exposure of a scene, which is solved from light of any brightness: more than what people
+/// type.
+pub(super) const SOLVED_EV: Bounds = Bounds::new(-100.0, 100.0, "what single precision holds");
 pub(super) const TURN: Bounds = Bounds::new(-3600.0, 3600.0, "degrees; a turn is 360");
 pub(super) const TILT: Bounds = Bounds::new(-180.0, 180.0, "degrees");
 pub(super) const ACROSS: Bounds = Bounds::new(-1.0, 1.0, "the walls");

@@ -8,7 +8,7 @@ use crate::geom::{Pose, UnitQuaternion};
 use crate::pixel::LinearRgb;
 use crate::scene::bounds::{
     CAST_SHARE, EV, FOCAL, FRICTION, GRADE, LENGTH, MAX_LIGHTS, MAX_OBJECTS, PHOTO_SIDE, PIXEL,
-    PLACE, RADIANCE, SHARE, TURN,
+    PLACE, RADIANCE, SHARE, SOLVED_EV, TURN,
 };
 use crate::scene::hull::doubled_corner_area;
 use crate::scene::{
@@ -186,7 +186,7 @@ pub(super) fn check_albedo(albedo: Albedo, at: &str) -> Result<()> {
 
 fn check_exposure(exposure: Exposure) -> Result<()> {
     match exposure {
-        Exposure::Ev(ev) => EV.check("exposure.ev", ev),
+        Exposure::Ev(ev) => SOLVED_EV.check("exposure.ev", ev),
         Exposure::MatchPlate { gain_ev } => EV.check("exposure.match_plate.gain_ev", gain_ev),
         Exposure::MatchSurface { albedo, gain_ev } => {
             check_albedo(albedo, "exposure.match_surface.albedo")?;
@@ -405,6 +405,20 @@ mod tests {
             reported,
             "objects[0].placement.at.rotation: a quaternion of norm 2, expected norm 1"
         );
+    }
+
+    #[test]
+    fn a_solved_exposure_may_be_larger_than_a_typed_gain() {
+        let exposed = |exposure| {
+            Scene {
+                exposure,
+                ..scene()
+            }
+            .check()
+        };
+        assert!(exposed(Exposure::Ev(60.0)).is_ok());
+        assert!(exposed(Exposure::Ev(101.0)).is_err());
+        assert!(exposed(Exposure::MatchPlate { gain_ev: 33.0 }).is_err());
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! `petcomp asset add -vv PHOTO ... -j 1` tells which stage takes how much of it.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use petcomp::asset::{Library, PhotoEntry, Scale, add_photo, contact_sheet};
+use petcomp::asset::{Library, PhotoEntry, Scale, add_photo, contact_sheets};
 use petcomp::matte::CutOutOptions;
 use petcomp::{Image, LinearRgb, io};
 use std::path::Path;
@@ -31,10 +31,10 @@ fn photo() -> Image<LinearRgb> {
     })
 }
 
-fn add(photo: &Path, folder: &Path) -> petcomp::Result<Image<petcomp::Srgb8>> {
+fn add(photo: &Path, folder: &Path) -> petcomp::Result<Vec<Image<petcomp::Srgb8>>> {
     let entry = PhotoEntry::new(photo, "bottle", "cap_label", Scale::Length(0.25));
     add_photo(folder, &entry, &[], &CutOutOptions::default())?;
-    contact_sheet(&Library::open(folder)?)
+    contact_sheets(&Library::open(folder)?).collect()
 }
 
 fn asset(c: &mut Criterion) {

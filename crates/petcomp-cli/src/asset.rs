@@ -54,7 +54,8 @@ pub(crate) enum AssetCommand {
     Sheet {
         /// Asset folder
         folder: PathBuf,
-        /// Picture to write
+        /// Picture to write: of many cut-outs the first page; further ones go beside it as
+        /// PICTURE_2, PICTURE_3 and so on
         #[arg(short, long, value_name = "PICTURE")]
         output: PathBuf,
     },
@@ -186,7 +187,7 @@ pub(crate) fn run(command: &AssetCommand, global: &GlobalArgs) -> anyhow::Result
         AssetCommand::Add(args) => add_photos(args, global),
         AssetCommand::List { folder } => list_photos(folder),
         AssetCommand::Check { folder, strict } => check_folder(folder, *strict),
-        AssetCommand::Sheet { folder, output } => draw_sheet(folder, output),
+        AssetCommand::Sheet { folder, output } => draw_sheet(folder, output, global),
     }
 }
 
@@ -195,12 +196,18 @@ fn trimmed(name: &str) -> Result<String, Infallible> {
     Ok(name.trim().to_owned())
 }
 
-fn draw_sheet(folder: &Path, output: &Path) -> anyhow::Result<()> {
+fn draw_sheet(folder: &Path, output: &Path, global: &GlobalArgs) -> anyhow::Result<()> {
     let library = Library::open(folder)?;
+    let count = asset::contact_sheets(&library).len();
+    let pages = (0..count).map(|page| asset::contact_sheet_page(output, page));
     let read = records_of(&library).flat_map(PhotoRecord::files);
     let read = read.chain([MANIFEST]).map(|file| folder.join(file));
-    io::check_distinct(read, [output])?;
-    Ok(io::write(output, &asset::contact_sheet(&library)?)?)
+    io::check_distinct(read, pages)?;
+    write_pages(&library, output)?;
+    if count > 1 {
+        global.print_written(output, format_args!("the first of {count} pages"));
+    }
+    Ok(())
 }
 
 fn check_folder(folder: &Path, strict: bool) -> anyhow::Result<()> {
@@ -327,12 +334,36 @@ fn describe_lengths(metres: &[[f64; 2]]) -> String {
     format!("objects are {range} mm long, to within {error:.1} mm; `petcomp asset list` shows each")
 }
 
-/// Writes the contact sheet of a folder.
+/// Writes the contact sheet of a folder, and deletes the pages that a longer one had.
 fn write_sheet(folder: &Path, library: &Library, global: &GlobalArgs) -> anyhow::Result<()> {
-    let path = folder.join(CONTACT_SHEET);
-    io::write(&path, &asset::contact_sheet(library)?)?;
-    global.print_look_at(&path);
+    let first = folder.join(CONTACT_SHEET);
+    let count = write_pages(library, &first)?;
+    remove_pages(&first, count)?;
+    match count {
+        1 => global.print_look_at(&first),
+        _ => global.print_status(format_args!(
+            "look at {}, the first of {count} pages",
+            first.display()
+        )),
+    }
     Ok(())
+}
+
+/// Draws and writes a contact sheet page by page, and counts them.
+fn write_pages(library: &Library, first: &Path) -> petcomp::Result<usize> {
+    let pages = asset::contact_sheets(library);
+    let count = pages.len();
+    for (i, page) in pages.enumerate() {
+        io::write(asset::contact_sheet_page(first, i), &page?)?;
+    }
+    Ok(count)
+}
+
+/// Deletes the pages of a contact sheet from one on, counted from 0.
+fn remove_pages(first: &Path, from: usize) -> petcomp::Result<()> {
+    let pages = (from..).map(|page| asset::contact_sheet_page(first, page));
+    let mut left = pages.take_while(|page| page.exists());
+    left.try_for_each(|page| std::fs::remove_file(&page).map_err(|e| Error::file(page, e)))
 }
 
 /// Draws the contact sheet of a folder whose manifest is another than before, though photos failed:

@@ -366,6 +366,20 @@ fn a_photo_that_its_cut_out_would_replace_is_refused() {
 }
 
 #[test]
+fn pages_of_a_longer_contact_sheet_do_not_stay() {
+    let desk = Desk::new();
+    write_slab(&desk.path("slab.png"));
+    let pages = [2, 3].map(|i| desk.path(format!("assets/contact_sheet_{i}.png")));
+    add_ring(&desk, "slab.png", "assets");
+    for page in &pages {
+        std::fs::write(page, "").expect("a page");
+    }
+    add_ring(&desk, "slab.png", "assets");
+    assert!(pages.iter().all(|page| !page.exists()));
+    assert!(desk.path("assets/contact_sheet.png").exists());
+}
+
+#[test]
 fn another_photo_of_the_same_name_replaces_a_cut_out_with_a_warning() {
     let desk = Desk::new();
     write_slab(&desk.path("x/slab.png"));
@@ -1884,6 +1898,51 @@ fn a_summary_tells_what_is_there_and_is_a_result() {
         ]
     );
     assert!(places.iter().all(|place| desk.path(place).is_file()));
+}
+
+/// Makes a few small pictures of the demo's recipe with these settings.
+fn generate_small(desk: &Desk, folder: &str, count: &str, settings: &[&str]) {
+    let mut call = words("-q dataset generate demo/recipe.toml --set scene.image=[160,120]");
+    call.extend(["--set", "scene.objects=4", "-n", count, "-o", folder]);
+    for &setting in settings {
+        call.extend(["--set", setting]);
+    }
+    desk.ok(&call);
+}
+
+#[test]
+fn a_report_tells_chances_by_their_shares_and_what_does_not_vary() {
+    let desk = Desk::new();
+    demo(&desk);
+    let chances = ["scene.start.face_down=0.3", "scene.negatives=0.2"];
+    generate_small(&desk, "out", "5", &chances);
+    desk.ok(&["dataset", "report", "out"]);
+    let page = std::fs::read_to_string(desk.path("out/report.html")).unwrap();
+    for row in [
+        "<td>start.face_down</td><td>0.3</td><td>0.",
+        "<td>negative</td><td>0.2</td><td>0.",
+        "<td>interreflection</td><td>0</td>",
+    ] {
+        assert!(page.contains(row), "{row}");
+    }
+    for title in ["start.face_down", "negative", "interreflection"] {
+        assert!(!page.contains(&format!(">{title}<title>")), "{title}");
+    }
+}
+
+#[test]
+fn one_light_gives_the_same_picture_at_any_power() {
+    let desk = Desk::new();
+    demo(&desk);
+    for (folder, lights) in [
+        ("bright", "scene.lights=[{power=10}]"),
+        ("dim", "scene.lights=[{power=1e-9}]"),
+    ] {
+        generate_small(&desk, folder, "1", &["scene.ambient=0", lights]);
+    }
+    // A code is 1/255.
+    let [bright, dim] = ["bright", "dim"].map(|folder| format!("{folder}/images/val/000000.png"));
+    desk.ok(&["diff", "--fail", "0.004", &bright, &dim]);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use petcomp::asset::MANIFEST;
 use std::path::Path;
 
 /// Endings of pictures that petcomp writes beside photos.
-const OWN_ENDINGS: [&str; 4] = [".overlay", ".front", ".matte", "contact_sheet"];
+const OWN_ENDINGS: [&str; 3] = [".overlay", ".front", ".matte"];
 
 /// All photos below a folder, in order of name; no pictures of datasets and no cut-outs.
 pub(crate) fn photos(folder: &Folder) -> Vec<String> {
@@ -36,7 +36,10 @@ pub(crate) fn parent_of(name: &str) -> &str {
 
 fn is_own(path: &Path) -> bool {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    OWN_ENDINGS.iter().any(|ending| stem.ends_with(ending))
+    // `contact_sheet_2` is a further page.
+    let first_page = stem.trim_end_matches(|c: char| c == '_' || c.is_ascii_digit());
+    let is_page = first_page.ends_with("contact_sheet");
+    is_page || OWN_ENDINGS.iter().any(|ending| stem.ends_with(ending))
 }
 
 #[cfg(test)]
@@ -51,6 +54,12 @@ mod tests {
             std::fs::write(path, "").unwrap();
         }
         photos(&Folder::open(dir.path()).unwrap())
+    }
+
+    #[test]
+    fn no_page_of_a_contact_sheet_is_a_photo() {
+        let files = ["contact_sheet.png", "contact_sheet_12.png", "a_2.png"];
+        assert_eq!(photos_of(&files), ["a_2.png"]);
     }
 
     #[test]

@@ -96,7 +96,7 @@ async fn photo(
 }
 
 /// A mark of the state of a file: when it was written, and its length.
-fn tag_of(path: &Path) -> Answer<String> {
+pub(crate) fn tag_of(path: &Path) -> Answer<String> {
     let meta = std::fs::metadata(path).map_err(unreadable)?;
     let written = meta.modified().map_err(unreadable)?;
     let nanos = written

@@ -7,7 +7,7 @@ use crate::image::Image;
 
 /// Cells per side of the pattern, and of the marker with its black border.
 const PATTERN_CELLS: usize = 4;
-pub(super) const MARKER_CELLS: usize = PATTERN_CELLS + 2;
+const MARKER_CELLS: usize = PATTERN_CELLS + 2;
 /// Wrong bits that are corrected: the least distance between two markers is 4.
 const MAX_WRONG_BITS: u32 = 1;
 /// White has to be this many times brighter than black.
@@ -26,36 +26,48 @@ const DICT_4X4_50: [u16; 50] = [
     0x502e, 0x5013,
 ];
 
-/// Which cells of a marker are white, row by row from the first corner.
-pub(super) type WhiteCells = [[bool; MARKER_CELLS]; MARKER_CELLS];
+/// The cells of a marker with a black border, as read.
+pub(super) struct MarkerCells<const CELLS: usize> {
+    /// Which of them are white, row by row from the first corner.
+    pub(super) white: [[bool; CELLS]; CELLS],
+    /// The light of the brightest.
+    pub(super) bright: f32,
+}
+
+impl<const CELLS: usize> MarkerCells<CELLS> {
+    /// White is as bright as the picture's format allows.
+    pub(super) fn is_overexposed(&self) -> bool {
+        self.bright >= OVEREXPOSED_LIGHT
+    }
+}
 
 /// The marker between four corners, as read.
 pub(super) struct MarkerReading {
     pub(super) id: u32,
     /// How many corners the printed top left is further on.
     pub(super) turns: usize,
-    pub(super) white: WhiteCells,
-    /// White is as bright as the picture's format allows.
-    pub(super) is_overexposed: bool,
+    pub(super) cells: MarkerCells<MARKER_CELLS>,
 }
 
 /// The marker between four corners (clockwise).
 pub(super) fn read(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<MarkerReading> {
-    let cells = cell_means(light, corners)?;
+    let cells = read_cells(light, corners)?;
+    let (id, turns) = lookup(pattern_code(&cells.white))?;
+    Some(MarkerReading { id, turns, cells })
+}
+
+/// The cells of the marker between four corners (clockwise); none where they are of one
+/// light or its border is not black.
+pub(super) fn read_cells<const CELLS: usize>(
+    light: &Image<f32>,
+    corners: &[Point2<f64>; 4],
+) -> Option<MarkerCells<CELLS>> {
+    let cells: [[f32; CELLS]; CELLS] = cell_means(light, corners)?;
     let (dark, bright) = extremes(cells.as_flattened());
     let middle = (dark + bright) / 2.0;
     let white = cells.map(|line| line.map(|cell| cell > middle));
-    let code = pattern_code(&white)?;
-    if bright < MIN_CONTRAST * dark {
-        return None;
-    }
-    let (id, turns) = lookup(code)?;
-    Some(MarkerReading {
-        id,
-        turns,
-        white,
-        is_overexposed: bright >= OVEREXPOSED_LIGHT,
-    })
+    let is_clear = bright >= MIN_CONTRAST * dark && has_black_border(&white);
+    is_clear.then_some(MarkerCells { white, bright })
 }
 
 fn extremes(light: &[f32]) -> (f32, f32) {
@@ -66,53 +78,52 @@ fn extremes(light: &[f32]) -> (f32, f32) {
 }
 
 /// The light of each cell between four corners; none where the photo does not show one.
-fn cell_means(
+fn cell_means<const CELLS: usize>(
     light: &Image<f32>,
     corners: &[Point2<f64>; 4],
-) -> Option<[[f32; MARKER_CELLS]; MARKER_CELLS]> {
+) -> Option<[[f32; CELLS]; CELLS]> {
     let photo_from_square = square_from_corners(corners);
-    let mut cells = [[0.0; MARKER_CELLS]; MARKER_CELLS];
+    let mut cells = [[0.0; CELLS]; CELLS];
     for (row, line) in cells.iter_mut().enumerate() {
         for (column, cell) in line.iter_mut().enumerate() {
-            *cell = cell_mean(light, &photo_from_square, [column, row])?;
+            *cell = cell_mean::<CELLS>(light, &photo_from_square, [column, row])?;
         }
     }
     Some(cells)
 }
 
-/// The bits of the pattern; none where the border is not black.
-fn pattern_code(white: &WhiteCells) -> Option<u16> {
-    let mut code = 0;
-    for (row, line) in white.iter().enumerate() {
-        for (column, &white) in line.iter().enumerate() {
-            match is_border(row) || is_border(column) {
-                true if white => return None,
-                true => {}
-                false => code = (code << 1) | u16::from(white),
-            }
-        }
-    }
-    Some(code)
+fn has_black_border<const CELLS: usize>(white: &[[bool; CELLS]; CELLS]) -> bool {
+    let last = CELLS - 1;
+    let is_white = |i: usize| white[0][i] || white[last][i] || white[i][0] || white[i][last];
+    !(0..CELLS).any(is_white)
 }
 
-fn is_border(i: usize) -> bool {
-    i == 0 || i == MARKER_CELLS - 1
+/// The bits of the pattern inside the border.
+fn pattern_code(white: &[[bool; MARKER_CELLS]; MARKER_CELLS]) -> u16 {
+    let inside = 1..MARKER_CELLS - 1;
+    let lines = white[inside.clone()].iter();
+    let bits = lines.flat_map(|line| &line[inside.clone()]);
+    bits.fold(0, |code, &white| (code << 1) | u16::from(white))
 }
 
 /// The mean of nine samples inside a cell (column and row).
-fn cell_mean(light: &Image<f32>, photo_from_square: &Homography, cell: [usize; 2]) -> Option<f32> {
+fn cell_mean<const CELLS: usize>(
+    light: &Image<f32>,
+    photo_from_square: &Homography,
+    cell: [usize; 2],
+) -> Option<f32> {
     let mut sum = 0.0;
     for i in 0..9 {
-        let at = photo_from_square.map(sample_position(cell, [i % 3, i / 3]));
+        let at = photo_from_square.map(sample_position::<CELLS>(cell, [i % 3, i / 3]));
         sum += sample_nearest(light, at.x, at.y)?;
     }
     Some(sum / 9.0)
 }
 
 /// Where in the unit square a cell's sample (column and row, of three each) is.
-fn sample_position(cell: [usize; 2], sample: [usize; 2]) -> Point2<f64> {
+fn sample_position<const CELLS: usize>(cell: [usize; 2], sample: [usize; 2]) -> Point2<f64> {
     [0, 1]
-        .map(|axis| (cell[axis] as f64 + 0.3 + 0.2 * sample[axis] as f64) / MARKER_CELLS as f64)
+        .map(|axis| (cell[axis] as f64 + 0.3 + 0.2 * sample[axis] as f64) / CELLS as f64)
         .into()
 }
 

@@ -1,6 +1,6 @@
 //! Corners of a dark square to a fraction of a pixel: where its fitted sides meet.
 
-use super::dictionary::{MARKER_CELLS, WhiteCells};
+use super::dictionary::MarkerCells;
 use crate::camera::rectangle::square_from_corners;
 use crate::filter::sample_bilinear_clamped;
 use crate::geom::{Homography, Line, Point2, Vector2, corners_between};
@@ -11,12 +11,9 @@ const SIDE_PROBES: usize = 32;
 const CORNER_PART: f64 = 0.12;
 /// Samples per pixel across a side.
 const SAMPLES_PER_PX: f64 = 4.0;
-/// How far across is looked, in cells of the marker as they are seen across that side: its border
-/// is one cell wide, and so should be the paper's margin.
-const REACH_CELLS: f64 = 0.6;
-/// Longest and shortest such reach, pixels.
+/// Shortest and longest way across an edge that is looked at to either side, pixels.
 const REACH_PX: std::ops::RangeInclusive<f64> = 1.2..=5.0;
-/// The same for edges inside the pattern.
+/// That way for edges inside the pattern, in cells.
 const INNER_REACH_CELLS: f64 = 0.45;
 /// White that has grown by more, pixels, has another cause; fewer edges than these are not
 /// conclusive.
@@ -33,8 +30,16 @@ const OUTLINE_ERROR_SHARE: f64 = 0.5;
 /// Probes farther than this from the fitted line do not belong to it, pixels.
 const MAX_OFF_LINE_PX: f64 = 0.7;
 
-/// Across an edge light rises by this at least, scene-linear.
-const MIN_RISE: f64 = 0.02;
+/// What counts as an edge in a photo.
+pub(super) struct EdgeSearch<'a> {
+    /// The photo's luminance, scene-linear.
+    pub(super) light: &'a Image<f32>,
+    /// How far a side is looked for to either side of its place, as a share of the square as it is
+    /// seen across that side.
+    pub(super) reach: f64,
+    /// Across an edge light rises by more than this, scene-linear.
+    pub(super) min_rise: f64,
+}
 
 /// Corners of a dark square, and how well they are known.
 #[derive(Clone, Copy, Debug)]
@@ -45,12 +50,12 @@ pub(super) struct RefinedCorners {
 }
 
 /// The corners where the fitted sides of a dark quadrangle meet; none where a side shows no edge.
-pub(super) fn refined(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<[Point2<f64>; 4]> {
+pub(super) fn refined(search: &EdgeSearch, rough: &[Point2<f64>; 4]) -> Option<[Point2<f64>; 4]> {
     let mut corners = *rough;
     // From the second time on the probes stand where the sides are.
     for _ in 0..MAX_ROUNDS {
         let before = corners;
-        corners = corners_between(&fitted_sides(light, &before)?)?;
+        corners = corners_between(&fitted_sides(search, &before)?)?;
         if have_settled(&before, &corners) {
             break;
         }
@@ -63,12 +68,12 @@ fn have_settled(before: &[Point2<f64>; 4], after: &[Point2<f64>; 4]) -> bool {
 }
 
 /// The line along each side of a quadrangle; none where a side shows no edge.
-fn fitted_sides(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<[Line; 4]> {
+fn fitted_sides(search: &EdgeSearch, corners: &[Point2<f64>; 4]) -> Option<[Line; 4]> {
     Some([
-        fitted_side(light, corners, 0)?,
-        fitted_side(light, corners, 1)?,
-        fitted_side(light, corners, 2)?,
-        fitted_side(light, corners, 3)?,
+        fitted_side(search, corners, 0)?,
+        fitted_side(search, corners, 1)?,
+        fitted_side(search, corners, 2)?,
+        fitted_side(search, corners, 3)?,
     ])
 }
 
@@ -80,14 +85,17 @@ fn fitted_sides(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<[Line;
 /// forward, while the grid they should lie on has shrunk with the outline. Least squares over all
 /// edges of the pattern. How far they are off after that is the uncertainty of the outline: blur
 /// moves both where cells are narrow.
-pub(super) fn by_cells(
-    light: &Image<f32>,
+pub(super) fn by_cells<const CELLS: usize>(
+    search: &EdgeSearch,
     corners: &[Point2<f64>; 4],
-    white: &WhiteCells,
-    is_overexposed: bool,
+    cells: &MarkerCells<CELLS>,
 ) -> Option<RefinedCorners> {
-    let edges = EdgeShifts::measure(light, corners, white);
-    let growth = if is_overexposed { edges.growth() } else { 0.0 };
+    let edges = EdgeShifts::measure(search, corners, &cells.white);
+    let growth = if cells.is_overexposed() {
+        edges.growth()
+    } else {
+        0.0
+    };
     let lines = [0, 1, 2, 3].map(|i| moved_side(corners, i, growth));
     let off = OUTLINE_ERROR_SHARE * edges.rms_px(growth) * mean_square_spread(&lines).sqrt();
     Some(RefinedCorners {
@@ -120,12 +128,16 @@ struct EdgeShifts {
 }
 
 impl EdgeShifts {
-    fn measure(light: &Image<f32>, corners: &[Point2<f64>; 4], white: &WhiteCells) -> Self {
+    fn measure<const CELLS: usize>(
+        search: &EdgeSearch,
+        corners: &[Point2<f64>; 4],
+        white: &[[bool; CELLS]; CELLS],
+    ) -> Self {
         let photo_from_square = square_from_corners(corners);
         Self {
             moved: inner_edges(white)
                 .iter()
-                .filter_map(|edge| edge.shift(light, &photo_from_square))
+                .filter_map(|edge| edge.shift(search, &photo_from_square))
                 .collect(),
         }
     }
@@ -153,7 +165,7 @@ impl EdgeShifts {
 }
 
 /// An edge between a black and a white cell.
-struct InnerEdge {
+struct InnerEdge<const CELLS: usize> {
     /// It is crossed on the way from the first corner to the fourth, not to the second.
     upright: bool,
     /// The row or column of the two cells.
@@ -164,9 +176,14 @@ struct InnerEdge {
     rising: f64,
 }
 
-impl InnerEdge {
+impl<const CELLS: usize> InnerEdge<CELLS> {
     /// The edge between two cells, where one is black and the other white.
-    fn between(white: &WhiteCells, upright: bool, across: usize, along: usize) -> Option<Self> {
+    fn between(
+        white: &[[bool; CELLS]; CELLS],
+        upright: bool,
+        across: usize,
+        along: usize,
+    ) -> Option<Self> {
         let [before, after] = [along - 1, along].map(|i| match upright {
             true => white[i][across],
             false => white[across][i],
@@ -181,7 +198,7 @@ impl InnerEdge {
 
     /// Where the middle of the edge is in the photo, or would be at another line of the grid.
     fn position(&self, photo_from_square: &Homography, along: f64) -> Point2<f64> {
-        let cells = MARKER_CELLS as f64;
+        let cells = CELLS as f64;
         let (along, across) = (along / cells, (self.across as f64 + 0.5) / cells);
         photo_from_square.map(match self.upright {
             true => Point2::new(across, along),
@@ -191,19 +208,19 @@ impl InnerEdge {
 
     /// By how much a growth of white by a pixel would move the edge, and by how much it is moved;
     /// none where it is not found.
-    fn shift(&self, light: &Image<f32>, photo_from_square: &Homography) -> Option<[f64; 2]> {
+    fn shift(&self, search: &EdgeSearch, photo_from_square: &Homography) -> Option<[f64; 2]> {
         let along = self.along as f64;
         let foot = self.position(photo_from_square, along);
         let step = self.position(photo_from_square, along + 0.5)
             - self.position(photo_from_square, along - 0.5);
         let reach = clamped_reach(INNER_REACH_CELLS * step.norm());
-        let moved = crossing(light, foot, step.normalize() * self.rising, reach)?;
+        let moved = crossing(search, foot, step.normalize() * self.rising, reach)?;
         Some([self.shift_per_growth(), moved * self.rising])
     }
 
     /// By how much a growth of white by a pixel would move the edge.
     fn shift_per_growth(&self) -> f64 {
-        2.0 * self.along as f64 / MARKER_CELLS as f64 - self.rising - 1.0
+        2.0 * self.along as f64 / CELLS as f64 - self.rising - 1.0
     }
 }
 
@@ -211,45 +228,45 @@ fn clamped_reach(px: f64) -> f64 {
     px.clamp(*REACH_PX.start(), *REACH_PX.end())
 }
 
-fn inner_edges(white: &WhiteCells) -> Vec<InnerEdge> {
+fn inner_edges<const CELLS: usize>(white: &[[bool; CELLS]; CELLS]) -> Vec<InnerEdge<CELLS>> {
     let mut edges = Vec::new();
     for upright in [false, true] {
-        for across in 1..MARKER_CELLS - 1 {
+        for across in 1..CELLS - 1 {
             edges.extend(edges_of_line(white, upright, across));
         }
     }
     edges
 }
 
-fn edges_of_line(
-    white: &WhiteCells,
+fn edges_of_line<const CELLS: usize>(
+    white: &[[bool; CELLS]; CELLS],
     upright: bool,
     across: usize,
-) -> impl Iterator<Item = InnerEdge> {
-    (1..MARKER_CELLS).filter_map(move |along| InnerEdge::between(white, upright, across, along))
+) -> impl Iterator<Item = InnerEdge<CELLS>> {
+    (1..CELLS).filter_map(move |along| InnerEdge::between(white, upright, across, along))
 }
 
 /// The edge near the side from a corner to the next, dark on its right-hand side (clockwise
 /// corners, y down).
-fn fitted_side(light: &Image<f32>, corners: &[Point2<f64>; 4], first: usize) -> Option<Line> {
+fn fitted_side(search: &EdgeSearch, corners: &[Point2<f64>; 4], first: usize) -> Option<Line> {
     let [a, b, c, d] = [0, 1, 2, 3].map(|i| corners[(first + i) % 4]);
     let outward = outward_normal(a, b);
     // From a steep side a marker is much longer than high, and so are its cells.
     let across = (outward.dot(&(a - d)) + outward.dot(&(b - c))) / 2.0;
-    let reach = clamped_reach(REACH_CELLS * across / MARKER_CELLS as f64);
+    let reach = clamped_reach(search.reach * across);
     let feet = (0..SIDE_PROBES).map(|i| a + (b - a) * probe_part(i));
-    let points = feet.filter_map(|foot| edge_point(light, foot, outward, reach));
+    let points = feet.filter_map(|foot| edge_point(search, foot, outward, reach));
     line_through_most(points.collect())
 }
 
 /// Where the light rises along a probe.
 fn edge_point(
-    light: &Image<f32>,
+    search: &EdgeSearch,
     foot: Point2<f64>,
     outward: Vector2<f64>,
     reach: f64,
 ) -> Option<Point2<f64>> {
-    Some(foot + outward * crossing(light, foot, outward, reach)?)
+    Some(foot + outward * crossing(search, foot, outward, reach)?)
 }
 
 /// The unit vector to the left of the way from a corner to the next.
@@ -286,7 +303,7 @@ fn line_through_most(mut points: Vec<Point2<f64>>) -> Option<Line> {
 /// Where the light rises along a direction: the centre of gravity of its slope, which blur does not
 /// move.
 fn crossing(
-    light: &Image<f32>,
+    search: &EdgeSearch,
     foot: Point2<f64>,
     direction: Vector2<f64>,
     reach: f64,
@@ -295,7 +312,7 @@ fn crossing(
     let (mut rise, mut moment, mut before) = (0.0, 0.0, 0.0);
     for i in 0..=steps {
         let at = foot + direction * along_probe(i as f64, steps, reach);
-        let now = f64::from(sample_bilinear_clamped(light, at.x, at.y));
+        let now = f64::from(sample_bilinear_clamped(search.light, at.x, at.y));
         if i > 0 {
             rise += now - before;
             moment += (now - before) * along_probe(i as f64 - 0.5, steps, reach);
@@ -303,7 +320,7 @@ fn crossing(
         before = now;
     }
     let edge = moment / rise;
-    (rise > MIN_RISE && edge.abs() <= reach).then_some(edge)
+    (rise > search.min_rise && edge.abs() <= reach).then_some(edge)
 }
 
 /// The position of a sample along a probe of `steps` steps, from its middle.

@@ -9,7 +9,8 @@
 //! the black, and the corners are moved back by that; they also show the uncertainty of the
 //! outline, which from a steep side and out of focus is larger than from above. The bits are looked
 //! up in the dictionary in all four rotations, one wrong bit allowed, so that corner 0 is the
-//! printed top left.
+//! printed top left. Corners that the AprilTag library finds are refined and corrected in the same
+//! way.
 
 #[cfg(feature = "markers")]
 mod april;
@@ -26,9 +27,15 @@ use crate::error::{Error, Result};
 use crate::geom::{Point2, Vector2};
 use crate::image::Image;
 use crate::pixel::LinearRgb;
+use edge::EdgeSearch;
 
 /// The family of markers that is always found.
 pub(crate) const FAMILY: &str = "DICT_4X4_50";
+/// How far across a side its edge is looked for, as a share of the marker: its border is a sixth
+/// wide, and so should be the paper's margin.
+const REACH: f64 = 0.1;
+/// Across an edge light rises by more than this, scene-linear.
+const MIN_RISE: f64 = 0.02;
 /// Least noise of a corner that a label states, pixels: lenses bend and paper is not flat, which no
 /// marker by itself shows. Root mean square on the sample background with markers.
 const MIN_STATED_SIGMA_PX: f64 = 0.15;
@@ -66,9 +73,14 @@ fn by_number_and_place(a: &Marker, b: &Marker) -> std::cmp::Ordering {
 
 /// The marker between four rough corners.
 fn marker_at(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<Marker> {
-    let fine = edge::refined(light, rough)?;
+    let search = EdgeSearch {
+        light,
+        reach: REACH,
+        min_rise: MIN_RISE,
+    };
+    let fine = edge::refined(&search, rough)?;
     let reading = dictionary::read(light, &fine)?;
-    let corners = edge::by_cells(light, &fine, &reading.white, reading.is_overexposed)?;
+    let corners = edge::by_cells(&search, &fine, &reading.cells)?;
     Some(Marker {
         id: reading.id,
         corners_px: [0, 1, 2, 3].map(|i| corners.px[(i + reading.turns) % 4]),

@@ -26,28 +26,64 @@ pub(super) fn add_drawn(page: &mut Page, summary: &Summary) {
     };
     page.heading("What was drawn").text(&format!(
         "Bars: {values}. Dashed line: the recipe's distribution; about one bar in twenty lies outside the \
-         band around it by chance. What does not vary is in the table below.",
+         band around it by chance. What does not vary, and what happens in a share of the cases, is in tables below.",
     ));
-    let (mut charts, fixed) = drawn_values(summary);
+    let DrawnValues {
+        mut charts,
+        fixed,
+        chances,
+    } = drawn_values(summary);
     let chosen = summary.chosen.iter();
     charts.extend(chosen.map(|(what, counts)| choice_histogram(what, counts)));
     add_histograms(page, &charts);
-    if !fixed.rows.is_empty() {
-        page.table(&fixed);
+    for table in [fixed, chances] {
+        if !table.rows.is_empty() {
+            page.table(&table);
+        }
     }
 }
 
-/// Histograms of the values that vary, and a table of the others.
-fn drawn_values(summary: &Summary) -> (Vec<Histogram>, Table) {
-    let mut fixed = Table::new(["not varying", "value"]);
-    let mut charts = Vec::new();
+/// What was drawn, by how it is shown.
+struct DrawnValues {
+    /// Values that vary.
+    charts: Vec<Histogram>,
+    /// Values that do not.
+    fixed: Table,
+    /// What happens by chance.
+    chances: Table,
+}
+
+fn drawn_values(summary: &Summary) -> DrawnValues {
+    let mut drawn = DrawnValues {
+        charts: Vec::new(),
+        fixed: Table::new(["not varying", "value"]),
+        chances: Table::new(["by chance", "share in the recipe", "share in the dataset"]),
+    };
     for (key, values) in &summary.drawn {
-        match summary.distribution(key) {
-            Some(from) if from.is_fixed() => fixed.push([key.clone(), values[0].to_string()]),
-            from => charts.push(drawn_histogram(key, values, from)),
+        if let Some(share) = summary.chance(key) {
+            let shares = [share.to_string(), share_below(values, share)];
+            drawn.chances.push([key.clone()].into_iter().chain(shares));
+            continue;
+        }
+        // A recipe leaves keys out that are at their default.
+        let from = summary.distribution(key).filter(|from| !from.is_fixed());
+        match from {
+            None if are_equal(values) => drawn.fixed.push([key.clone(), values[0].to_string()]),
+            from => drawn.charts.push(drawn_histogram(key, values, from)),
         }
     }
-    (charts, fixed)
+    drawn
+}
+
+/// How many of the values lie below a limit, in words: `0.25 (3 of 12)`.
+fn share_below(values: &[f64], limit: f64) -> String {
+    let below = values.iter().filter(|value| **value < limit).count();
+    let all = values.len();
+    format!("{:.2} ({below} of {all})", below as f64 / all as f64)
+}
+
+fn are_equal(values: &[f64]) -> bool {
+    values.iter().all(|value| *value == values[0])
 }
 
 /// Values of one draw, against its distribution in the recipe.
@@ -184,6 +220,11 @@ pub(super) fn add_histograms(page: &mut Page, charts: &[Histogram]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_chance_came_true_where_the_draw_is_below_it() {
+        assert_eq!(share_below(&[0.1, 0.3, 0.9, 0.29], 0.3), "0.50 (2 of 4)");
+    }
 
     #[test]
     fn whole_numbers_have_bars_of_their_own_until_there_are_too_many() {

@@ -402,7 +402,7 @@ fn manifest(world: &World) {
     };
     let photos: usize = library.assets.iter().map(|asset| asset.photos.len()).sum();
     if photos < 10 {
-        ends(asset::contact_sheet(&library));
+        asset::contact_sheets(&library).for_each(|page| drop(ends(page)));
     }
     if let Some(pipeline) = ends(Pipeline::open(world_setup(world))) {
         ends(pipeline.draw(0, 0));

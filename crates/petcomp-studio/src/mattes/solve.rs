@@ -3,19 +3,20 @@
 use super::entry::EntryName;
 use crate::folder::Folder;
 use crate::message::Json;
+use crate::picture::tag_of;
 use crate::refusal::{Answer, Refusal};
 use crate::studio::Studio;
 use crate::turn::{Tab, Turns};
 use axum::extract::State;
 use axum::http::StatusCode;
-use petcomp::asset::{OpenPhoto, PhotoEntry, Review};
+use petcomp::asset::{OpenPhoto, PhotoEntry, Review, ScreenSource};
 use petcomp::matte::{CutOut, CutOutOptions, Stroke};
 use petcomp::{Diagnostic, Error, Film, Image, LinearRgb, Roi};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Instant, SystemTime};
+use std::time::Instant;
 
 /// Photos that are kept in memory: one that is worked on, and its neighbour.
 const OPEN_PHOTOS: usize = 2;
@@ -59,15 +60,22 @@ impl<K: PartialEq, V> Recent<K, V> {
 struct PhotoKey {
     entry: PhotoEntry,
     options: CutOutOptions,
-    modified: Option<SystemTime>,
+    /// State of the photo's file; nothing where that cannot be read.
+    photo: Option<String>,
+    /// The same of the photo of the empty screen, where the entry has one.
+    screen: Option<String>,
 }
 
 impl PhotoKey {
     fn new(name: &EntryName, folder: &Folder) -> Answer<Self> {
         let (entry, options) = name.find(folder)?;
-        let metadata = std::fs::metadata(&entry.file);
+        let screen = match &entry.screen {
+            ScreenSource::Photo(empty) => tag_of(empty).ok(),
+            _ => None,
+        };
         Ok(Self {
-            modified: metadata.and_then(|m| m.modified()).ok(),
+            photo: tag_of(&entry.file).ok(),
+            screen,
             entry,
             options,
         })
@@ -233,6 +241,26 @@ impl From<CutOut> for ShownCut {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_photo_is_read_again_beside_another_empty_screen() {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+        write(
+            "photos.csv",
+            "file,asset,class,length,screen\na.png,a,c,0.2,empty.png\n",
+        );
+        write("a.png", "photo");
+        write("empty.png", "screen");
+        let folder = Folder::open(dir.path()).unwrap();
+        let name = serde_json::json!({ "list": "photos.csv", "photo": "a.png" });
+        let name: EntryName = serde_json::from_value(name).unwrap();
+        let key = || PhotoKey::new(&name, &folder).unwrap();
+        let before = key();
+        assert!(before == key());
+        write("empty.png", "another screen");
+        assert!(before != key());
+    }
 
     #[test]
     fn what_was_kept_longest_goes_first() {
