@@ -85,7 +85,8 @@ impl Library {
         let kept = most_bytes() as f64;
         if needed > kept {
             log::warn!(
-                "cut-outs take {:.1} GB in memory, {:.1} GB of them are kept and others read anew for each picture:                  a smaller longest_side in [cut_out] of their list makes this faster",
+                "cut-outs take up to {:.1} GB in memory, {:.1} GB of them are kept and others read again and again: \
+                 a smaller longest_side in [cut_out] of their list makes this faster",
                 needed / 1e9,
                 kept / 1e9
             );
@@ -142,7 +143,7 @@ fn places_and_records(manifest: &Manifest) -> impl Iterator<Item = (String, &Pho
 const ROUNDING_PX: f64 = 0.5;
 
 /// The photo of a record that stands at a place of the manifest; what its checksum does not cover
-/// is read once.
+/// is read now.
 fn open(folder: &Path, record: &PhotoRecord, at: &str, files: &Arc<CutOutFiles>) -> Result<Photo> {
     let path = io::inside(folder, &record.file).map_err(|e| in_manifest(e, folder, at))?;
     let texture = Checksum::from_file(&path)?.crc32;
@@ -157,7 +158,7 @@ fn open(folder: &Path, record: &PhotoRecord, at: &str, files: &Arc<CutOutFiles>)
         flow: flow.map(|found| found.crc32),
     };
     if record.crc32.is_none() || flow.is_some() {
-        files.read(record, checksums)?;
+        files.pixels(record, checksums)?;
     }
     let source = Source::Files(Arc::clone(files), checksums);
     Ok(Photo::from_source(source, size, record.clone()))
