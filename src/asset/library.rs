@@ -308,9 +308,18 @@ mod tests {
         );
     }
 
+    /// Without a checksum it is read when the folder is opened.
+    fn note_checksum(folder: &tempfile::TempDir) {
+        let mut manifest = Manifest::read(folder.path()).unwrap();
+        let checksum = Checksum::from_file(folder.path().join("a.exr")).unwrap();
+        manifest.assets[0].photos[0].crc32 = Some(checksum.crc32);
+        manifest.write(folder.path()).unwrap();
+    }
+
     #[test]
     fn a_cut_out_that_changes_is_refused_unless_it_was_read() {
         let [read, unread] = [(); 2].map(|()| folder_with(Some((40, 20))));
+        [&read, &unread].into_iter().for_each(note_checksum);
         let [kept, changed] = [&read, &unread].map(|folder| Library::open(folder).unwrap());
         let before = kept.assets[0].photos[0].pixels().unwrap();
         for folder in [&read, &unread] {

@@ -40,10 +40,10 @@ pub(super) fn moved(free: &DeepImage, shot: &Shot, options: &RenderOptions) -> O
     }
     work::add(Kind::Filters, 1);
     let ways = ways(shot);
-    let effect = WideEffect::new(free, shot, margin_px(&ways), options);
-    let means = effect.averaged(&ways);
+    let wide = WideDeep::new(free, shot, margin_px(&ways), options);
+    let means = WideEffect::new(&wide, shot.plate.is_some()).averaged(&ways);
     Some(match &shot.holdout {
-        Some(holdout) => held_out(&means, free, holdout, &ways),
+        Some(holdout) => held_out(&means, &wide, holdout, &ways),
         None => means,
     })
 }
@@ -52,7 +52,7 @@ pub(super) fn moved(free: &DeepImage, shot: &Shot, options: &RenderOptions) -> O
 /// counts.
 fn held_out(
     means: &Image<Film>,
-    free: &DeepImage,
+    wide: &WideDeep<'_>,
     holdout: &Image<HoldoutSample>,
     ways: &Image<Vector2<f64>>,
 ) -> Image<Film> {
@@ -62,7 +62,7 @@ fn held_out(
             return mean;
         }
         let way = ways[(x / SQUARE_PX, y / SQUARE_PX)];
-        let front = mean_in_front(free, place, along(center(x, y), way));
+        let front = mean_in_front(wide, place, along(center(x, y), way));
         let past = Film::default().add_scaled(1.0 - place.coverage.0, mean);
         past.add_scaled(place.coverage.0, front)
     })
@@ -70,15 +70,52 @@ fn held_out(
 
 /// The mean at some places, those of the nearest pixels, of what is in front of the place.
 fn mean_in_front(
-    free: &DeepImage,
+    wide: &WideDeep<'_>,
     place: &HoldoutSample,
     at: impl ExactSizeIterator<Item = Point2<f64>>,
 ) -> Film {
-    let inside = |v: f64, side: usize| (v.max(0.0) as usize).min(side - 1);
+    let [width, height] = wide.size();
+    let inside = |v: f64, side: usize| {
+        let from_corner = (v + wide.margin_px as f64).max(0.0);
+        (from_corner as usize).min(side - 1)
+    };
     mean(at, |p| {
-        let (x, y) = (inside(p.x, free.width()), inside(p.y, free.height()));
-        free.in_front(x, y, place)
+        let (deep, x, y) = wide.at(inside(p.x, width), inside(p.y, height));
+        deep.in_front(x, y, place)
     })
+}
+
+/// Deep samples in the picture and in a margin around it.
+struct WideDeep<'a> {
+    free: &'a DeepImage,
+    /// None without a margin.
+    beyond: Option<DeepImage>,
+    /// Pixels on every side, whole squares.
+    margin_px: usize,
+}
+
+impl<'a> WideDeep<'a> {
+    fn new(free: &'a DeepImage, shot: &Shot, margin_px: usize, options: &RenderOptions) -> Self {
+        Self {
+            free,
+            beyond: (margin_px > 0).then(|| render_beyond(shot, margin_px, options)),
+            margin_px,
+        }
+    }
+
+    /// Width and height with the margin.
+    fn size(&self) -> [usize; 2] {
+        [self.free.width(), self.free.height()].map(|side| side + 2 * self.margin_px)
+    }
+
+    /// The samples that have a pixel, counted from the margin's corner, and where they have it.
+    fn at(&self, x: usize, y: usize) -> (&DeepImage, usize, usize) {
+        let inside = |at: usize, side| at.checked_sub(self.margin_px).filter(|at| *at < side);
+        match (inside(x, self.free.width()), inside(y, self.free.height())) {
+            (Some(x), Some(y)) => (self.free, x, y),
+            _ => (self.beyond.as_ref().unwrap_or(self.free), x, y),
+        }
+    }
 }
 
 /// What objects and their shadows do to the plate, in the picture and in a margin around it.
@@ -91,32 +128,21 @@ struct WideEffect {
 }
 
 impl WideEffect {
-    /// With so many pixels on every side, whole squares.
-    fn new(free: &DeepImage, shot: &Shot, margin_px: usize, options: &RenderOptions) -> Self {
-        let beyond = (margin_px > 0).then(|| render_beyond(shot, margin_px, options));
-        let picture = [free.width(), free.height()];
-        let [width, height] = picture.map(|side| side + 2 * margin_px);
-        // Shadows need something to fall on.
-        let is_shaded = shot.plate.is_some();
-        let film = |deep: &DeepImage, x, y| {
-            let film = deep.flat(x, y);
-            if is_shaded {
-                film.shaded(deep.shadow()[(x, y)])
-            } else {
-                film
-            }
-        };
-        let inside = |at: usize, side: usize| at.checked_sub(margin_px).filter(|at| *at < side);
+    /// Shadows need something to fall on.
+    fn new(wide: &WideDeep<'_>, is_shaded: bool) -> Self {
+        let [width, height] = wide.size();
         Self {
             films: Image::from_fn(width, height, |x, y| {
-                match (inside(x, picture[0]), inside(y, picture[1]), &beyond) {
-                    (Some(x), Some(y), _) => film(free, x, y),
-                    (_, _, Some(beyond)) => film(beyond, x, y),
-                    _ => Film::default(),
+                let (deep, x, y) = wide.at(x, y);
+                let film = deep.flat(x, y);
+                if is_shaded {
+                    film.shaded(deep.shadow()[(x, y)])
+                } else {
+                    film
                 }
             }),
-            margin: margin_px / SQUARE_PX,
-            picture,
+            margin: wide.margin_px / SQUARE_PX,
+            picture: [wide.free.width(), wide.free.height()],
         }
     }
 
