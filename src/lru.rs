@@ -8,7 +8,7 @@ pub(crate) trait Shared: Clone {
     /// What finds the value again while a clone of it lives.
     type Weak: Debug;
 
-    /// Bytes that it takes by now.
+    /// Bytes that it takes at most; always the same.
     fn bytes(&self) -> usize;
 
     /// A reference that keeps nothing.
@@ -52,22 +52,17 @@ impl<V: Shared> LruCache<V> {
 
     /// The value of a name, which is now the one used last.
     pub(crate) fn get(&self, name: &str) -> Option<V> {
-        let mut entries = self.entries();
-        let place = entries.iter().position(|entry| entry.name == name)?;
-        let value = entries[place].value()?;
-        entries[place].kept = Some(value.clone());
-        entries[place..].rotate_left(1);
-        Some(value)
+        used(&mut self.entries(), name)
     }
 
     /// Keeps a value, unless another thread was faster: then that one's. It is made before it comes
     /// here, not under the lock, since the work may be parallel, and a thread that waits may come
     /// back here.
     pub(crate) fn insert(&self, name: &str, value: V) -> V {
-        if let Some(known) = self.get(name) {
+        let mut entries = self.entries();
+        if let Some(known) = used(&mut entries, name) {
             return known;
         }
-        let mut entries = self.entries();
         entries.retain(|entry| entry.name != name && entry.value().is_some());
         entries.push(Entry {
             name: name.to_owned(),
@@ -82,6 +77,15 @@ impl<V: Shared> LruCache<V> {
         // Every change is whole, even where a thread panicked afterwards.
         self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// The value of a name, which is now the one used last.
+fn used<V: Shared>(entries: &mut [Entry<V>], name: &str) -> Option<V> {
+    let place = entries.iter().position(|entry| entry.name == name)?;
+    let value = entries[place].value()?;
+    entries[place].kept = Some(value.clone());
+    entries[place..].rotate_left(1);
+    Some(value)
 }
 
 /// Drops the values that were used longest ago, until the others take little enough memory.

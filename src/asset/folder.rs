@@ -145,13 +145,15 @@ impl CutOutWriter<'_> {
 
     /// Writes the cut-out and the thumbnail of one photo.
     pub(super) fn write(&self, entry: &PhotoEntry) -> Result<PhotoRecord> {
+        // Before they are read: what changes meanwhile is another input.
+        let inputs_crc32 = inputs_crc32(entry, self.options).ok();
         let record = match &entry.captured {
             Some(captured) => self.write_captured(entry, captured),
             None => self.write_cut_out(entry),
         }?;
         Ok(PhotoRecord {
             source_crc32: Some(Checksum::from_file(&entry.file)?.crc32),
-            inputs_crc32: Some(inputs_crc32(entry, self.options)?),
+            inputs_crc32,
             ..record
         })
     }

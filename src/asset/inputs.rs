@@ -26,14 +26,14 @@ pub(super) fn inputs_crc32(entry: &PhotoEntry, options: &CutOutOptions) -> Resul
     Ok(hasher.finalize())
 }
 
-/// What an entry says of how its object is cut out; not what the object is, nor where files lie.
+/// What an entry says of how its object is cut out, its thickness too, by which a scale in the plane
+/// of the screen becomes that of the object; not what else the object is, nor where files lie.
 fn without_names(entry: &PhotoEntry) -> PhotoEntry {
     let mut said = PhotoEntry {
         file: PathBuf::new(),
         asset: String::new(),
         role: Role::default(),
         class: String::new(),
-        thickness: None,
         mass: None,
         ..entry.clone()
     };
@@ -81,6 +81,9 @@ mod tests {
             of(&entry("a.png", "a", 0.2), &smaller),
         ];
         assert!(others.iter().all(|other| *other != first));
+        let mut thick = entry("a.png", "a", 0.2);
+        thick.thickness = Some(0.06);
+        assert_ne!(of(&thick, &plain), first);
         std::fs::write(path("a.review.json"), "{}").unwrap();
         assert_ne!(of(&entry("a.png", "a", 0.2), &plain), first);
     }

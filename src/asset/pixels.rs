@@ -49,7 +49,9 @@ impl Shared for Pixels {
 
     fn bytes(&self) -> usize {
         let flow = self.flow.as_ref().map_or(0, |flow| flow_bytes(flow));
-        self.texture.bytes() + self.surface.bytes() + flow
+        // With all that is made of it later, so that the number stays.
+        let (w, h) = self.texture.size();
+        (BYTES_PER_PIXEL * (w * h) as f64) as usize + flow
     }
 
     fn downgrade(&self) -> WeakPixels {

@@ -54,11 +54,6 @@ impl SurfaceCache {
         weak.upgrade().map(Self)
     }
 
-    /// Bytes of the map by now.
-    pub(super) fn bytes(&self) -> usize {
-        self.0.get().map_or(0, Pyramid::bytes)
-    }
-
     /// The map; `texture` is the same at every call.
     pub fn of(&self, texture: &Texture) -> &Pyramid<SurfaceTexel> {
         if let Some(map) = self.0.get() {

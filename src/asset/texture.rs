@@ -64,14 +64,6 @@ impl Texture {
         }
     }
 
-    /// Bytes of the levels that exist by now.
-    pub(super) fn bytes(&self) -> usize {
-        match self {
-            Self::Rgba(pyramid) => pyramid.bytes(),
-            Self::Film(pyramid) => pyramid.bytes(),
-        }
-    }
-
     /// It may tint what is behind.
     pub fn is_film(&self) -> bool {
         matches!(self, Self::Film(_))

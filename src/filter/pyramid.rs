@@ -37,14 +37,6 @@ impl<P: Mix> Pyramid<P> {
         self.halves.len() + 1
     }
 
-    /// Bytes of the levels that exist by now.
-    #[cfg(feature = "pipeline")]
-    pub(crate) fn bytes(&self) -> usize {
-        let halves = self.halves.iter().filter_map(OnceLock::get);
-        let levels = std::iter::once(&self.base).chain(halves);
-        levels.map(|level| size_of_val(level.pixels())).sum()
-    }
-
     /// The picture halved `level` times; the smallest there is for a larger `level`.
     pub fn level(&self, level: usize) -> &Image<P> {
         let Some(n) = level.min(self.halves.len()).checked_sub(1) else {

@@ -275,7 +275,12 @@ pub(crate) fn build_library(
         false => asset::build(list, folder, &report, interruption()),
     };
     drop(progress);
-    let built = built.inspect_err(|_| refresh_sheet(folder, before.as_ref(), global))?;
+    let built = built.inspect_err(|error| {
+        // After a stop there are seconds left, and resuming draws it.
+        if !matches!(error, Error::Interrupted { .. }) {
+            refresh_sheet(folder, before.as_ref(), global);
+        }
+    })?;
     report_built(&built, folder, global);
     let library = &built.library;
     show_classes(&library.classes, "`classes = [...]` in the list", global);

@@ -31,7 +31,7 @@ pub(crate) fn run(args: &DemoArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     io::create_folder(&args.output)?;
     let recipe = args.recipe()?;
     let config = DatasetConfig::read(&recipe, &[])?;
-    let built = asset::build_library(&list, &args.output.join("assets"), false, global)?;
+    let built = asset::build_library(&list, &args.output.join("assets"), true, global)?;
     let pipeline = Pipeline::with_library(config, built.library)?;
     let plan = pipeline.plan(args.count, args.seed, args.dataset_folder())?;
     let counts = dataset::generate_supervised(&pipeline, &plan, &args.consent, global)?;

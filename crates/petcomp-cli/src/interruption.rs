@@ -14,7 +14,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 
 /// Turns true at the first Ctrl-C (or SIGTERM), so that a long job can stop between two pictures.
 /// What has not ended by itself after [`GRACE_PERIOD`] is ended in the middle, as the second signal
-/// ends it at once: every file is complete or absent, so the same command continues from there.
+/// ends it at once: every file is complete or absent, so that nothing that is done is lost.
 pub(crate) fn interruption() -> &'static AtomicBool {
     static ONCE: Once = Once::new();
     ONCE.call_once(catch_interrupts);
@@ -78,8 +78,7 @@ fn stop_soon() {
     }
     std::thread::spawn(stop_after_grace_period);
     print::aside(format_args!(
-        "stopping after the pictures in hand, in {} s at the latest; the same command goes on; interrupt again to stop at \
-         once",
+        "stopping after the pictures in hand, in {} s at the latest; interrupt again to stop at once",
         GRACE_PERIOD.as_secs()
     ));
 }

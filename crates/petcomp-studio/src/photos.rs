@@ -10,17 +10,29 @@ const OWN_ENDINGS: [&str; 3] = [".overlay", ".front", ".matte"];
 
 /// All photos below a folder, in order of name; no pictures of datasets and no cut-outs.
 pub(crate) fn photos(folder: &Folder) -> Vec<String> {
-    let made = folder.find(|path| path.ends_with("dataset.json") || path.ends_with(MANIFEST));
-    let lists = folder.find(is_list);
-    let of_photos = |made: &&str| lists.iter().any(|list| parent_of(list) == *made);
-    let made = made.iter().map(|name| parent_of(name));
-    // What is opened itself is looked at, and so are photos that cut-outs were put beside.
-    let made: Vec<&str> = made
-        .filter(|made| !made.is_empty() && !of_photos(made))
-        .collect();
+    let (datasets, assets) = (
+        folders_with(folder, "dataset.json"),
+        folders_with(folder, MANIFEST),
+    );
+    let is_cut_out = |photo: &str| {
+        let film = Path::new(photo).with_extension("exr");
+        let below = parent_of(parent_of(photo));
+        assets.iter().any(|made| made == below) && folder.file(&film.to_string_lossy()).is_ok()
+    };
+    let is_of_dataset = |photo: &str| {
+        let mut datasets = datasets.iter();
+        datasets.any(|made| Path::new(photo).starts_with(made))
+    };
     let mut photos = folder.find(|path| may_be_photo(path) && !is_own(path));
-    photos.retain(|photo| !made.iter().any(|made| Path::new(photo).starts_with(made)));
+    photos.retain(|photo| !is_cut_out(photo) && !is_of_dataset(photo));
     photos
+}
+
+/// The folders below one in which a file is; what is opened itself is looked at.
+fn folders_with(folder: &Folder, file: &str) -> Vec<String> {
+    let found = folder.find(|path| path.ends_with(file));
+    let folders = found.iter().map(|name| parent_of(name).to_owned());
+    folders.filter(|folder| !folder.is_empty()).collect()
 }
 
 /// A list of photos of objects.
@@ -79,5 +91,7 @@ mod tests {
         assert_eq!(photos_of(&files), ["backgrounds/tray.jpg"]);
         let beside = ["b/assets.toml", "b/photos.csv", "b/a.png"];
         assert_eq!(photos_of(&beside), ["b/a.png"]);
+        let mixed = ["b/assets.toml", "b/a.png", "b/cup/a.exr", "b/cup/a.png"];
+        assert_eq!(photos_of(&mixed), ["b/a.png"]);
     }
 }
