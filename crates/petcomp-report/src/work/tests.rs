@@ -54,11 +54,10 @@ fn a_scene_reads_the_files_that_it_names_and_no_others() {
         let case = cases.iter().find(|case| case.name == name).unwrap();
         work_of(&world, case).unwrap()[FilesRead]
     };
-    // Manifest, label, photo, and the cut-out, whose header is read first; without a photo no label
-    // either.
-    assert_eq!(read("usual"), 5);
+    // Manifest, label, cut-out, photo; without a photo no label either.
+    assert_eq!(read("usual"), 4);
     assert_eq!((read("plate alone"), read("nothing")), (3, 1));
-    assert_eq!((read("labels"), read("map"), read("dim map")), (4, 6, 5));
+    assert_eq!((read("labels"), read("map"), read("dim map")), (3, 5, 4));
 }
 
 /// What the program writes for a scene: the picture as it is displayed and its scene-linear values.
