@@ -4,6 +4,7 @@ use super::MANIFEST;
 use super::entry::PhotoEntry;
 use super::files;
 use super::folder::{CutOutWriter, is_rejected, lock, read_or_new, refusal, take_out};
+use super::journal::Journal;
 use super::library::Library;
 use super::list::{List, check_not_written_over, check_reviews, find_list};
 use super::manifest::{Manifest, PhotoRecord};
@@ -14,8 +15,6 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
 
 /// Memory that a photo takes for each of its pixels while it is cut out: 130 bytes, measured with
 /// photos of 12 and 24 megapixels.
@@ -109,11 +108,8 @@ fn build_beside(
         journal.write()?;
         return Err(interrupted(&outcomes));
     }
-    let kept = outcomes
-        .iter()
-        .flatten()
-        .count()
-        .saturating_sub(journal.count());
+    let there = outcomes.iter().flatten().count();
+    let kept = there.saturating_sub(journal.count());
     let recorded = record(&list, outcomes, folder);
     let (manifest, mut taken) = recorded.map_err(|e| e.in_file(&path))?;
     if let Some(error) = taken.failed.take() {
@@ -123,10 +119,7 @@ fn build_beside(
         return Err(no_cut_out(&path, &taken.refused));
     }
     let library = Library::from_manifest(folder, manifest)?;
-    Ok(Built {
-        kept,
-        ..Built::new(library, taken, &list)
-    })
+    Ok(Built::new(library, taken, kept, &list))
 }
 
 /// What becomes of a photo after a stop.
@@ -147,13 +140,13 @@ fn no_cut_out(list: &Path, refused: &[String]) -> Error {
 }
 
 impl Built {
-    fn new(library: Library, taken: TakenIn, list: &List) -> Self {
+    fn new(library: Library, taken: TakenIn, kept: usize, list: &List) -> Self {
         let records = taken.records;
         Self {
             unlisted: unlisted(&library, list),
             library,
             photos: records.len(),
-            kept: 0,
+            kept,
             lengths: records.iter().map(length_and_error).collect(),
             refused: taken.refused,
             rejected: taken.rejected,
@@ -219,81 +212,6 @@ fn cut_out_all<'a>(
         outcomes.par_extend(photos.par_iter().map(write));
     }
     (outcomes, journal)
-}
-
-/// From one writing of the manifest to the next.
-const JOURNAL_INTERVAL: Duration = Duration::from_secs(10);
-
-/// Cut-outs that are written, on their way into the manifest.
-struct Journal<'a> {
-    list: &'a List,
-    folder: &'a Path,
-    waiting: Mutex<Waiting<'a>>,
-}
-
-struct Waiting<'a> {
-    /// Cut-outs that were taken in by now.
-    count: usize,
-    since: Instant,
-    cut_outs: Vec<(&'a PhotoEntry, PhotoRecord)>,
-}
-
-impl<'a> Journal<'a> {
-    fn new(list: &'a List, folder: &'a Path) -> Self {
-        let waiting = Mutex::new(Waiting {
-            count: 0,
-            since: Instant::now(),
-            cut_outs: Vec::new(),
-        });
-        Self {
-            list,
-            folder,
-            waiting,
-        }
-    }
-
-    /// Takes a cut-out in where there is one, and writes the manifest from time to time.
-    fn add(&self, entry: &'a PhotoEntry, record: Result<PhotoRecord>) -> Result<PhotoRecord> {
-        let record = record?;
-        let mut waiting = self.waiting();
-        waiting.count += 1;
-        waiting.cut_outs.push((entry, record.clone()));
-        if waiting.since.elapsed() >= JOURNAL_INTERVAL {
-            self.write_waiting(&mut waiting)?;
-        }
-        Ok(record)
-    }
-
-    /// How many cut-outs were taken in.
-    fn count(&self) -> usize {
-        self.waiting().count
-    }
-
-    /// Writes the manifest with all that was taken in.
-    fn write(&self) -> Result<()> {
-        self.write_waiting(&mut self.waiting())
-    }
-
-    fn write_waiting(&self, waiting: &mut Waiting) -> Result<()> {
-        if waiting.cut_outs.is_empty() {
-            return Ok(());
-        }
-        let _alone = lock(self.folder)?;
-        let mut manifest = read_or_new(self.folder)?;
-        self.list.add_classes_to(&mut manifest)?;
-        for (entry, record) in &waiting.cut_outs {
-            manifest.insert(entry.asset_with(record.clone()))?;
-        }
-        manifest.write(self.folder)?;
-        waiting.cut_outs.clear();
-        waiting.since = Instant::now();
-        Ok(())
-    }
-
-    fn waiting(&self) -> MutexGuard<'_, Waiting<'a>> {
-        // Every change is whole, even where a thread panicked afterwards.
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 /// How many of these photos are worked on at once: all, if there is memory for one on each thread.

@@ -24,6 +24,7 @@ mod flow_sheet;
 mod folder;
 mod inpaint;
 mod inputs;
+mod journal;
 mod library;
 mod list;
 mod manifest;

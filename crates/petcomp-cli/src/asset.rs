@@ -430,8 +430,8 @@ impl AddPhotoArgs {
         })
     }
 
-    /// Adds the photos, and counts those that gave a cut-out. Of several, one that cannot be used does not stop the others; an
-    /// option that cannot be right does, since it is that of all.
+    /// Adds the photos, and counts those that gave a cut-out. Of several, one that cannot be used
+    /// does not stop the others; an option that cannot be right does, since it is that of all.
     fn add_each(&self, global: &GlobalArgs) -> petcomp::Result<(usize, FileBatch)> {
         let options = self.quality.cut_out(CutOutOptions::default());
         let entries = self.entries();
