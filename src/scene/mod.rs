@@ -125,7 +125,6 @@ pub use recipe::{GradeRanges, LightRanges, Selections};
 #[doc(hidden)]
 pub use refraction::Refraction;
 pub use resolve::Appearance;
-pub(crate) use resolve::CATCHER_RATIO;
 pub use shot::{Card, Shot};
 #[doc(hidden)]
 pub use stack::DropRanges;

@@ -14,10 +14,6 @@ use crate::scene::{
 };
 use std::sync::Arc;
 
-/// Extent of the plane that shadows fall on, as a multiple of the surface's sides: that of the
-/// reference scenes.
-pub(crate) const CATCHER_RATIO: f64 = 3.0;
-
 /// What an object looks like: all that a shot needs from its asset.
 #[derive(Clone, Debug)]
 pub struct Appearance {
@@ -67,8 +63,7 @@ impl Scene {
     /// `look` finds an object's asset and photo, or nothing; for a library that is
     /// [`Appearance::from_library`]. `plate` is the background at the picture's size, or larger where
     /// the view zooms in; none leaves it transparent. `panorama` is the picture that the scene's environment names. Object `i`
-    /// gets id `i + 1`; the shadow catcher is the plane of the labelled surface,
-    /// `CATCHER_RATIO` times as large.
+    /// gets id `i + 1`; the shadow catcher is the whole plane of the labelled surface.
     ///
     /// # Errors
     /// The first unknown that is left (`objects[3].placement: still falling; settle it first`); an
@@ -96,7 +91,7 @@ impl Scene {
             k1: self.lens.k1,
             thin_lens: self.lens.thin_lens(&camera),
             plate: plate.map(|plate| self.shown_plate(&camera, plate)),
-            catcher: self.surface.size.map(|side| CATCHER_RATIO * side),
+            catcher: [f64::INFINITY; 2],
             cards: self.cards(look)?,
             lights: self.tinted_lights(cast),
             ambient: self.ambient * cast,
@@ -378,7 +373,7 @@ mod tests {
         );
         assert_eq!(
             (shot.exposure, shot.catcher, shot.cards[0].class),
-            (2.0, [0.4, 0.3].map(|side| CATCHER_RATIO * side), Some(3))
+            (2.0, [f64::INFINITY; 2], Some(3))
         );
     }
 

@@ -11,9 +11,13 @@ use crate::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
 use crate::io;
 use crate::pixel::{Film, LinearRgb, Mix, ObjectId, PremulRgba};
-use crate::scene::{AreaLight, CATCHER_RATIO, Card, EnvironmentMap, Shot, ThinLens};
+use crate::scene::{AreaLight, Card, EnvironmentMap, Shot, ThinLens};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
+
+/// Extent of the plane that shadows fall on in a file that does not tell it, as a multiple of the
+/// tray's sides: that of the reference renderer.
+const CATCHER_RATIO: f64 = 3.0;
 
 /// The shot that a scene file of the reference renderer describes, at the file's own size or
 /// another.
