@@ -122,6 +122,7 @@ codes! {
     TwoObjects "matte.two_objects" "The object may be two objects"
     Truncated "matte.truncated" "The object reaches a border of the photo"
     GreyScreen "matte.grey_screen" "The background has no colour to key"
+    ScreenEdgeSeen "matte.screen_edge_seen" "What was cut out looks like the whole screen"
     UnstableOutline "matte.unstable_outline" "Searches at other depths of the pyramid find another outline"
     WeakEdges "matte.weak_edges" "Little of the outline lies on edges"
     ThresholdSensitive "matte.threshold_sensitive" "The bounding box moves at another edge threshold"
@@ -139,6 +140,7 @@ codes! {
     ClippedObject "matte.clipped_object" "A part of the object is overexposed"
     Moved "matte.moved" "The object moved between two photos and was aligned"
     SimilarScreens "matte.similar_screens" "The screens do not differ in a channel"
+    MatteExposureDrift "matte.exposure_drift" "Photos on several screens differ in exposure or colour"
     // Capture.
     MissingFrames "capture.missing_frames" "Some frames of the stripes have no photo"
     ExposureDrift "capture.exposure_drift" "The exposure or colour of a photo differs from the others"
@@ -178,6 +180,7 @@ impl Code {
                 | Self::KeyedAway
                 | Self::TintUncertain
                 | Self::ClippedObject
+                | Self::MatteExposureDrift
         )
     }
 }

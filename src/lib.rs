@@ -114,6 +114,9 @@ pub use error::{Error, Result};
 #[doc(hidden)]
 pub use image::ImageView;
 pub use image::{Image, Mask, Roi};
+#[cfg(feature = "pipeline")]
+#[doc(hidden)]
+pub use lru::share_memory;
 #[doc(hidden)]
 pub use pixel::Mix;
 pub use pixel::{

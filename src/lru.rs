@@ -1,7 +1,20 @@
 //! A cache that keeps what was used last, within a number of bytes.
 
 use std::fmt::Debug;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+
+/// Processes that keep the same in memory, this one among them.
+static PROCESSES: AtomicUsize = AtomicUsize::new(1);
+
+/// Lets every cache of this process keep its share alone, where so many processes keep the same.
+pub fn share_memory(processes: usize) {
+    PROCESSES.store(processes.max(1), Ordering::Relaxed);
+}
+
+fn own_share(bytes: usize) -> usize {
+    bytes / PROCESSES.load(Ordering::Relaxed)
+}
 
 /// A value whose clones share what is large in it.
 pub(crate) trait Shared: Clone {
@@ -69,7 +82,7 @@ impl<V: Shared> LruCache<V> {
             kept: Some(value.clone()),
             weak: value.downgrade(),
         });
-        drop_oldest(&mut entries, self.most_bytes);
+        drop_oldest(&mut entries, own_share(self.most_bytes));
         value
     }
 

@@ -3,7 +3,7 @@
 #![cfg(feature = "pipeline")]
 
 use geo::{Area, BooleanOps, BoundingRect, LineString, Polygon};
-use petcomp::{Image, LinearRgb, asset, io, matte};
+use petcomp::{Code, Image, LinearRgb, asset, io, matte};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -80,4 +80,29 @@ fn the_sample_list_becomes_a_library_of_all_four_classes() {
     // The renderer's b0000_0 is 0.26518 m long; 2 pixels are 1 mm.
     let [length, _] = library.find("b0000").unwrap().photos[0].record.object_m;
     assert!((length - 0.265).abs() < 0.005, "{length}");
+}
+
+/// Samples with a table around their screens, which are 75 % as wide as the photos, and without.
+#[test]
+fn a_screen_whose_edge_is_seen_needs_a_review() {
+    for name in ["b0000_0.png", "b0003_0.png", "b0006_0.png"] {
+        let bottle: Image<LinearRgb> = io::read(samples().join(name)).unwrap();
+        let told = |photo: &Image<LinearRgb>, code: Code| {
+            let cut = matte::cut_out(photo, &matte::CutOutOptions::default()).unwrap();
+            let mut diagnostics = cut.diagnostics.iter();
+            diagnostics.any(|d| d.needs_review() && d.code == code)
+        };
+        let (w, h) = bottle.size();
+        for table in [LinearRgb::new(0.2, 0.12, 0.06), LinearRgb::grey(0.6)] {
+            let whole = Image::from_fn(w * 4 / 3, h + w / 3, |x, y| {
+                match (x.checked_sub(w / 6), y.checked_sub(w / 6)) {
+                    (Some(x), Some(y)) if x < w && y < h => bottle[(x, y)],
+                    _ => table,
+                }
+            });
+            assert!(told(&whole, Code::ScreenEdgeSeen), "{name} {table:?}");
+            assert!(!told(&whole, Code::GreyScreen), "{name} {table:?}");
+        }
+        assert!(!told(&bottle, Code::ScreenEdgeSeen), "{name}");
+    }
 }

@@ -29,8 +29,8 @@ pub struct Built {
     pub photos: usize,
     /// How many of these cut-outs were there before.
     pub kept: usize,
-    /// Lengths of the objects that were cut out, with their standard errors, metres, in the order
-    /// of the list.
+    /// Lengths of the objects that were cut out and lie wholly in their photos, with their standard
+    /// errors, metres, in the order of the list.
     pub lengths: Vec<[f64; 2]>,
     /// Photos that gave no cut-out, and why.
     pub refused: Vec<String>,
@@ -147,7 +147,7 @@ impl Built {
             library,
             photos: records.len(),
             kept,
-            lengths: records.iter().map(length_and_error).collect(),
+            lengths: records.iter().filter_map(length_and_error).collect(),
             refused: taken.refused,
             rejected: taken.rejected,
             needs_review: records
@@ -306,8 +306,9 @@ fn inserted(
     Ok(record)
 }
 
-fn length_and_error(record: &PhotoRecord) -> [f64; 2] {
-    [record.object_m[0], record.error_m]
+/// Nothing of an object of which a part is missing.
+fn length_and_error(record: &PhotoRecord) -> Option<[f64; 2]> {
+    (!record.truncated).then_some([record.object_m[0], record.error_m])
 }
 
 #[cfg(test)]
@@ -406,6 +407,26 @@ mod tests {
         assert!((asset.photos[1].record.object_m[0] - 0.6).abs() <= 0.02);
         assert!((asset.photos[1].record.object_m[1] - 0.3).abs() <= 0.02);
         assert_eq!(asset.photos[1].record.source, "two.png");
+    }
+
+    #[test]
+    fn a_stated_length_of_a_truncated_object_is_not_said_to_be_exact() {
+        let folder = folder_with(TWO);
+        let slab = slab();
+        // Both cut through the slab; the scale of the second is not the object's.
+        let cut = Image::from_fn(75, 80, |x, y| slab[(x, y)]);
+        for name in ["one.png", "two.png"] {
+            io::write(folder.path().join(name), &cut).unwrap();
+        }
+        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        let built = build(&list, &out, &|_, _| ()).unwrap();
+        let [one, two] = &built.library.assets[0].photos[..] else {
+            panic!("two photos")
+        };
+        assert!(one.record.truncated && two.record.truncated);
+        assert_eq!(one.record.error_m, one.record.object_m[0]);
+        assert!(two.record.error_m < 0.1 * two.record.object_m[0]);
+        assert!(built.lengths.is_empty());
     }
 
     #[test]

@@ -281,7 +281,7 @@ fn matte_record(cut: &CutOut, file: String, px_per_metre: f64) -> PhotoRecord {
         unevenness: f64::from(cut.unevenness),
         outline_confidence: cut.segmentation.confidence.value(),
         color_confidence: cut.color_uncertainty.map(ColorUncertainty::confidence),
-        truncated: cut.segmentation.touches.contains(&true),
+        truncated: cut.segmentation.is_truncated(),
         ..PhotoRecord::new(file, px_per_metre, size_m, outline_px)
     }
 }

@@ -13,7 +13,8 @@ pub(super) struct MeasuredSize {
     pub(super) px_per_metre: f64,
     /// Length and width of the tight outline.
     pub(super) object_m: [f64; 2],
-    /// Standard error of the length.
+    /// Standard error of the length; as large as the length where the scale is that of an object of
+    /// which a part is missing.
     pub(super) error_m: f64,
     /// The given size does not fit the outline.
     pub(super) size_mismatch: Option<Diagnostic>,
@@ -37,10 +38,12 @@ impl MeasuredSize {
         let px_per_metre = scale_of_outline(tight, scale, screen.px_per_metre, cut.scale);
         let error_px = outline_error_px(cut, tight);
         let object_m = tight.map(|px| px / px_per_metre);
+        let error_m = libm::hypot(error_px / px_per_metre, screen.sigma * object_m[0]);
+        let is_of_a_part = cut.segmentation.is_truncated() && scale.is_of_object();
         Self {
             px_per_metre,
             object_m,
-            error_m: libm::hypot(error_px / px_per_metre, screen.sigma * object_m[0]),
+            error_m: if is_of_a_part { object_m[0] } else { error_m },
             size_mismatch: size_mismatch(tight, error_px, scale),
         }
     }

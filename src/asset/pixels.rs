@@ -107,17 +107,19 @@ fn flow_checksum(flow: &Flow) -> u32 {
     hasher.finalize()
 }
 
-/// The share of the machine's memory that holds cut-outs of a folder: one in so many bytes.
+/// The share of the machine's memory that holds cut-outs of a folder, and as much again the plates
+/// of its places: one in so many bytes.
 const MEMORY_SHARE: u64 = 4;
-/// Bytes that hold them where the machine's memory is not known.
+/// Bytes that hold either where the machine's memory is not known.
 const DEFAULT_BYTES: u64 = 1 << 30;
 
 /// Memory of a film, its smaller levels and the map of its surface, for each of its pixels.
 pub(super) const BYTES_PER_PIXEL: f64 =
     4.0 / 3.0 * (size_of::<Film>() + size_of::<SurfaceTexel>()) as f64;
 
-/// Memory that holds cut-outs of a folder, beside those that pictures in the making show.
-pub(super) fn most_bytes() -> usize {
+/// Memory that holds cut-outs of a folder, or plates of its places, beside those that pictures in
+/// the making show.
+pub(crate) fn most_bytes() -> usize {
     let share = io::machine_bytes().map_or(DEFAULT_BYTES, |bytes| bytes / MEMORY_SHARE);
     usize::try_from(share).unwrap_or(usize::MAX)
 }

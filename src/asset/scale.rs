@@ -63,6 +63,11 @@ impl Scale {
         Err(Error::Photo { what })
     }
 
+    /// A size of the object itself gives it: wrong where a part of that is missing.
+    pub(super) fn is_of_object(self) -> bool {
+        matches!(self, Self::Length(_) | Self::Size(_))
+    }
+
     /// The field of an entry that gives it and its value, where that is something else than the
     /// object.
     fn measured_field(self) -> Option<(&'static str, String)> {

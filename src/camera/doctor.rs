@@ -110,19 +110,20 @@ fn principal_text(solution: &Solution) -> String {
     )
 }
 
-/// How much better the focal length would be known if the picture were whole; empty where the
-/// corners do not allow that.
+/// How much better the focal length would be known if the picture were whole; empty where it would
+/// not, or the corners do not allow that.
 fn whole_picture_gain(label: &Label, solution: &Solution, options: &SolveOptions) -> String {
     let mut whole = label.clone();
     whole.image.cropped = Some(false);
     let fitting = solve(&whole, options).and_then(Solution::fitting);
-    fitting.map_or(String::new(), |whole| {
-        format!(
-            " and the focal length known to {:.1} % instead of {:.1} %",
-            100.0 * whole.sigma.ln_focal,
-            100.0 * solution.sigma.ln_focal
-        )
-    })
+    let Ok(whole) = fitting else {
+        return String::new();
+    };
+    let [better, known] = [&whole, solution].map(|s| format!("{:.1} %", 100.0 * s.sigma.ln_focal));
+    if better == known {
+        return String::new();
+    }
+    format!(" and the focal length known to {better} instead of {known}")
 }
 
 fn surface_line(solution: &Solution) -> String {
@@ -211,6 +212,15 @@ mod tests {
         );
         assert!(say(Some(false)).contains("the picture is whole"));
         assert!(say(Some(true)).contains("a part of a larger one"));
+    }
+
+    #[test]
+    fn a_gain_that_rounding_hides_is_none() {
+        let mut label = Scenario::realistic().tilted(30.0).view(1, 0).label;
+        label.image.cropped = Some(false);
+        let options = SolveOptions::default();
+        let whole = solve(&label, &options).unwrap();
+        assert_eq!(whole_picture_gain(&label, &whole, &options), "");
     }
 
     #[test]

@@ -11,6 +11,8 @@ use nalgebra::{Matrix2, Matrix3};
 const MAX_STEPS: usize = 60;
 /// Relative change of the radius that counts as none.
 const CONVERGED: f64 = 1e-15;
+/// Change of a radius, as a share of it, at the fold of a barrel.
+const SHARE_AT_FOLD: f64 = -1.0 / 3.0;
 /// The part of a barrel's radius up to its fold that a picture may use: three fifths of the
 /// resolution are left there at the corners.
 const USED_PART_OF_FOLD: f64 = 0.77;
@@ -44,10 +46,12 @@ impl RadialDistortion {
         self.k1 == 0.0
     }
 
-    /// Where the picture shows what a pinhole camera sees at a position.
+    /// Where the picture shows what a pinhole camera sees at a position. Beyond where the lens
+    /// folds the picture over, which it does not show, farther out at the fold's scale.
     pub fn distort(&self, px: Point2<f64>) -> Point2<f64> {
         let x = self.in_focal_lengths(px);
-        self.in_pixels(x * (1.0 + self.k1 * x.norm_squared()))
+        let share = (self.k1 * x.norm_squared()).max(SHARE_AT_FOLD);
+        self.in_pixels(x * (1.0 + share))
     }
 
     /// Where a pinhole camera sees what the picture shows at a position. Beyond where the lens
@@ -361,6 +365,13 @@ pub(crate) mod tests {
             let least = seen.iter().fold(f64::MAX, |m, p| m.min(p.x));
             assert!((least - low.x).abs() < 0.1, "{k1}: {least} {low}");
         }
+    }
+
+    #[test]
+    fn what_a_barrel_cannot_show_is_farther_out_than_what_it_shows() {
+        let lens = RadialDistortion::new(&camera(), -0.3);
+        let along = (0..400).map(|i| lens.distort(Point2::new(77.0 + f64::from(i), 64.0)).x);
+        assert!(along.is_sorted_by(|a, b| a < b));
     }
 
     #[test]

@@ -15,8 +15,9 @@ pub(crate) const LABEL_SUFFIX: &str = ".label.json";
 const OWN_FORMAT: &str = "plane-label";
 /// How camera files are named.
 const CAMERA_SUFFIX: &str = ".camera.json";
-/// Relative noise of a focal length that was recorded together with a digital zoom.
-const ZOOMED_FOCAL_SIGMA: f64 = 0.25;
+/// Relative noise of a focal length that was recorded together with a digital zoom, or is reckoned
+/// from the resolution of a sensor: of a picture of half the size it is twice as long.
+const ROUGH_FOCAL_SIGMA: f64 = 0.25;
 
 /// A label, and where it and its camera lie.
 #[derive(Clone, Debug, PartialEq)]
@@ -421,8 +422,9 @@ pub(crate) fn apply_exif(label: &mut Label, header: &io::Header) {
     }
     if label.camera.focal_px.is_none() && label.camera.focal_35mm.is_none() {
         label.camera.focal_35mm = equivalent_mm(header);
-        if header.digital_zoom && label.camera.focal_35mm.is_some() {
-            label.camera.focal_sigma.get_or_insert(ZOOMED_FOCAL_SIGMA);
+        let is_rough = header.digital_zoom || header.focal_by_sensor;
+        if is_rough && label.camera.focal_35mm.is_some() {
+            label.camera.focal_sigma.get_or_insert(ROUGH_FOCAL_SIGMA);
         }
     }
 }
@@ -522,16 +524,22 @@ pub(super) mod tests {
 
     /// A label of a photo of 90 x 60 pixels with EXIF data: a 35 mm equivalent of 28 mm, a digital
     /// zoom, and the size it was taken in.
-    fn label_of_photo(zoom: [u32; 2], taken: [u32; 2]) -> Label {
-        let folder = tempfile::tempdir().unwrap();
-        let [num, denom] = zoom;
-        let zoom = Value::Rational(vec![Rational { num, denom }]);
-        let notes = [
+    fn label_of_photo(zoom: [u32; 2], [width, height]: [u32; 2]) -> Label {
+        label_by_notes([
             equivalent(28),
-            (Tag::DigitalZoomRatio, zoom),
-            (Tag::PixelXDimension, Value::Long(vec![taken[0]])),
-            (Tag::PixelYDimension, Value::Long(vec![taken[1]])),
-        ];
+            (Tag::DigitalZoomRatio, rational(zoom)),
+            (Tag::PixelXDimension, Value::Long(vec![width])),
+            (Tag::PixelYDimension, Value::Long(vec![height])),
+        ])
+    }
+
+    fn rational([num, denom]: [u32; 2]) -> Value {
+        Value::Rational(vec![Rational { num, denom }])
+    }
+
+    /// A label of a photo of 90 x 60 pixels with these EXIF data.
+    fn label_by_notes(notes: impl IntoIterator<Item = (Tag, Value)>) -> Label {
+        let folder = tempfile::tempdir().unwrap();
         write_photo(&folder.path().join("a.jpg"), notes);
         let mut label = Label::new([90, 60], [[0.0; 2]; 4], [0.6, 0.4]);
         label.image.file = "a.jpg".into();
@@ -628,6 +636,22 @@ pub(super) mod tests {
             (label.camera.focal_35mm, label.camera.focal_sigma),
             (Some(28.0), Some(0.25))
         );
+    }
+
+    /// 180 pixels on 22.5 mm of a sensor, in a picture that was halved and states its new size.
+    #[test]
+    fn a_focal_length_by_the_sensor_s_resolution_is_within_its_errors_when_it_was_halved() {
+        let label = label_by_notes([
+            (Tag::FocalLength, rational([20, 1])),
+            (Tag::FocalPlaneXResolution, rational([80, 1])),
+            (Tag::FocalPlaneResolutionUnit, Value::Short(vec![3])),
+            (Tag::PixelXDimension, Value::Long(vec![90])),
+            (Tag::PixelYDimension, Value::Long(vec![60])),
+        ]);
+        let stated = label.camera.focal_35mm.unwrap();
+        let truth = 20.0 * 36f64.hypot(24.0) / 22.5_f64.hypot(15.0);
+        let sigmas = libm::log(stated / truth) / label.camera.focal_sigma.unwrap();
+        assert!(sigmas > 1.0 && sigmas < 3.0, "{stated} mm, {truth} mm");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use crate::color::{from_srgb8, to_srgb8};
 use crate::filter;
 use crate::geom::{Homography, Point2};
 use crate::image::Image;
-use crate::io::through_jpeg;
+use crate::io::{Chroma, through_jpeg};
 use crate::pixel::{LinearRgb, Mix};
 
 const DISPLAY: Display = Display {
@@ -120,7 +120,7 @@ fn photo(frame: Frame, conditions: Conditions) -> Image<LinearRgb> {
         )
     });
     if conditions.is_jpeg {
-        from_srgb8(&through_jpeg(&to_srgb8(&seen), 92).unwrap())
+        from_srgb8(&through_jpeg(&to_srgb8(&seen), 92, Chroma::Full).unwrap())
     } else {
         seen
     }

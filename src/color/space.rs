@@ -31,6 +31,11 @@ impl RgbSpace {
         primaries: [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060]],
         white: [0.3127, 0.3290],
     };
+    /// Adobe RGB (1998) primaries and D65 (4.3.1).
+    pub const ADOBE_RGB: Self = Self {
+        primaries: [[0.64, 0.33], [0.21, 0.71], [0.15, 0.06]],
+        white: [0.3127, 0.3290],
+    };
     /// ACEScg: AP1 primaries and the ACES white, which is near D60 but not it (S-2014-004).
     pub const ACESCG: Self = Self {
         primaries: [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044]],
@@ -142,10 +147,11 @@ mod tests {
     use super::*;
     use crate::pixel::LinearRgb;
 
-    const SPACES: [RgbSpace; 4] = [
+    const SPACES: [RgbSpace; 5] = [
         RgbSpace::REC709,
         RgbSpace::REC2020,
         RgbSpace::DISPLAY_P3,
+        RgbSpace::ADOBE_RGB,
         RgbSpace::ACESCG,
     ];
 

@@ -1,19 +1,22 @@
 //! Labelled photos of the place that scenes are set in.
 
+use crate::asset;
 use crate::camera::{self, Camera, LabelledPhoto, PhotoCamera};
 use crate::dataset::paths::folder_of;
+use crate::dataset::photo_memory::PhotoMemory;
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::{Point2, Point3, Vector2};
 use crate::image::{Image, Roi};
 use crate::io::{self, Format, FromFile};
 use crate::light::{MeasuredPlate, PlateMeasures};
+use crate::lru::LruCache;
 use crate::pixel::{Coverage, LinearRgb, Mix};
 use crate::scene::{Background, CameraSource, Wall};
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// A part of a photo so small is worth a warning where only that fits into the pictures' shape.
 const SMALL_SHOWN_SHARE: f64 = 0.75;
@@ -21,7 +24,8 @@ const SMALL_SHOWN_SHARE: f64 = 0.75;
 /// any more.
 const CUT_OFF_SHARE: f64 = 0.02;
 
-/// A labelled photo: its camera is found once, its pixels are read when a picture first needs them.
+/// A labelled photo: its camera is found once, its pixels are read when a picture needs them and
+/// memory no longer has them.
 #[derive(Debug)]
 pub(crate) struct BackgroundPhoto {
     /// What a recipe sees of it.
@@ -36,11 +40,13 @@ pub(crate) struct BackgroundPhoto {
     pub(crate) notes: Vec<String>,
     taken: [u32; 2],
     image: [u32; 2],
-    /// The photo at the picture's size, and at larger ones for views that zoom in.
-    plates: Vec<Plate>,
+    /// What was measured of the photo at the picture's size, and at larger ones for views that zoom
+    /// in.
+    measures: Vec<PlateMeasures>,
     /// The mask of what hides objects, beside the photo.
     pub(crate) front: Option<PathBuf>,
-    front_mask: OnceLock<Arc<Image<Coverage>>>,
+    /// That of all places.
+    memory: Arc<PhotoMemory>,
 }
 
 /// Zoom from one size of a plate to the next: so much larger or smaller than it is seen a plate
@@ -50,13 +56,6 @@ const ZOOM_STEP: f64 = 1.25;
 const EPSILON: f64 = 1e-9;
 
 /// A photo at one size, and what was measured of it.
-#[derive(Debug, Default)]
-struct Plate {
-    image: OnceLock<Arc<Image<LinearRgb>>>,
-    measures: PlateMeasures,
-}
-
-/// A plate that was read.
 #[derive(Clone, Debug)]
 pub(crate) struct ReadPlate<'a> {
     pub(crate) image: Arc<Image<LinearRgb>>,
@@ -90,23 +89,29 @@ impl BackgroundPhoto {
         }
         let sightings = camera::photo_cameras(&labels, options.force)?;
         warn_of_cameras(&labels, &sightings);
+        let memory = Arc::new(PhotoMemory::of_bytes(asset::most_bytes()));
         let opened = labels
             .iter()
             .zip(&sightings)
-            .map(|(label, seen)| Self::open(label, seen, options.image));
+            .map(|(label, seen)| Self::open(label, seen, options.image, &memory));
         let places = opened.collect::<Result<Vec<_>>>()?;
         warn_of_shapes(&places);
         warn_of_unlabelled(folder, &places);
         Ok(places)
     }
 
-    fn open(labelled: &LabelledPhoto, seen: &PhotoCamera, image: [u32; 2]) -> Result<Self> {
+    fn open(
+        labelled: &LabelledPhoto,
+        seen: &PhotoCamera,
+        image: [u32; 2],
+        memory: &Arc<PhotoMemory>,
+    ) -> Result<Self> {
         let photo = photo_path(labelled)?;
         let shown = cropped(seen.camera, middle_part(labelled.label.image_size(), image));
         camera::check_distance(&seen.camera)
             .and_then(|()| camera::check_lens(&shown, seen.k1))
             .map_err(|e| e.in_file(&labelled.source))?;
-        let mut background = Self::cropped_to(image, labelled, seen, photo);
+        let mut background = Self::cropped_to(image, labelled, seen, photo, memory);
         background.notes.extend(background.shape_note());
         Ok(background)
     }
@@ -117,6 +122,7 @@ impl BackgroundPhoto {
         labelled: &LabelledPhoto,
         seen: &PhotoCamera,
         photo: PathBuf,
+        memory: &Arc<PhotoMemory>,
     ) -> Self {
         let taken = labelled.label.image_size();
         let kept = middle_part(taken, image);
@@ -136,9 +142,9 @@ impl BackgroundPhoto {
             taken,
             kept,
             image,
-            plates: empty_plates(kept, image),
+            measures: no_measures(kept, image),
             front: front_beside(&photo),
-            front_mask: OnceLock::new(),
+            memory: memory.clone(),
             photo,
         }
     }
@@ -215,28 +221,49 @@ impl BackgroundPhoto {
         corners.map(|[x, y]| Point3::new(x, y, 0.0))
     }
 
-    /// The photo at the picture's size, scene-linear; read once.
+    /// The photo at the picture's size, scene-linear.
     pub(crate) fn plate(&self) -> Result<ReadPlate<'_>> {
         self.plate_at_level(0)
     }
 
-    /// The photo as large as a view that zooms in needs it, if it has so many pixels; read once for
-    /// each step of the zoom.
+    /// The photo as large as a view that zooms in needs it, if it has so many pixels.
     pub(crate) fn plate_for_zoom(&self, zoom: f64) -> Result<ReadPlate<'_>> {
+        self.plate_at_level(self.level_for_zoom(zoom))
+    }
+
+    /// What of the place hides objects, as large as the plate for the same zoom, where a mask says
+    /// so.
+    pub(crate) fn front_mask(&self, zoom: f64) -> Result<Option<Arc<Image<Coverage>>>> {
+        let level = self.level_for_zoom(zoom);
+        let read = |path: &PathBuf| self.at_level(path, level, &self.memory.masks);
+        self.front.as_ref().map(read).transpose()
+    }
+
+    fn level_for_zoom(&self, zoom: f64) -> usize {
         let level = (zoom.ln() / ZOOM_STEP.ln() - EPSILON).ceil().max(0.0) as usize;
-        self.plate_at_level(level.min(self.plates.len() - 1))
+        level.min(self.measures.len() - 1)
     }
 
     fn plate_at_level(&self, level: usize) -> Result<ReadPlate<'_>> {
-        let Plate { image, measures } = &self.plates[level];
-        let image = match image.get() {
-            Some(image) => image.clone(),
-            None => {
-                let read = Arc::new(self.shown_part(&self.photo, self.size_at_level(level))?);
-                image.get_or_init(|| read).clone()
-            }
-        };
-        Ok(ReadPlate { image, measures })
+        Ok(ReadPlate {
+            image: self.at_level(&self.photo, level, &self.memory.plates)?,
+            measures: &self.measures[level],
+        })
+    }
+
+    /// The part that is seen of a picture of the photo's size, from memory where that has it.
+    fn at_level<P: FromFile + Mix>(
+        &self,
+        path: &Path,
+        level: usize,
+        memory: &LruCache<Arc<Image<P>>>,
+    ) -> Result<Arc<Image<P>>> {
+        let name = format!("{level} {}", self.background.name);
+        if let Some(known) = memory.get(&name) {
+            return Ok(known);
+        }
+        let read = self.shown_part(path, self.size_at_level(level))?;
+        Ok(memory.insert(&name, Arc::new(read)))
     }
 
     /// The picture's size times the zoom, up to that of the photo.
@@ -247,21 +274,8 @@ impl BackgroundPhoto {
             .map(|side| (f64::from(side) * scale).round() as usize)
     }
 
-    /// What of the place hides objects, at the picture's size, where a mask says so; read once.
-    pub(crate) fn front_mask(&self) -> Result<Option<Arc<Image<Coverage>>>> {
-        let Some(path) = &self.front else {
-            return Ok(None);
-        };
-        if let Some(mask) = self.front_mask.get() {
-            return Ok(Some(mask.clone()));
-        }
-        let size = self.image.map(|side| side as usize);
-        let mask = Arc::new(self.shown_part::<Coverage>(path, size)?);
-        Ok(Some(self.front_mask.get_or_init(|| mask).clone()))
-    }
-
     /// The part that is seen of a picture of the photo's size, at another size.
-    fn shown_part<P: FromFile + Mix + Send + Sync>(
+    fn shown_part<P: FromFile + Mix>(
         &self,
         path: &Path,
         [width, height]: [usize; 2],
@@ -387,11 +401,11 @@ fn detail_of(kept: Roi, image: [u32; 2]) -> f64 {
     kept.width as f64 / f64::from(image[0])
 }
 
-/// Room for plates of every size up to the photo's.
-fn empty_plates(kept: Roi, image: [u32; 2]) -> Vec<Plate> {
+/// Room for what is measured of plates of every size up to the photo's.
+fn no_measures(kept: Roi, image: [u32; 2]) -> Vec<PlateMeasures> {
     let steps = detail_of(kept, image).ln() / ZOOM_STEP.ln();
     let larger = steps.ceil().max(0.0) as usize;
-    (0..=larger).map(|_| Plate::default()).collect()
+    (0..=larger).map(|_| PlateMeasures::default()).collect()
 }
 
 /// The mask beside a photo of what hides objects, `NAME.front.png`, where there is one.
@@ -454,6 +468,92 @@ fn area([w, h]: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::tilted_camera;
+    use std::sync::Weak;
+
+    const TAKEN: [usize; 2] = [16, 12];
+
+    /// A photo four times as large as the pictures, in shades of its own.
+    fn place(folder: &Path, name: &str, memory: &Arc<PhotoMemory>) -> BackgroundPhoto {
+        let ([width, height], image) = (TAKEN, [4, 3]);
+        let shade = |x: usize, y: usize| LinearRgb::grey((name.len() * (x + width * y)) as f32);
+        let photo = folder.join(name).with_extension("exr");
+        io::write(&photo, &Image::from_fn(width, height, shade)).unwrap();
+        let kept = middle_part(TAKEN.map(|side| side as u32), image);
+        BackgroundPhoto {
+            background: Background {
+                name: name.into(),
+                size: [0.4, 0.3],
+                camera: CameraSource::Known(tilted_camera()),
+                k1: 0.0,
+                shown_share: 1.0,
+                albedo: None,
+                wall: None,
+            },
+            label: folder.join(name).with_extension("label.json"),
+            kept,
+            notes: Vec::new(),
+            taken: TAKEN.map(|side| side as u32),
+            image,
+            measures: no_measures(kept, image),
+            front: front_beside(&photo),
+            memory: memory.clone(),
+            photo,
+        }
+    }
+
+    /// The plates of places, each at three sizes.
+    fn plates(places: &[BackgroundPhoto]) -> impl Iterator<Item = Arc<Image<LinearRgb>>> {
+        let sizes = |place: &BackgroundPhoto| [1.0, 2.0, 4.0].map(|zoom| plate(place, zoom));
+        places.iter().flat_map(sizes)
+    }
+
+    fn plate(place: &BackgroundPhoto, zoom: f64) -> Arc<Image<LinearRgb>> {
+        place.plate_for_zoom(zoom).unwrap().image
+    }
+
+    #[test]
+    fn plates_stay_within_their_memory_and_are_read_again_the_same() {
+        let folder = tempfile::tempdir().unwrap();
+        let pixels = TAKEN[0] * TAKEN[1];
+        let most_bytes = pixels * size_of::<LinearRgb>();
+        let masks_bytes = pixels * size_of::<Coverage>();
+        let memory = Arc::new(PhotoMemory::of_bytes(most_bytes + masks_bytes));
+        let places = ["a", "bb", "ccc"].map(|name| place(folder.path(), name, &memory));
+        let first: Vec<_> = plates(&places).map(|plate| (*plate).clone()).collect();
+        let known: Vec<_> = plates(&places)
+            .map(|plate| Arc::downgrade(&plate))
+            .collect();
+        let kept = known.iter().filter_map(Weak::upgrade);
+        let bytes: usize = kept.map(|plate| size_of_val(plate.pixels())).sum();
+        assert!((1..=most_bytes).contains(&bytes), "{bytes}");
+        assert!(plates(&places).map(|plate| (*plate).clone()).eq(first));
+    }
+
+    #[test]
+    fn plates_that_fit_are_read_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let memory = Arc::new(PhotoMemory::of_bytes(1 << 20));
+        let places = ["a", "bb"].map(|name| place(folder.path(), name, &memory));
+        let first: Vec<_> = plates(&places)
+            .map(|plate| Arc::downgrade(&plate))
+            .collect();
+        assert!(first.iter().all(|plate| plate.upgrade().is_some()));
+    }
+
+    #[test]
+    fn a_mask_is_as_large_as_the_plate() {
+        let folder = tempfile::tempdir().unwrap();
+        let mask = Image::from_fn(TAKEN[0], TAKEN[1], |x, _| Coverage(f32::from(x < 5)));
+        io::write(folder.path().join("a.front.png"), &mask).unwrap();
+        let memory = Arc::new(PhotoMemory::of_bytes(1 << 20));
+        let place = place(folder.path(), "a", &memory);
+        let front = |zoom| place.front_mask(zoom).unwrap().unwrap();
+        for zoom in [1.0, 1.5, 4.0] {
+            assert_eq!(front(zoom).size(), plate(&place, zoom).size());
+        }
+        assert_eq!(*front(4.0), mask);
+    }
 
     #[test]
     fn photos_without_a_label_are_named() {

@@ -73,13 +73,15 @@ impl Falls {
     }
 }
 
-/// All of a scene that decides how it falls.
+/// All of a scene that decides how it falls, and the process in which: a fork has none of the threads
+/// that made its parent's falls, and would wait for them for ever.
 fn what_falls(scene: &Scene, options: &SettleOptions) -> String {
     let mut scene = scene.clone().unlit();
     for object in &mut scene.objects {
         object.grade = Grade::default();
     }
-    let falling = (scene.camera, scene.surface, scene.objects, options);
+    let (process, surface) = (std::process::id(), scene.surface);
+    let falling = (process, scene.camera, surface, scene.objects, options);
     serde_json::to_string(&falling).expect("numbers and names are JSON")
 }
 

@@ -162,6 +162,15 @@ impl LabelConfig {
         (self.distinct_formats() == [Format::WebDataset]).then_some(self.webdataset)
     }
 
+    /// How much of an object labels in memory tell: as much as YOLO's where that is written, else as
+    /// those of the first layout with boxes.
+    pub fn extent(&self) -> Extent {
+        // YOLO is the first of all.
+        let writers = self.writers(&Pictures::default());
+        let extent = writers.iter().find_map(|writer| writer.extent());
+        extent.unwrap_or_default()
+    }
+
     fn distinct_formats(&self) -> Vec<Format> {
         let mut formats = self.formats.clone();
         formats.sort();
@@ -286,6 +295,19 @@ mod tests {
             .flat_map(|s| s.as_object().unwrap().keys().cloned())
             .collect();
         assert_eq!(keys, ["yolo", "coco", "webdataset"]);
+    }
+
+    #[test]
+    fn labels_in_memory_are_those_that_are_written() {
+        let extent = |recipe: &str| toml::from_str::<LabelConfig>(recipe).unwrap().extent();
+        let coco = "coco = { boxes = 'visible' }\n";
+        let formats = |formats: &str| extent(&format!("{coco}formats = {formats}"));
+        assert_eq!(formats("['coco']"), Extent::Visible);
+        assert_eq!(formats("['layers', 'coco', 'webdataset']"), Extent::Visible);
+        assert_eq!(formats("['coco', 'yolo']"), Extent::Amodal);
+        assert_eq!(formats("['mot', 'voc']"), Extent::Amodal);
+        assert_eq!(formats("[]"), Extent::Amodal);
+        assert_eq!(extent("yolo = { boxes = 'visible' }"), Extent::Visible);
     }
 
     #[test]

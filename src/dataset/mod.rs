@@ -52,6 +52,7 @@ mod obstructed;
 pub mod page;
 mod partition;
 mod paths;
+mod photo_memory;
 mod pictures;
 mod pipeline;
 mod preset;

@@ -139,7 +139,8 @@ impl Labelling {
     }
 }
 
-/// What the boxes of a dataset are around: those of YOLO, else of its first format with boxes.
+/// What the boxes of a dataset are around, as `LabelConfig::extent` says of a recipe: those of YOLO,
+/// else of its first format with boxes.
 fn extent_of(identity: &Value) -> Extent {
     let writers = identity["writers"].as_array().into_iter().flatten();
     let formats = writers.filter_map(Value::as_object).flatten();

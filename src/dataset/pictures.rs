@@ -1,10 +1,13 @@
 //! The images of a dataset.
 
 use crate::bounds::Bounds;
+use crate::color;
 use crate::dataset::paths::create_part_folders;
 use crate::dataset::{Entry, Writer};
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::image::Image;
 use crate::io::{self, Chroma, WriteOptions};
+use crate::pixel::{PremulRgba, Srgb8};
 use crate::scene::{Draws, Range};
 use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
@@ -67,12 +70,29 @@ impl PictureFormat {
 }
 
 impl Pictures {
-    fn write_options(&self, entry: &Entry<'_>) -> WriteOptions {
+    fn write_options(&self, seed: u64, k: u64) -> WriteOptions {
         WriteOptions {
-            jpeg_quality: self.quality(entry.seed, entry.k),
-            jpeg_chroma: self.chroma(entry.seed, entry.k),
+            jpeg_quality: self.quality(seed, k),
+            jpeg_chroma: self.chroma(seed, k),
             ..WriteOptions::default()
         }
+    }
+
+    /// Picture `k` of a dataset as its file is read: 8-bit sRGB, on black where nothing lies behind
+    /// the objects, with what a JPEG of its quality and chroma has lost.
+    ///
+    /// # Errors
+    /// [`Error::Value`] for a picture that no JPEG holds, as one without pixels.
+    pub fn shown(&self, frame: &Image<PremulRgba>, seed: u64, k: u64) -> Result<Image<Srgb8>> {
+        let codes = color::to_srgb8(&frame.map(|p| p.color()));
+        if self.format == PictureFormat::Png {
+            return Ok(codes);
+        }
+        let lossy = io::through_jpeg(&codes, self.quality(seed, k), self.chroma(seed, k));
+        lossy.ok_or_else(|| {
+            let (w, h) = codes.size();
+            Error::value("picture", format!("{w} x {h} pixels, which no JPEG holds"))
+        })
     }
 
     /// For a picture outside of a dataset: the middle quality, and the first of several choices of
@@ -135,7 +155,8 @@ impl Pictures {
         let path = entry.path("images", self.format.extension());
         let mut watch = Stopwatch::start();
         let displayed = entry.sample.frame.map(|p| p.color());
-        io::write_with(folder.join(&path), &displayed, &self.write_options(entry))?;
+        let options = self.write_options(entry.seed, entry.k);
+        io::write_with(folder.join(&path), &displayed, &options)?;
         watch.lap("encode");
         watch.log(path.display());
         Ok(path)
@@ -151,6 +172,8 @@ fn write_exr(folder: &Path, entry: &Entry<'_>) -> Result<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::color::to_srgb8;
+    use crate::pixel::LinearRgb;
     use std::collections::BTreeSet;
 
     #[test]
@@ -195,6 +218,31 @@ mod tests {
         };
         assert_eq!(options(&mixed), (85, Chroma::Quarter));
         assert_eq!(options(&Pictures::default()), (95, Chroma::Full));
+    }
+
+    #[test]
+    fn a_picture_is_shown_as_its_file_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.jpg");
+        let frame = Image::from_fn(20, 12, |x, y| {
+            let red = if (x + y) % 3 == 0 { 0.8 } else { 0.1 };
+            PremulRgba::new(red, x as f32 / 20.0, 0.2, 1.0)
+        });
+        let displayed: Image<LinearRgb> = frame.map(|p| p.color());
+        let jpg = Pictures {
+            format: PictureFormat::Jpg,
+            jpeg_quality: Range::new(20.0, 60.0),
+            jpeg_chroma: vec![Chroma::Quarter, Chroma::Full],
+            ..Pictures::default()
+        };
+        for k in 0..4 {
+            io::write_with(&path, &displayed, &jpg.write_options(3, k)).unwrap();
+            let read: Image<LinearRgb> = io::read(&path).unwrap();
+            assert_eq!(jpg.shown(&frame, 3, k).unwrap(), to_srgb8(&read));
+        }
+        let png = Pictures::default().shown(&frame, 3, 0).unwrap();
+        assert_eq!(png, to_srgb8(&displayed));
+        assert_ne!(png, jpg.shown(&frame, 3, 0).unwrap());
     }
 
     #[test]

@@ -485,7 +485,7 @@ impl Pipeline {
     /// takes the place of what the walls hide.
     fn behind_front(&self, plate: &str, scene: &Scene, shot: Shot) -> Result<Shot> {
         let place = self.place(plate);
-        let mask = place.map_or(Ok(None), BackgroundPhoto::front_mask)?;
+        let mask = place.map_or(Ok(None), |place| place.front_mask(scene.zoom_used()))?;
         Ok(match (mask, scene.camera) {
             (Some(mask), CameraSource::Known(camera)) => Shot {
                 holdout: Some(Arc::new(scene.holdout_of_mask(&camera, &mask))),

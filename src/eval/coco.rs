@@ -2,7 +2,7 @@
 
 use super::average::{mean_of_samples, recall_and_precision};
 use super::by_class::{ByClass, ImageBoxes};
-use super::overlap::{BoxIndex, area, intersection, share};
+use super::overlap::{BoxIndex, intersection, share};
 use super::rank::{Hit, Marks, Ranking};
 use super::{
     ClassScores, Definition, Detection, EvalImage, GroundTruth, Scores, THRESHOLDS, check_weights,
@@ -273,7 +273,7 @@ fn marks(
                     right |= bit
                 }
             }
-            None if !range.holds(area(&found.bbox)) => ignored |= bit,
+            None if !range.holds(found.box_area) => ignored |= bit,
             None => {}
         }
     }
@@ -314,8 +314,8 @@ fn overlap(found: &Detection, truth: &GroundTruth) -> f64 {
 /// What the shared area is measured against: in a crowd the detection alone.
 fn whole_area(found: &Detection, truth: &GroundTruth, shared: f64) -> f64 {
     match truth.crowd {
-        true => area(&found.bbox),
-        false => area(&found.bbox) + area(&truth.bbox) - shared,
+        true => found.box_area,
+        false => found.box_area + truth.box_area - shared,
     }
 }
 

@@ -321,6 +321,10 @@ fn corners([x, y, w, h]: [f64; 4]) -> Result<BBox> {
     Err(impossible_box([x, y, w, h]))
 }
 
+fn area_of([_, _, w, h]: [f64; 4]) -> f64 {
+    w * h
+}
+
 fn is_near(b: &BBox) -> bool {
     let sides = [b.x0, b.y0, b.x1, b.y1];
     sides.iter().all(|v| v.abs() <= FARTHEST_PX)
@@ -335,17 +339,14 @@ fn impossible_box(bbox: [f64; 4]) -> Error {
 
 impl CocoAnnotation {
     fn to_truth(&self, class: u32) -> Result<GroundTruth> {
+        let box_area = area_of(self.bbox);
         Ok(GroundTruth {
             class,
             bbox: corners(self.bbox)?,
-            area: self.mask_or_box_area(),
+            box_area,
+            area: self.area.unwrap_or(box_area),
             crowd: self.iscrowd != 0,
         })
-    }
-
-    fn mask_or_box_area(&self) -> f64 {
-        let [_, _, width, height] = self.bbox;
-        self.area.unwrap_or(width * height)
     }
 }
 
@@ -354,6 +355,7 @@ impl CocoDetection {
         Ok(Detection {
             class,
             bbox: corners(self.bbox)?,
+            box_area: area_of(self.bbox),
             confidence: self.score,
         })
     }
@@ -452,6 +454,22 @@ mod tests {
             truth("\"iscrowd\": 1", "\"iscrowd\": 256")
                 .contains("expected an integer from 0 to 255")
         );
+    }
+
+    #[test]
+    fn boxes_are_as_large_as_their_sides_are_told() {
+        let text = TRUTH.replace("[0, 0, 2, 2]", "[293.09, 189.23, 80, 80]");
+        let mut truth = CocoTruth::new(&io::parse_json(&text).unwrap()).unwrap();
+        // By their corners, one is a hair too small for the medium range, the other a hair less than
+        // half of the truth.
+        let found = r#"[{"image_id": 3, "category_id": 10, "bbox": [0.3, 0.3, 32, 32], "score": 0.9},
+            {"image_id": 3, "category_id": 10, "bbox": [293.09, 189.23, 80, 40], "score": 0.5}]"#;
+        let found: Vec<CocoDetection> = io::parse_json(found).unwrap();
+        truth.add(&found).unwrap();
+        let scores = crate::eval::coco(&truth.sheets, &[]);
+        // As of pycocotools: found at the first of ten thresholds, behind one false alarm.
+        assert!((scores.scores.classes[0].ap[0] - 0.5).abs() < 1e-12);
+        assert!((scores.ap_by_area[1].unwrap() - 0.05).abs() < 1e-12);
     }
 
     #[test]

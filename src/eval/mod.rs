@@ -10,10 +10,9 @@
 //! use petcomp::geom::BBox;
 //!
 //! let bbox = BBox { x0: 10.0, y0: 10.0, x1: 60.0, y1: 40.0 };
-//! let truth = GroundTruth { class: 0, bbox, area: 1500.0, crowd: false };
-//! let mut image = EvalImage::new("000000", vec![truth]);
+//! let mut image = EvalImage::new("000000", vec![GroundTruth::new(0, bbox)]);
 //! let shifted = BBox { x0: 12.0, x1: 62.0, ..bbox };
-//! image.found.push(Detection { class: 0, bbox: shifted, confidence: 0.9 });
+//! image.found.push(Detection::new(0, shifted, 0.9));
 //! let scores = evaluate(&[image], Definition::Coco, &[]);
 //! // The overlap is 48/52: found at nine of the ten thresholds.
 //! assert!((scores.map() - 0.9).abs() < 1e-9);
@@ -84,6 +83,9 @@ pub struct GroundTruth {
     pub class: u32,
     /// Where, pixels.
     pub bbox: BBox,
+    /// Area of the box, square pixels: width times height where a file tells them, since corners
+    /// round both.
+    pub box_area: f64,
     /// Area that decides its size range, square pixels: that of its mask where there is one.
     pub area: f64,
     /// It counts neither as found nor as missed (COCO's `iscrowd`).
@@ -97,8 +99,36 @@ pub struct Detection {
     pub class: u32,
     /// Where, pixels.
     pub bbox: BBox,
+    /// As [`GroundTruth::box_area`]; it decides the size range, too.
+    pub box_area: f64,
     /// How sure the detector is; only the order matters.
     pub confidence: f64,
+}
+
+impl GroundTruth {
+    /// A box to be found, as large as its corners say.
+    pub fn new(class: u32, bbox: BBox) -> Self {
+        let area = overlap::area(&bbox);
+        Self {
+            class,
+            bbox,
+            box_area: area,
+            area,
+            crowd: false,
+        }
+    }
+}
+
+impl Detection {
+    /// A box as large as its corners say.
+    pub fn new(class: u32, bbox: BBox, confidence: f64) -> Self {
+        Self {
+            class,
+            bbox,
+            box_area: overlap::area(&bbox),
+            confidence,
+        }
+    }
 }
 
 /// What is in an image and what was found in it.
@@ -261,20 +291,11 @@ pub(crate) mod tests {
     }
 
     pub(crate) fn there(class: u32, bbox: BBox) -> GroundTruth {
-        GroundTruth {
-            class,
-            bbox,
-            area: bbox.width() * bbox.height(),
-            crowd: false,
-        }
+        GroundTruth::new(class, bbox)
     }
 
     pub(crate) fn found(class: u32, bbox: BBox, confidence: f64) -> Detection {
-        Detection {
-            class,
-            bbox,
-            confidence,
-        }
+        Detection::new(class, bbox, confidence)
     }
 
     pub(crate) fn sheet(truth: Vec<GroundTruth>, found: Vec<Detection>) -> EvalImage {

@@ -432,21 +432,11 @@ impl LabelRow {
     }
 
     fn truth(&self, size: [u32; 2]) -> GroundTruth {
-        let bbox = self.bbox(size);
-        GroundTruth {
-            class: self.class,
-            bbox,
-            area: bbox.width() * bbox.height(),
-            crowd: false,
-        }
+        GroundTruth::new(self.class, self.bbox(size))
     }
 
     fn found(&self, size: [u32; 2]) -> Detection {
-        Detection {
-            class: self.class,
-            bbox: self.bbox(size),
-            confidence: self.confidence,
-        }
+        Detection::new(self.class, self.bbox(size), self.confidence)
     }
 }
 

@@ -2,6 +2,8 @@
 
 use super::codec::exif::CameraNotes;
 use super::codec::raster::Raster;
+#[cfg(feature = "oiio")]
+use super::codec::raster::Samples;
 use super::codec::refusal::Refusal;
 use super::codec::{Wanted, exr, hdr, jpeg, png, tiff};
 use super::format::Format;
@@ -15,6 +17,7 @@ use super::source::SourceFile;
 use super::worker::{self, Request, Response};
 use std::io::{BufRead, Cursor, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 
 /// Samples by our decoders, or by OpenImageIO where those do not know the kind.
 pub(super) fn decode_raster(
@@ -101,6 +104,16 @@ pub(super) fn camera_notes(source: &SourceFile) -> CameraNotes {
     }
 }
 
+/// Names a photo of which nobody can tell whether it lies on its side.
+pub(super) fn warn_unreadable(notes: &CameraNotes, path: &Path) {
+    if notes.unreadable {
+        let path = path.display();
+        log::warn!(
+            "{path}: its EXIF data cannot be read: orientation and focal length are unknown"
+        );
+    }
+}
+
 fn notes_of_source(source: &SourceFile) -> CameraNotes {
     let file = Cursor::new(&source.bytes);
     catch_panic(|| Ok(read_notes(file, source.format))).unwrap_or_default()
@@ -127,7 +140,9 @@ pub(super) fn decode_elsewhere(
     };
     let response = ask_openimageio(source, what.clone(), options, request);
     match response.map_err(|e| e.after(&what))? {
-        Response::Raster(raster) => Ok(with_known_alpha(raster, source)),
+        Response::Raster(raster) => {
+            Ok(with_whole_palette(with_known_alpha(raster, source), source))
+        }
         Response::Shape(_) => Err("OpenImageIO gave no pixels".into()),
     }
 }
@@ -140,6 +155,18 @@ fn with_known_alpha(raster: Raster, source: &SourceFile) -> Raster {
         premultiplied: is_premultiplied(&raster, source),
         ..raster
     }
+}
+
+/// OpenImageIO divides the entries of a palette by 257 and rounds down, which gives a code less
+/// where they are codes times 256.
+#[cfg(feature = "oiio")]
+fn with_whole_palette(mut raster: Raster, source: &SourceFile) -> Raster {
+    let is_less = source.format == Format::Tiff && tiff::has_shifted_palette(&source.bytes);
+    if is_less && let Samples::U8(codes) = &mut raster.samples {
+        let lit = codes.iter_mut().filter(|code| **code > 0);
+        lit.for_each(|code| *code = code.saturating_add(1));
+    }
+    raster
 }
 
 #[cfg(feature = "oiio")]

@@ -39,12 +39,16 @@ pub struct Header {
     /// noted it, or the focal length and the resolution of its sensor. Of the picture as it
     /// was taken.
     pub focal_35mm: Option<f64>,
+    /// The focal length is by the resolution of the sensor, which programs that resize pictures
+    /// leave as it was: it may be wrong by their factor.
+    pub focal_by_sensor: bool,
     /// The camera enlarged the middle of its picture, so that its focal length may not be the
     /// picture's.
     pub digital_zoom: bool,
     /// The camera noted a picture of another shape: a part was cut away.
     pub cropped: bool,
-    /// The camera noted the size of this picture, or a whole multiple of it: nothing was cut away.
+    /// The camera noted the size of this picture, or a whole multiple of it, and no program that
+    /// edits pictures wrote the file: nothing was cut away.
     pub whole: bool,
     /// Texts that the file carries, by name.
     pub metadata: Vec<(String, String)>,
@@ -61,6 +65,7 @@ impl Default for Header {
             channels: Vec::new(),
             bits: 0,
             focal_35mm: None,
+            focal_by_sensor: false,
             digital_zoom: false,
             cropped: false,
             whole: false,

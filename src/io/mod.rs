@@ -23,8 +23,9 @@
 //! An EXR is cropped or padded with zeros from its data window to its display window ([`Window`]
 //! keeps the former), and converted if it names other primaries. A colour profile (ICC) of
 //! primaries and curves, such as Display P3 or Adobe RGB, is applied to display codes, as are code
-//! points of Rec. 709, Rec. 2020 and Display P3 with the curve of sRGB or none; others are named in
-//! a warning and the codes treated as sRGB. Inks (CMYK) are multiplied. Samples that are infinite
+//! points of Rec. 709, Rec. 2020 and Display P3 with the curve of sRGB or none, and a camera's word
+//! (EXIF) for Adobe RGB in a JPEG or TIFF without profile; others are named in a warning and the
+//! codes treated as sRGB. Inks (CMYK) are multiplied; CIELab is refused. Samples that are infinite
 //! or NaN are counted in a warning, and become codes of 0 or full scale where integers are written.
 //!
 //! # What holds for untrusted files

@@ -5,7 +5,7 @@ use super::codec::profile::{ColorDescription, DisplayProfile};
 use super::codec::raster::Raster;
 use super::codec::refusal::Refusal;
 use super::codec::{FromFile, heif, jpeg, png, tiff};
-use super::decode::{camera_notes, catch_panic, decode_raster};
+use super::decode::{camera_notes, catch_panic, decode_raster, warn_unreadable};
 use super::format::Format;
 use super::limits::{Limits, affordable, saturating_product};
 use super::options::ReadOptions;
@@ -61,16 +61,19 @@ impl Picture {
         wanted: Wanted,
     ) -> Result<Self> {
         let raster = raster.map_err(|e| Error::file(&source.path, e))?;
+        let notes = camera_notes(source);
+        warn_unreadable(&notes, &source.path);
+        let noted = notes.color.filter(|_| raster.display_encoded);
         let profile = wanted
             .is_color()
-            .then(|| usable_profile(&raster, source, limits))
+            .then(|| usable_profile(&raster, source, limits, noted))
             .flatten();
         warn_not_finite(&raster, source, wanted);
         warn_unusual_channels(&raster, source, wanted);
         Ok(Self {
             path: source.path.clone(),
             format: source.format,
-            raster: raster.upright(camera_notes(source).orientation),
+            raster: raster.upright(notes.orientation),
             profile,
         })
     }
@@ -150,10 +153,15 @@ impl Picture {
 }
 
 /// The colour profile of display codes, where there is one other than sRGB.
-fn usable_profile(raster: &Raster, source: &SourceFile, limits: &Limits) -> Option<DisplayProfile> {
+fn usable_profile(
+    raster: &Raster,
+    source: &SourceFile,
+    limits: &Limits,
+    noted: Option<ColorDescription>,
+) -> Option<DisplayProfile> {
     let path = source.path.display();
-    let embedded = catch_panic(|| Ok(embedded_profile(source, limits)?));
-    let profile = embedded.unwrap_or_else(|e| {
+    let described = catch_panic(|| Ok(described_profile(source, limits, noted)?));
+    let profile = described.unwrap_or_else(|e| {
         log::warn!("{path}: has {e}; treated as sRGB");
         None
     });
@@ -164,15 +172,21 @@ fn usable_profile(raster: &Raster, source: &SourceFile, limits: &Limits) -> Opti
     profile
 }
 
-/// The profile in a file, if it is not sRGB anyway; formats of linear light have none.
-fn embedded_profile(
+/// The profile in a file, or that its camera noted, if it is not sRGB anyway; formats of linear
+/// light have none.
+fn described_profile(
     source: &SourceFile,
     limits: &Limits,
+    noted: Option<ColorDescription>,
 ) -> std::result::Result<Option<DisplayProfile>, String> {
     let description = match source.format {
         Format::Png => png::color_description(&source.bytes, limits),
-        Format::Jpeg => jpeg::profile(&source.bytes).map(ColorDescription::Icc),
-        Format::Tiff => tiff::profile(&source.bytes, limits).map(ColorDescription::Icc),
+        Format::Jpeg => jpeg::profile(&source.bytes)
+            .map(ColorDescription::Icc)
+            .or(noted),
+        Format::Tiff => tiff::profile(&source.bytes, limits)
+            .map(ColorDescription::Icc)
+            .or(noted),
         Format::Heif => heif::color_description(&source.bytes),
         _ => None,
     };
@@ -202,5 +216,65 @@ fn warn_unusual_channels(raster: &Raster, source: &SourceFile, wanted: Wanted) {
             log::warn!("{path}: uses the channel {} as grey", raster.names[0])
         }
         _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::image::Image;
+    use crate::io;
+    use crate::pixel::{LinearRgb, Srgb8};
+    use exif::experimental::Writer;
+    use exif::{Field, In, Tag, Value};
+    use moxcms::ColorProfile;
+
+    const APP1: u8 = 0xe1;
+    const APP2: u8 = 0xe2;
+
+    /// Light of a JPEG of one colour with a segment.
+    fn light(marker: u8, data: &[u8]) -> LinearRgb {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.jpg");
+        let green = Srgb8 {
+            r: 60,
+            g: 180,
+            b: 90,
+        };
+        io::write(&path, &Image::filled(16, 16, green)).unwrap();
+        let mut jpeg = std::fs::read(&path).unwrap();
+        let length = (data.len() as u16 + 2).to_be_bytes();
+        jpeg.splice(2..2, [&[0xff, marker][..], &length, data].concat());
+        std::fs::write(&path, jpeg).unwrap();
+        io::read::<LinearRgb>(&path).unwrap()[(8, 8)]
+    }
+
+    /// EXIF data of a camera that was set to Adobe RGB.
+    fn noted_adobe_rgb() -> Vec<u8> {
+        let field = |tag, value| Field {
+            tag,
+            ifd_num: In::PRIMARY,
+            value,
+        };
+        let space = field(Tag::ColorSpace, Value::Short(vec![65_535]));
+        let index = Value::Ascii(vec![b"R03".to_vec()]);
+        let index = field(Tag::InteroperabilityIndex, index);
+        let (mut writer, mut notes) = (Writer::new(), std::io::Cursor::new(Vec::new()));
+        writer.push_field(&space);
+        writer.push_field(&index);
+        writer.write(&mut notes, false).unwrap();
+        [&b"Exif\0\0"[..], notes.get_ref()].concat()
+    }
+
+    #[test]
+    fn a_camera_s_adobe_rgb_is_that_of_the_profile() {
+        let icc = ColorProfile::new_adobe_rgb().encode().unwrap();
+        let profile = [&b"ICC_PROFILE\0\x01\x01"[..], &icc].concat();
+        let [noted, profiled] = [light(APP1, &noted_adobe_rgb()), light(APP2, &profile)];
+        let apart = |other: LinearRgb| {
+            let [r, g, b] = [noted.r - other.r, noted.g - other.g, noted.b - other.b];
+            r.abs().max(g.abs()).max(b.abs())
+        };
+        assert!(apart(profiled) < 1e-3, "{noted:?}, expected {profiled:?}");
+        assert!(apart(light(APP1, b"nothing")) > 0.02, "{noted:?}");
     }
 }

@@ -5,7 +5,7 @@ use super::codec::exif::CameraNotes;
 use super::codec::refusal::Refusal;
 #[cfg(feature = "oiio")]
 use super::decode::decode_elsewhere;
-use super::decode::{catch_panic, header_elsewhere, read_file_header};
+use super::decode::{catch_panic, header_elsewhere, read_file_header, warn_unreadable};
 use super::header::Header;
 #[cfg(feature = "oiio")]
 use super::options::Fallback;
@@ -68,6 +68,7 @@ pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
         decoded => decoded,
     }
     .map_err(|e| Error::file(path, e))?;
+    warn_unreadable(&notes, path);
     apply_notes(&mut header, &notes);
     Ok(header)
 }
@@ -91,6 +92,7 @@ fn apply_notes(header: &mut Header, notes: &CameraNotes) {
         header.data_size = [header.width, header.height];
     }
     (header.focal_35mm, header.digital_zoom) = (notes.focal_35mm, notes.digital_zoom);
+    header.focal_by_sensor = notes.focal_by_sensor;
 }
 
 /// Reads a picture by OpenImageIO alone, even one that the Rust decoders could read.

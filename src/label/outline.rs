@@ -8,7 +8,8 @@
 //! rule: whatever the outline winds around is inside.
 //!
 //! Where the lens bends straight lines, the pyramid is that of all that it lets into the picture,
-//! and the sides of the outline are cut into short ones before the lens bends them.
+//! and the sides of the outline are cut into short ones before the lens bends them. What a barrel
+//! cannot show, beyond its fold, lies outside of what it shows.
 
 use crate::camera::{Camera, RadialDistortion};
 use crate::geom::{BBox, Point2, Vector3};
@@ -339,6 +340,22 @@ mod tests {
             prop_assert!((overlap(&rb, &ra).unsigned_area() - shared.unsigned_area()).abs() < 1e-4);
             prop_assert!((overlap(&ra, &ra).unsigned_area() - ra.unsigned_area()).abs() < 1e-4);
         }
+    }
+
+    #[test]
+    fn what_a_barrel_cannot_show_is_not_mirrored_into_the_picture() {
+        // From a quarter of a focal length to the right of the middle to beyond the fold at 1.29.
+        let card = card_on_grid(&[[6, 4], [22, 4], [22, 5], [6, 5]]);
+        let lens = RadialDistortion::new(&camera(), -0.2);
+        let all = whole(&card, &camera(), &lens);
+        let b = bounds(&all);
+        // (0.25, 0.125) at 0.984375 of its radius, 2.25 at two thirds.
+        assert!((b.x0 - 29.84375).abs() < 1e-6, "{b:?}");
+        assert!((b.x1 - 80.0).abs() < 1e-6, "{b:?}");
+        let inside = region(&card, &camera(), &lens).unsigned_area();
+        // Of areas integrated along the card.
+        let outside = 1.0 - inside / all.unsigned_area();
+        assert!((outside - 0.7506).abs() < 0.003, "{outside}");
     }
 
     #[test]

@@ -3,7 +3,8 @@
 //! # Method
 //! Truncation as KITTI has it ("refers to the object leaving image boundaries", 0 to 1), by area:
 //! the share of the outline, as the camera sees it, that lies beyond the picture's edges. Samples
-//! end at the edges, outlines do not.
+//! end at the edges, outlines do not. What a barrel lens cannot show is outside, at the scale of its
+//! fold.
 
 use crate::geom::BBox;
 use crate::label::outline::{self, SLIVER_AREA_PX2};

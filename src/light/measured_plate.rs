@@ -175,6 +175,21 @@ mod tests {
     }
 
     #[test]
+    fn blur_grows_where_a_barrel_zooms_in() {
+        let plate = edges(0.8);
+        let blur = |scene: Scene| match match_plate(scene, &plate, None).finish.blur_px {
+            Blur::Known(sigma_px) => sigma_px,
+            Blur::MatchPlate => panic!("nothing found"),
+        };
+        let mut bent = open_scene();
+        bent.lens.k1 = -0.1;
+        bent.lens.bends_plate = true;
+        let zoom = bent.zoom_used();
+        assert!(zoom > 1.0);
+        assert_eq!(blur(bent), zoom * blur(open_scene()));
+    }
+
+    #[test]
     fn another_camera_sees_another_part() {
         let plate = Image::from_fn(40, 30, |x, _| LinearRgb::grey(0.01 * (x as f32 + 0.5)));
         let measures = PlateMeasures::default();

@@ -12,6 +12,7 @@ use super::outline::Outline;
 use super::plate::{PlateOptions, ScreenPlate};
 use super::prepared::Prepared;
 use super::screen::{masked_pixels, mean_color, screen_color, screen_pixels};
+use super::screen_edge::screen_edge_seen;
 use super::segment::{Segmentation, segment_prepared};
 use super::stroke::{Claims, Stroke, StrokesOnPhoto, check_strokes, corrected_coverage, unclaimed};
 use crate::diagnostic::{Code, Diagnostic};
@@ -138,7 +139,7 @@ fn cut_segmented(
     let matted = Matted::new(prepared, screen, region, options)?;
     watch.lap("matte");
     let cut = CutOut {
-        diagnostics: diagnostics(prepared.photo, &segmentation, &matted, options),
+        diagnostics: diagnostics(prepared.photo, &segmentation, screen, &matted, options),
         ..region
             .trim(options.longest_side)
             .cut_out(matted, segmentation, screen)
@@ -414,11 +415,17 @@ const MAX_RESIDUAL_MATTE: f32 = 0.2;
 fn diagnostics(
     photo: &Image<LinearRgb>,
     found: &Segmentation,
+    screen: &CleanScreen,
     matted: &Matted,
     options: &CutOutOptions,
 ) -> Vec<Diagnostic> {
+    let edge = screen_edge_seen(photo, &found.hull, screen.color, &options.segment);
+    // A background that is not the screen needs no advice.
+    let is_right = |d: &&Diagnostic| edge.is_none() || d.code != Code::GreyScreen;
+    let of_matte = matted.diagnostics.iter().filter(is_right).cloned();
     let mut diagnostics = found.diagnostics.clone();
-    diagnostics.extend_from_slice(&matted.diagnostics);
+    diagnostics.extend(of_matte);
+    diagnostics.extend(edge);
     let residual = matted.residual_matte;
     diagnostics.extend((residual > MAX_RESIDUAL_MATTE).then(|| residual_matte(residual)));
     // An outline alone does not depend on the screen.

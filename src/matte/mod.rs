@@ -33,6 +33,7 @@ mod prepared;
 mod register;
 mod screen;
 mod screen_corners;
+mod screen_edge;
 mod segment;
 mod stroke;
 mod triangulate;

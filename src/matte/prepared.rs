@@ -44,6 +44,11 @@ impl<'a> Prepared<'a> {
         })
     }
 
+    /// Pixels of the photo for a pixel of [`small`](Self::small).
+    pub(super) fn reduction(&self) -> f64 {
+        self.longer_side() as f64 / longer_side(&self.small) as f64
+    }
+
     /// Longer side of the photo, pixels.
     pub(super) fn longer_side(&self) -> usize {
         longer_side(self.photo)

@@ -27,7 +27,7 @@ const MAX_HUES: usize = 4;
 /// What is thinner than twice this is no part of a screen, pixels of the search.
 const THIN_PX: f64 = 2.0;
 /// What lies on a screen is farther than this from its border, and covers this share of it.
-const RIM_PX: f64 = 8.0;
+pub(super) const RIM_PX: f64 = 8.0;
 const MIN_OBJECT_SHARE: f64 = 0.002;
 /// Times a corner of a rough quadrangle is moved, at most: it takes two or three rounds.
 const MAX_CORNER_MOVES: usize = 40;
@@ -98,7 +98,7 @@ fn rough_corners(picture: &Image<LinearRgb>) -> Result<[Point2<f64>; 4]> {
         .ok_or_else(|| not_found("its outline has no four corners"))
 }
 
-fn at_search_size(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
+pub(super) fn at_search_size(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
     let longer = SEARCH_SIZE_PX.min(longer_side(photo));
     let [width, height] = scaled_sides(photo.size(), longer, 1);
     filter::resize(photo, width, height)
@@ -146,13 +146,13 @@ fn not_found(what: impl std::fmt::Display) -> Error {
 }
 
 /// A connected region of one hue.
-struct HueRegion {
+pub(super) struct HueRegion {
     pixels: usize,
-    hull: Vec<Point2<f64>>,
+    pub(super) hull: Vec<Point2<f64>>,
     /// It reaches the border of the picture.
     is_cut: bool,
     /// Something lies on it.
-    is_covered: bool,
+    pub(super) is_covered: bool,
 }
 
 /// The region that is a screen.
@@ -174,7 +174,7 @@ fn screen_region(picture: &Image<LinearRgb>) -> Result<HueRegion> {
 }
 
 /// The regions that are large enough for a screen, largest first.
-fn large_hue_regions(picture: &Image<LinearRgb>) -> Vec<HueRegion> {
+pub(super) fn large_hue_regions(picture: &Image<LinearRgb>) -> Vec<HueRegion> {
     let least = MIN_SCREEN_SHARE * picture.pixels().len() as f64;
     let mut regions = hue_regions(picture);
     regions.retain(|region| region.pixels as f64 >= least);
@@ -297,7 +297,7 @@ fn largest_group(set: &Mask) -> usize {
 /// # Method
 /// From any four, each in turn becomes the point that is farthest from the way between its
 /// neighbours, until none moves.
-fn four_corners(ring: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
+pub(super) fn four_corners(ring: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
     let n = ring.len();
     if n < 4 {
         return None;

@@ -135,7 +135,7 @@ pub(super) fn segment_prepared(
     watch.lap("outline");
     let mut diagnostics = chosen.diagnostics(prepared.small.width());
     diagnostics.extend(object.diagnostic());
-    diagnostics.extend(confidence.diagnostics());
+    diagnostics.extend(confidence.diagnostics(prepared.reduction(), shape.scale.reduction()));
     let found = Segmentation {
         confidence,
         diagnostics,
@@ -147,6 +147,11 @@ pub(super) fn segment_prepared(
 }
 
 impl Segmentation {
+    /// The object reaches a border of the photo: part of it is missing.
+    pub(crate) fn is_truncated(&self) -> bool {
+        self.touches.contains(&true)
+    }
+
     /// With the confidence of the search alone and without diagnostics.
     fn new(prepared: &Prepared<'_>, chosen: ChosenSearch<'_>, shape: ObjectShape) -> Self {
         let [mask, tight] = shape.coverages(prepared.photo.size());

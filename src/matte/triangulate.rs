@@ -1,5 +1,6 @@
 //! Triangulation: exact film from photos of the same object on two or more screens.
 
+mod drift;
 mod dye;
 mod lines;
 mod noise;
@@ -82,8 +83,8 @@ pub struct Triangulated {
 /// Solves `photo = F + T * plate` for F and T by least squares over several photos, each with its
 /// own screen.
 ///
-/// Photos are scene-linear, of one size, of the same object under the same light; the more the
-/// screens differ, the better. `inside` is the object's coverage in the first photo.
+/// Photos are scene-linear, of one size, of the same object under the same light, with the same
+/// exposure and white balance; the more the screens differ, the better. `inside` is the object's coverage in the first photo.
 ///
 /// # Method
 /// [Smith and Blinn 1996], theorem 4, per channel: T is the slope and F the intercept of the
@@ -125,7 +126,10 @@ pub fn triangulate(
     let inferred = Inferred::fit(&lines, inside, determined, dye);
     let solved = lines.map(|line| inferred.complete(&line));
     let shift_px: Vec<[f64; 2]> = aligned.iter().map(|photo| photo.shift_px).collect();
-    let mut diagnostics = diagnostics(&shift_px, determined, inferred.largest_spread());
+    // Drift shows as tint, too.
+    let doubt = exposure_drift(&aligned, &solved, inside)
+        .or_else(|| uncertain_tint(inferred.largest_spread()));
+    let mut diagnostics = diagnostics(&shift_px, determined, doubt);
     diagnostics.extend(clipped_screens(shots, inside));
     Ok(Triangulated {
         residual: residual(&aligned, &solved, inside),
@@ -174,12 +178,29 @@ fn view_transmittance(
     view(&measured, flat, inside).zip_map(inside, covered)
 }
 
-fn diagnostics(shift_px: &[[f64; 2]], determined: [bool; 3], spread: f32) -> Vec<Diagnostic> {
-    let is_uncertain = spread > ColorUncertainty::NEEDS_REVIEW.tint;
+fn diagnostics(
+    shift_px: &[[f64; 2]],
+    determined: [bool; 3],
+    doubt: Option<Diagnostic>,
+) -> Vec<Diagnostic> {
     let moved = moved_photos(shift_px).chain(open_channels(determined));
-    moved
-        .chain(is_uncertain.then(|| tint_uncertain(spread)))
-        .collect()
+    moved.chain(doubt).collect()
+}
+
+/// The warning about photos that differ in exposure or white balance.
+fn exposure_drift(
+    photos: &[AlignedPhoto],
+    solved: &Image<PixelFilm>,
+    inside: &Image<Coverage>,
+) -> Option<Diagnostic> {
+    let shares = photos
+        .iter()
+        .map(|aligned| drift::unexplained_share([&aligned.photo, &aligned.screen], solved, inside));
+    drift::warning(&shares.collect::<Vec<_>>())
+}
+
+fn uncertain_tint(spread: f32) -> Option<Diagnostic> {
+    (spread > ColorUncertainty::NEEDS_REVIEW.tint).then(|| tint_uncertain(spread))
 }
 
 fn moved_photos(shift_px: &[[f64; 2]]) -> impl Iterator<Item = Diagnostic> {

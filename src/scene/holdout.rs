@@ -24,17 +24,21 @@ const PIXEL_RADIUS_PX: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 impl Scene {
     /// The part of a mask of what hides objects that the picture shows; it is in front of all of
-    /// them. `photo` is the camera of the whole mask.
+    /// them. `photo` is the camera of the whole mask, which is as large as the picture or larger.
     pub(crate) fn holdout_of_mask(
         &self,
         photo: &Camera,
         mask: &Image<Coverage>,
     ) -> Image<HoldoutSample> {
+        let [across, down] = self.detail_of(mask);
+        let is_whole = self.view.is_whole() && [across, down] == [1.0; 2];
         let shown;
-        let mask = if self.view.is_whole() && !self.lens.moves_plate() {
+        let mask = if is_whole && !self.lens.moves_plate() {
             mask
         } else {
-            shown = self.shown(photo, |at| sample_bilinear_clamped(mask, at.x, at.y));
+            shown = self.shown(photo, |at| {
+                sample_bilinear_clamped(mask, at.x * across, at.y * down)
+            });
             &shown
         };
         mask.map(|coverage| HoldoutSample {
@@ -222,7 +226,7 @@ fn inner_sides(ring: &[Point2<f64>]) -> Vec<(Vector2<f64>, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Wall;
+    use crate::scene::{CameraSource, View, Wall};
 
     fn tray(slope_deg: f64) -> Surface {
         let wall = Wall {
@@ -291,6 +295,27 @@ mod tests {
             .unwrap();
         let covered: f32 = holdout.pixels().iter().map(|p| p.coverage.0).sum();
         assert!((f64::from(covered) / (doubled.abs() / 2.0) - 1.0).abs() < 0.005);
+    }
+
+    #[test]
+    fn a_zoom_shows_the_detail_of_a_larger_mask() {
+        let photo = camera();
+        let [width, height] = photo.image.map(|side| 4 * side as usize);
+        // The zoomed view shows the columns 240 to 400.
+        let mask = Image::from_fn(width, height, |x, _| Coverage(f32::from(x >= 300)));
+        let view = View {
+            zoom: 4.0,
+            ..View::default()
+        };
+        let (known, surface) = (CameraSource::Known(photo), Surface::new([0.56, 0.37]));
+        let scene = Scene {
+            view,
+            ..Scene::new(photo.image, known, surface)
+        };
+        let held = scene.holdout_of_mask(&photo, &mask);
+        for x in (0..160).filter(|x| !(59..61).contains(x)) {
+            assert_eq!(held[(x, 60)].coverage.0, f32::from(x > 60), "{x}");
+        }
     }
 
     #[test]

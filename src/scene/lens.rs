@@ -97,6 +97,11 @@ impl Lens {
         }
     }
 
+    /// How many times larger than the photo the middle of the whole picture is.
+    pub(super) fn zoom(&self, photo: &Camera) -> f64 {
+        self.camera(photo).focal_px.x / photo.focal_px.x
+    }
+
     /// Where the photo shows what the whole picture taken by this lens shows at a position.
     pub(super) fn photo_px(&self, photo: &Camera, px: Point2<f64>) -> Point2<f64> {
         if !self.moves_plate() {

@@ -62,7 +62,7 @@ impl Scene {
     ///
     /// `look` finds an object's asset and photo, or nothing; for a library that is
     /// [`Appearance::from_library`]. `plate` is the background at the picture's size, or larger where
-    /// the view zooms in; none leaves it transparent. `panorama` is the picture that the scene's environment names. Object `i`
+    /// view or lens zooms in; none leaves it transparent. `panorama` is the picture that the scene's environment names. Object `i`
     /// gets id `i + 1`; the shadow catcher is the whole plane of the labelled surface.
     ///
     /// # Errors
@@ -120,8 +120,8 @@ impl Scene {
         }))
     }
 
-    /// Columns and rows of a plate for one of the picture.
-    fn detail_of(&self, plate: &Image<LinearRgb>) -> [f64; 2] {
+    /// Columns and rows of a plate, or of a mask beside it, for one of the picture.
+    pub(super) fn detail_of<P: Copy>(&self, plate: &Image<P>) -> [f64; 2] {
         let ([width, height], (w, h)) = (self.image.map(f64::from), plate.size());
         [w as f64 / width, h as f64 / height]
     }
@@ -134,7 +134,7 @@ impl Scene {
     /// How many times larger it shows its photo.
     pub(crate) fn zoom_used(&self) -> f64 {
         match &self.camera {
-            CameraSource::Known(camera) => self.view.zoom_used(camera),
+            CameraSource::Known(camera) => self.view.zoom_used(camera) * self.lens.zoom(camera),
             CameraSource::Rectangle { .. } => 1.0,
         }
     }
@@ -308,7 +308,7 @@ mod tests {
     use super::*;
     use crate::geom::{UnitQuaternion, Vector2};
     use crate::pixel::PremulRgba;
-    use crate::scene::{Grade, Surface, View};
+    use crate::scene::{Grade, Lens, Surface, View};
 
     fn camera() -> Camera {
         Camera {
@@ -446,6 +446,29 @@ mod tests {
         let shot = zoomed.resolve(look, Some(Arc::new(plate)), None).unwrap();
         let row: Vec<f32> = shot.plate.unwrap().row(2).iter().map(|c| c.g).collect();
         assert_eq!(row, [0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn a_barrel_that_bends_the_plate_zooms_in() {
+        let lens = Lens {
+            k1: -0.1,
+            bends_plate: true,
+            ..Lens::default()
+        };
+        let bent = Scene { lens, ..scene() };
+        let shot = bent.resolve(look, None, None).unwrap();
+        let ratio = shot.camera.focal_px.x / camera().focal_px.x;
+        assert!(ratio > 1.0);
+        assert_eq!(bent.zoom_used(), ratio);
+        let unmoved = Lens {
+            bends_plate: false,
+            ..lens
+        };
+        let taken_so = Scene {
+            lens: unmoved,
+            ..scene()
+        };
+        assert_eq!(taken_so.zoom_used(), 1.0);
     }
 
     #[test]

@@ -64,6 +64,7 @@ fn sheets(boxes: &Boxes) -> Vec<EvalImage> {
         sheets[i].truth.push(GroundTruth {
             class,
             bbox: bbox(x, y, w, h),
+            box_area: w * h,
             area: w * h,
             crowd: crowd == 1,
         });
@@ -72,6 +73,7 @@ fn sheets(boxes: &Boxes) -> Vec<EvalImage> {
         sheets[i].found.push(Detection {
             class,
             bbox: bbox(x, y, w, h),
+            box_area: w * h,
             confidence,
         });
     }

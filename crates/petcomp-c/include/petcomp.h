@@ -137,8 +137,8 @@ petcomp_status petcomp_sample_make(petcomp_pipeline pipeline,
 // `width` and `height` are null or can be written to.
 petcomp_status petcomp_sample_size(petcomp_sample sample, size_t *width, size_t *height);
 
-// The picture as a display shows it: rows without gaps, three bytes a pixel, sRGB. `capacity` is in
-// bytes, at least 3 * width * height.
+// The picture as a display shows it, with what a JPEG loses where the recipe writes those: rows
+// without gaps, three bytes a pixel, sRGB. `capacity` is in bytes, at least 3 * width * height.
 //
 // # Safety
 // `rgb` is null or has room for `capacity` bytes.

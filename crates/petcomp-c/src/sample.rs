@@ -6,9 +6,9 @@ use crate::memory::{put, store, store_text};
 use crate::pipeline::{OpenedPipeline, PipelineHandle, opened};
 use crate::status::{Failure, Status, call};
 use bytemuck::{Pod, Zeroable};
-use petcomp::dataset::{LabelConfig, LabelledObject, Sample};
+use petcomp::dataset::{Extent, LabelledObject, Pictures, Sample};
 use petcomp::label::RleMask;
-use petcomp::{Error, PremulRgba, color};
+use petcomp::{Error, Image, Srgb8};
 use serde::Serialize;
 use std::ffi::c_char;
 
@@ -20,10 +20,20 @@ pub struct SampleHandle {
     pub id: u64,
 }
 
-/// A sample, and its labels as JSON.
+/// A sample, its labels as JSON, and the file that a dataset has of it.
 struct Made {
     sample: Sample,
     labels: String,
+    pictures: Pictures,
+    seed: u64,
+    k: u64,
+}
+
+impl Made {
+    /// What whoever reads its file sees.
+    fn shown(&self) -> Result<Image<Srgb8>, Error> {
+        self.pictures.shown(&self.sample.frame, self.seed, self.k)
+    }
 }
 
 static SAMPLES: Handles<Made> = Handles::new("sample");
@@ -75,25 +85,31 @@ pub unsafe extern "C" fn petcomp_sample_make(
 fn made(opened: &OpenedPipeline, seed: u64, k: u64) -> Result<Made, Failure> {
     let sample = opened.pipeline.sample(seed, k)?;
     let labels = labels_json(&sample, opened)?;
-    Ok(Made { sample, labels })
+    Ok(Made {
+        sample,
+        labels,
+        pictures: opened.pipeline.config().pictures.clone(),
+        seed,
+        k,
+    })
 }
 
 fn labels_json(sample: &Sample, opened: &OpenedPipeline) -> Result<String, Error> {
     let config = &opened.pipeline.config().labels;
     let (width, height) = sample.frame.size();
-    let (count, extent) = (opened.classes.len(), config.yolo.boxes);
+    let (count, extent) = (opened.classes.len(), config.extent());
     let labelled = config.obstructed.labelled(&sample.labels, count, &[extent]);
     let document = LabelDocument {
         width,
         height,
         classes: &opened.classes,
-        objects: labelled.iter().map(|label| entry(label, config)).collect(),
+        objects: labelled.iter().map(|label| entry(label, extent)).collect(),
     };
     serde_json::to_string(&document).map_err(|e| Error::value("labels", e))
 }
 
-fn entry<'a>(label: &LabelledObject<'a>, config: &LabelConfig) -> LabelEntry<'a> {
-    let (bounds, mask) = config.yolo.boxes.of(label.object);
+fn entry<'a>(label: &LabelledObject<'a>, extent: Extent) -> LabelEntry<'a> {
+    let (bounds, mask) = extent.of(label.object);
     LabelEntry {
         id: label.object.id.0,
         class: label.class,
@@ -124,8 +140,8 @@ pub unsafe extern "C" fn petcomp_sample_size(
     })
 }
 
-/// The picture as a display shows it: rows without gaps, three bytes a pixel, sRGB. `capacity` is in
-/// bytes, at least 3 * width * height.
+/// The picture as a display shows it, with what a JPEG loses where the recipe writes those: rows
+/// without gaps, three bytes a pixel, sRGB. `capacity` is in bytes, at least 3 * width * height.
 ///
 /// # Safety
 /// `rgb` is null or has room for `capacity` bytes.
@@ -136,8 +152,7 @@ pub unsafe extern "C" fn petcomp_sample_srgb8(
     capacity: usize,
 ) -> Status {
     call(|| {
-        let made = SAMPLES.get(sample.id)?;
-        let shown = color::to_srgb8(&made.sample.frame.map(PremulRgba::color));
+        let shown = SAMPLES.get(sample.id)?.shown()?;
         // SAFETY: promised by the caller.
         unsafe { store("rgb", bytemuck::cast_slice(shown.pixels()), rgb, capacity) }
     })

@@ -28,8 +28,8 @@ fn install(folder: &Path) {
     }
 }
 
-/// A recipe for small pictures of two bottles.
-fn write_recipe(folder: &Path) -> PathBuf {
+/// A recipe for small pictures of two bottles, with more lines behind those of its labels.
+fn write_recipe(folder: &Path, more: &str) -> PathBuf {
     let samples = repository().canonicalize().unwrap().join("tests/samples");
     let mut list = String::from("file,asset,class,length\n");
     for name in ["b0000_0", "b0001_0"] {
@@ -41,7 +41,7 @@ fn write_recipe(folder: &Path) -> PathBuf {
     asset::build(list, assets, &|_, _| {}, &AtomicBool::new(false)).unwrap();
     let recipe = format!(
         "assets = \"assets\"\nbackgrounds = {:?}\n[scene]\nimage = [160, 120]\nobjects = [2, 3]\n\
-         [labels]\nobstructed = \"keep\"\n[render]\nsubsamples = 1\nambient_samples = 8\n",
+         [labels]\nobstructed = \"keep\"\n{more}[render]\nsubsamples = 1\nambient_samples = 8\n",
         samples.join("backgrounds")
     );
     std::fs::write(folder.join("recipe.toml"), recipe).unwrap();
@@ -109,12 +109,10 @@ fn run_checked(folder: &Path, recipe: &Path) -> Output {
     run(valgrind, folder, recipe)
 }
 
-#[test]
-fn c_program_makes_the_programs_sample() {
-    let temporary = tempfile::tempdir().unwrap();
-    let folder = temporary.path();
+/// A sample by the program in C, and a dataset of the same recipe; returns what the former said.
+fn make_both(folder: &Path, more: &str) -> String {
     install(folder);
-    let recipe = write_recipe(folder);
+    let recipe = write_recipe(folder, more);
     generate(&recipe, &folder.join("set"));
     let source = repository().join("examples/c/sample.c");
     let program = ["-std=c11", "-o", "sample", "-L.", "-lpetcomp"];
@@ -126,20 +124,41 @@ fn c_program_makes_the_programs_sample() {
         String::from_utf8_lossy(&done.stderr),
     );
     assert!(done.status.success(), "{out}{err}");
+    out.into_owned()
+}
+
+#[test]
+fn c_program_makes_the_programs_sample() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let out = make_both(folder, "");
     let version = env!("CARGO_PKG_VERSION");
     assert!(
         out.starts_with(&format!("petcomp {version}\nmatte 0.")),
         "{out}"
     );
+    assert_same_picture(folder, "png");
+    assert_eq!(own_labels(folder), program_labels(folder, "amodal_mask"));
+}
 
-    let theirs = image::open(one_of(folder, "images", "png"))
-        .unwrap()
-        .to_rgb8();
-    assert_eq!(
-        image::open(folder.join("picture.ppm")).unwrap().to_rgb8(),
-        theirs
-    );
-    assert_eq!(own_labels(folder), program_labels(folder));
+#[test]
+fn c_program_makes_the_programs_jpeg_and_labels() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let more = "formats = ['coco']\ncoco = { boxes = 'visible' }\n\
+                [pictures]\nformat = 'jpg'\njpeg_quality = [20, 60]\n";
+    make_both(folder, more);
+    assert_same_picture(folder, "jpg");
+    assert_eq!(own_labels(folder), program_labels(folder, "visible_mask"));
+}
+
+fn assert_same_picture(folder: &Path, extension: &str) {
+    let [own, theirs] = [
+        folder.join("picture.ppm"),
+        one_of(folder, "images", extension),
+    ]
+    .map(|path| image::open(path).unwrap().to_rgb8());
+    assert!(own == theirs);
 }
 
 /// Sample K is in one part or the other.
@@ -162,11 +181,11 @@ fn own_labels(folder: &Path) -> Vec<serde_json::Value> {
         .collect()
 }
 
-fn program_labels(folder: &Path) -> Vec<serde_json::Value> {
+fn program_labels(folder: &Path, mask: &str) -> Vec<serde_json::Value> {
     let record = json(&one_of(folder, "scenes", "json"));
     let objects = record["labels"]["objects"].as_array().unwrap().iter();
     let labels: Vec<_> = objects
-        .map(|o| serde_json::json!([o["class"], o["visible_fraction"], o["amodal_mask"]]))
+        .map(|o| serde_json::json!([o["class"], o["visible_fraction"], o[mask]]))
         .collect();
     assert_eq!(labels.len(), record["labelled"].as_array().unwrap().len());
     assert!(!labels.is_empty());

@@ -178,16 +178,12 @@ fn check_box(image: usize, bbox: &[f64; 4]) -> Result<()> {
 
 fn sheet_of(i: usize, (truth, found): &Sheet) -> EvalImage {
     let truth = truth.iter().map(|&(class, bbox, crowd)| GroundTruth {
-        class,
-        bbox: bbox_of(bbox),
-        area: bbox_of(bbox).width() * bbox_of(bbox).height(),
         crowd,
+        ..GroundTruth::new(class, bbox_of(bbox))
     });
-    let found = found.iter().map(|&(class, bbox, confidence)| Detection {
-        class,
-        bbox: bbox_of(bbox),
-        confidence,
-    });
+    let found = found
+        .iter()
+        .map(|&(class, bbox, confidence)| Detection::new(class, bbox_of(bbox), confidence));
     EvalImage {
         found: found.collect(),
         ..EvalImage::new(format!("{i:06}"), truth.collect())

@@ -38,6 +38,6 @@ mod _petcomp {
         sample::Sample,
         scene::{check_scene, read_scene, write_scene},
         shot::render_shot,
-        work::{end_callers, set_threads},
+        work::{end_callers, set_threads, share_memory},
     };
 }

@@ -5,9 +5,10 @@ use crate::document::{parse, text};
 use crate::errors::{to_python, wrong_type, wrong_value};
 use crate::work;
 use numpy::{PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use petcomp::io::{self, Bits, WriteOptions};
 use petcomp::matte::key::{Deviations, KeyOptions, Keyed, Keying, Screen};
 use petcomp::matte::{self, CutOut, CutOutOptions};
-use petcomp::{Coverage, Error, Image, LinearRgb, PremulRgba, Result, io};
+use petcomp::{Coverage, Error, Image, LinearRgb, PremulRgba, Result};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
@@ -180,7 +181,7 @@ pub(crate) fn read_picture<'py>(
     to_array(py, image)
 }
 
-/// A picture to a file, its format by the extension.
+/// A picture to a file, its format by the extension; of 32-bit floats where it is one of floats.
 #[pyfunction]
 pub(crate) fn write_picture(
     py: Python<'_>,
@@ -195,18 +196,23 @@ pub(crate) fn write_picture(
             format_args!("{}: {what}", path.display()),
         ));
     }
+    let options = WriteOptions {
+        bits: extension.eq_ignore_ascii_case("exr").then_some(Bits::Float),
+        ..WriteOptions::default()
+    };
     let image = Given::from_argument("image", image)?;
     work::run(py, move || match image.decoded("image")? {
-        Photo::Rgb(pixels) => io::write(path, &pixels.into_image()),
+        Photo::Rgb(pixels) => io::write_with(path, &pixels.into_image(), &options),
         Photo::Rgba(pixels) => {
             let image = pixels.into_image();
-            check_sound(&image)?;
-            io::write(path, &image)
+            check_sound("image", &image)?;
+            io::write_with(path, &image, &options)
         }
     })
 }
 
-fn check_sound(image: &Image<PremulRgba>) -> Result<()> {
+/// Refuses a picture with a pixel whose alpha no picture has.
+pub(crate) fn check_sound(name: &str, image: &Image<PremulRgba>) -> Result<()> {
     let bad = image.pixels().iter().position(|pixel| !pixel.is_sound());
     bad.map_or(Ok(()), |i| {
         let (x, y) = (i % image.width(), i / image.width());
@@ -214,6 +220,6 @@ fn check_sound(image: &Image<PremulRgba>) -> Result<()> {
             "alpha {} in column {x}, row {y}, expected 0 to 1",
             image.pixels()[i].a
         );
-        Err(Error::value("image", what))
+        Err(Error::value(name, what))
     })
 }

@@ -3,7 +3,7 @@
 use crate::document::text;
 use crate::errors::{closed, to_python};
 use crate::lock::locked;
-use crate::sample::{Policy, Sample};
+use crate::sample::{PictureFile, Policy, Sample};
 use crate::scene::{config_of, scene_of};
 use crate::work::{self, Stop};
 use petcomp::dataset::{self, DatasetConfig};
@@ -78,7 +78,7 @@ impl Opened {
         let policy = Policy {
             classes: labels.obstructed.classes(&pipeline.library().classes)?,
             obstructed: labels.obstructed,
-            extent: labels.yolo.boxes,
+            extent: labels.extent(),
         };
         Ok(Self { pipeline, policy })
     }
@@ -153,7 +153,9 @@ impl Pipeline {
     fn sample(&self, py: Python<'_>, seed: u64, k: u64) -> PyResult<Sample> {
         let opened = self.opened()?;
         let sample = opened.run(py, move |pipeline| pipeline.sample(seed, k))?;
-        Ok(Sample::new(sample, opened.policy))
+        let pictures = opened.pipeline.config().pictures.clone();
+        let file = PictureFile { pictures, seed, k };
+        Ok(Sample::of_file(sample, opened.policy, file))
     }
 
     /// Finds out what is unknown in a scene, renders it and labels it.

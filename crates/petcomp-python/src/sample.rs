@@ -4,12 +4,13 @@ use crate::arrays::{Given, matte_of, to_array};
 use crate::document::text;
 use crate::errors::{internal, to_python, wrong_value};
 use crate::lock::locked;
+use crate::picture::check_sound;
 use crate::work;
 use numpy::ndarray::Array2;
 use numpy::{PyArray2, PyArrayDyn};
-use petcomp::dataset::{self, Extent, LabelledObject, Obstructed, Provenance};
+use petcomp::dataset::{self, Extent, LabelledObject, Obstructed, Pictures, Provenance};
 use petcomp::label::{Labels, ObjectLabel, RleMask};
-use petcomp::{Coverage, DeepImage, Image, ObjectId, PremulRgba, Srgb8, color, composite};
+use petcomp::{Coverage, DeepImage, Image, ObjectId, PremulRgba, Srgb8, composite};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex};
@@ -30,6 +31,21 @@ impl Policy {
     }
 }
 
+/// The file that a dataset has of a sample; by default one without loss, as of a picture without number.
+#[derive(Default)]
+pub(crate) struct PictureFile {
+    pub(crate) pictures: Pictures,
+    pub(crate) seed: u64,
+    pub(crate) k: u64,
+}
+
+impl PictureFile {
+    /// What whoever reads it sees.
+    fn shown(&self, frame: &Image<PremulRgba>) -> petcomp::Result<Image<Srgb8>> {
+        self.pictures.shown(frame, self.seed, self.k)
+    }
+}
+
 /// A picture and its labels.
 #[pyclass(frozen, module = "petcomp._petcomp")]
 pub(crate) struct Sample {
@@ -44,6 +60,7 @@ struct Facts {
     labels: Labels,
     provenance: Option<Provenance>,
     policy: Policy,
+    file: PictureFile,
 }
 
 /// The picture, until it is moved into an array, and what is made from it.
@@ -55,6 +72,10 @@ struct Frame {
 
 impl Sample {
     pub(crate) fn new(sample: dataset::Sample, policy: Policy) -> Self {
+        Self::of_file(sample, policy, PictureFile::default())
+    }
+
+    pub(crate) fn of_file(sample: dataset::Sample, policy: Policy, file: PictureFile) -> Self {
         let (width, height) = sample.frame.size();
         Self {
             facts: Arc::new(Facts {
@@ -63,6 +84,7 @@ impl Sample {
                 labels: sample.labels,
                 provenance: sample.provenance,
                 policy,
+                file,
             }),
             frame: Mutex::new(Frame {
                 linear: Some(Arc::new(sample.frame)),
@@ -100,16 +122,13 @@ impl Sample {
                 drop(frame);
                 let pixels = Given::from_argument("image_linear", &array)?;
                 let pixels = pixels.decoded("image_linear").map_err(to_python)?;
-                Ok(pixels.into_premul())
+                let pixels = pixels.into_premul();
+                check_sound("image_linear", &pixels).map_err(to_python)?;
+                Ok(pixels)
             }
             (None, None) => Err(internal("a sample without a picture")),
         }
     }
-}
-
-/// As a display shows it, on black.
-fn displayed(frame: &Image<PremulRgba>) -> Image<Srgb8> {
-    color::to_srgb8(&frame.map(PremulRgba::color))
 }
 
 impl Facts {
@@ -183,6 +202,7 @@ impl Sample {
         };
         let sample = work::run(py, move || {
             let frame = image.decoded("image")?.into_premul();
+            check_sound("image", &frame)?;
             let labels = labels_of(frame.size(), &masks, &object_classes)?;
             Ok(dataset::Sample::new(frame, labels))
         })?;
@@ -204,7 +224,8 @@ impl Sample {
             frame.linear.clone()
         };
         let linear = linear.ok_or_else(|| internal("a sample without a picture"))?;
-        let shown = work::run(py, move || Ok(displayed(&linear)))?;
+        let facts = self.facts.clone();
+        let shown = work::run(py, move || facts.file.shown(&linear))?;
         let array = to_array::<Srgb8, u8>(py, shown)?.unbind();
         let mut frame = locked(&self.frame);
         Ok(frame.shown.get_or_insert(array).clone_ref(py))

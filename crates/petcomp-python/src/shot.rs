@@ -92,7 +92,7 @@ impl Settings {
         Ok(Policy {
             classes: obstructed.classes(&self.classes)?,
             obstructed,
-            extent: self.labels.yolo.boxes,
+            extent: self.labels.extent(),
         })
     }
 

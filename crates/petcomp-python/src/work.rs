@@ -45,6 +45,12 @@ pub(crate) fn set_threads(count: usize) -> PyResult<()> {
     Ok(())
 }
 
+/// Lets this process keep its share of cut-outs and photos in memory, where so many do the same.
+#[pyfunction]
+pub(crate) fn share_memory(processes: usize) {
+    petcomp::share_memory(processes);
+}
+
 /// Flags that no job reads any more.
 static IDLE_FLAGS: Mutex<Vec<&'static AtomicBool>> = Mutex::new(Vec::new());
 

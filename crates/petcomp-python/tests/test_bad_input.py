@@ -180,6 +180,18 @@ def test_a_shot_that_cannot_be_is_refused():
             petcomp.render(shot)
 
 
+def test_alpha_that_cannot_be_is_refused(tmp_path):
+    image = np.full((4, 4, 4), 0.5, np.float32)
+    image[1, 2, 3] = 2
+    with pytest.raises(errors.InvalidValueError, match="^image: alpha 2 in column 2, row 1, expected 0 to 1"):
+        petcomp.Sample.from_masks(image, [], [], ["a"])
+    image[1, 2, 3] = 1
+    sample = petcomp.Sample.from_masks(image, [], [], ["a"])
+    sample.image_linear[3, 0, 3] = -1
+    with pytest.raises(errors.InvalidValueError, match="^image_linear: alpha -1 in column 0, row 3"):
+        petcomp.generate(lambda k: sample, 1, tmp_path / "set", classes=["a"])
+
+
 def test_a_texture_seen_edge_on_or_from_behind_is_fine():
     camera = petcomp.Camera.looking_down(1.0, 80.0, [64, 48])
     film = np.full((4, 4, 4), 0.5, np.float32)

@@ -5,6 +5,7 @@ import logging
 import multiprocessing
 import os
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
@@ -26,6 +27,23 @@ def test_a_fork_makes_the_same_picture(recipe):
     with context.Pool(2) as pool:
         for image in pool.starmap(picture_of, [(recipe, 1)] * 4):
             assert (image == want).all()
+
+
+def test_a_fork_does_not_wait_for_a_fall_of_its_parent(recipe):
+    belt = {"direction_deg": 0, "exposure_s": 0.004, "frame_rate": 15, "frames": 10, "speed": [0.3, 0.6]}
+    pipeline = petcomp.Pipeline(recipe, set={"scene.belt": belt, "scene.objects": 60, "scene.collider": "hull"})
+    falling = threading.Thread(target=pipeline.sample, args=(0,))
+    falling.start()
+    time.sleep(0.1)
+    assert falling.is_alive()
+    # The same sequence, in a process without the thread that makes it.
+    child = multiprocessing.get_context("fork").Process(target=pipeline.sample, args=(1,))
+    child.start()
+    falling.join()
+    child.join(60)
+    hangs = child.is_alive()
+    child.kill()
+    assert not hangs and child.exitcode == 0
 
 
 def test_a_spawned_process_makes_the_same_picture(recipe):
@@ -95,6 +113,24 @@ def test_one_sample_in_many_threads(recipe):
         shown = list(pool.map(lambda i: native.image_linear() if i % 2 else native.image(), range(64)))
     assert all(image is shown[0] for image in shown[::2])
     assert all(image is shown[1] for image in shown[1::2])
+
+
+def test_many_processes_keep_their_share_in_memory(world, recipe, tmp_path):
+    def second_picture(processes):
+        assets = tmp_path / str(processes)
+        shutil.copytree(world / "assets", assets)
+        pipeline = petcomp.Pipeline(recipe, set={"assets": str(assets), "scene.objects": 10})
+        petcomp._petcomp.share_memory(processes)
+        try:
+            assert len({item["asset"] for item in pipeline[0].scene["objects"]}) == 2
+            shutil.rmtree(assets)
+            return pipeline[0]
+        finally:
+            petcomp._petcomp.share_memory(1)
+
+    assert second_picture(1).size == (160, 120)
+    with pytest.raises(petcomp.errors.FileError):
+        second_picture(2**60)
 
 
 def test_the_interpreter_goes_on_beside_the_work(recipe):

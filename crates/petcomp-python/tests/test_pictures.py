@@ -83,6 +83,15 @@ def test_codes_are_decoded_as_files_are(tmp_path):
     assert (screens[0] == screens[1]).all()
 
 
+def test_an_exr_loses_nothing(tmp_path):
+    random = np.random.default_rng(0)
+    for channels in (3, 4):
+        light = random.uniform(0, 1, (5, 6, channels)).astype(np.float32)
+        light[..., :3] *= 1e5
+        petcomp.io.write(tmp_path / "a.EXR", light)
+        assert (petcomp.io.read(tmp_path / "a.EXR", alpha=channels == 4) == light).all()
+
+
 def test_a_plate_of_one_colour_is_that_colour(photo):
     plate = np.broadcast_to(np.array(GREEN, np.float32), photo.shape)
     assert np.allclose(

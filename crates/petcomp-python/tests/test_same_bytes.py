@@ -69,6 +69,27 @@ def test_labels_are_the_programs(recipe, written):
         assert ours == set(rows)
 
 
+def test_a_sample_is_the_programs_jpeg(recipe, tmp_path):
+    changes = {"format": "jpg", "jpeg_quality": [20, 60], "jpeg_chroma": ["4:2:0", "4:4:4"]}
+    lossy = petcomp.Pipeline(recipe, seed=5, set={f"pictures.{key}": value for key, value in changes.items()})
+    petcomp.generate(lossy, 2, tmp_path / "set")
+    for k in range(2):
+        sample, whole = lossy[k], petcomp.Pipeline(recipe, seed=5)[k]
+        petcomp.io.write(tmp_path / "own.png", sample.image)
+        path = next(tmp_path.glob(f"set/images/*/{k:06}.jpg"))
+        assert (petcomp.io.read(tmp_path / "own.png") == petcomp.io.read(path)).all()
+        assert (sample.image != whole.image).any()
+        assert (sample.image_linear == whole.image_linear).all()
+
+
+def test_boxes_are_those_of_the_layout_that_is_written(recipe):
+    changes = {"labels.formats": ["coco"], "labels.coco.boxes": "visible", "labels.obstructed": "keep"}
+    sample = petcomp.Pipeline(recipe, seed=5, set={**changes, "scene.objects": 10})[0]
+    objects = [o for o in sample.labels["objects"] if o["id"] in sample.object_ids]
+    visible, amodal = ([list(o[name].values()) for o in objects] for name in ("visible_box", "amodal_box"))
+    assert sample.boxes.tolist() == visible != amodal
+
+
 def test_masks_boxes_and_depth_agree(recipe):
     sample = petcomp.Pipeline(recipe, seed=5)[1]
     masks = sample.mask_arrays()

@@ -1,5 +1,6 @@
 """Training loops get the program's samples, from whichever worker."""
 
+import copyreg
 import hashlib
 
 import petcomp
@@ -37,6 +38,18 @@ def test_workers_make_the_same_samples(recipe, context):
     )
     assert list(loader) == want
     assert list(loader) == want, "a second epoch"
+
+
+def test_workers_share_the_memory_for_cut_outs(recipe, monkeypatch):
+    data, shares = dataset(recipe, transform=digest), []
+    monkeypatch.setattr(petcomp._petcomp, "share_memory", shares.append)
+    monkeypatch.setattr(torch.utils.data, "get_worker_info", lambda: type("Worker", (), {"num_workers": 3}))
+    try:
+        assert data[0] != data[1]
+    finally:
+        petcomp.set_threads(0)
+        copyreg.dispatch_table.pop(petcomp.Sample)
+    assert shares == [3]
 
 
 def test_a_sample_stays_in_its_worker(recipe):

@@ -68,7 +68,7 @@ impl FallPlan<'_> {
     /// Box of each label, in shares of the picture.
     fn boxes(&self, labels: &Labels) -> Vec<[f64; 4]> {
         let config = &self.pipeline.config().labels;
-        let extent = config.yolo.boxes;
+        let extent = config.extent();
         let labelled = config.obstructed.labelled(labels, 0, &[extent]).into_iter();
         labelled
             .filter(|label| !label.ignored)

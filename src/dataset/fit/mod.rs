@@ -242,7 +242,7 @@ fn plain_pictures(config: &DatasetConfig) -> DatasetConfig {
         labels: LabelConfig {
             formats: vec![Format::Yolo],
             yolo: Yolo {
-                boxes: config.labels.yolo.boxes,
+                boxes: config.labels.extent(),
                 ..Yolo::default()
             },
             ..config.labels.clone()

@@ -386,19 +386,8 @@ mod tests {
             x1: i as f64 + 2.0,
             y1: 2.0,
         };
-        let found = |i: usize| Detection {
-            class: 0,
-            bbox: at(i),
-            confidence: 0.3 + (i % 7) as f64 / 10.0,
-        };
-        let truth = (0..300)
-            .map(|i| GroundTruth {
-                class: 0,
-                bbox: at(i),
-                area: 4.0,
-                crowd: false,
-            })
-            .collect();
+        let found = |i: usize| Detection::new(0, at(i), 0.3 + (i % 7) as f64 / 10.0);
+        let truth = (0..300).map(|i| GroundTruth::new(0, at(i))).collect();
         let sheet = EvalImage {
             image: "a".into(),
             truth,

@@ -607,22 +607,13 @@ mod tests {
             x1: 50.0,
             y1: 40.0,
         };
-        let truth = GroundTruth {
-            class: 0,
-            bbox,
-            area: 2000.0,
-            crowd: false,
-        };
+        let truth = GroundTruth::new(0, bbox);
         let sheet = |image: &str, found: &[f64]| EvalImage {
             image: image.into(),
             truth: vec![truth],
             found: found
                 .iter()
-                .map(|&confidence| Detection {
-                    class: 0,
-                    bbox,
-                    confidence,
-                })
+                .map(|&confidence| Detection::new(0, bbox, confidence))
                 .collect(),
         };
         Run {

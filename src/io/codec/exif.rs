@@ -1,7 +1,9 @@
-//! What the camera wrote beside the pixels: which way up, and how wide the lens was.
+//! What the camera wrote beside the pixels: which way up, how wide the lens was, and in which
+//! colours.
 
 use super::orient::Orientation;
-use exif::{Exif, In, Tag, Value};
+use super::profile::ColorDescription;
+use exif::{Error, Exif, In, Tag, Value};
 use std::io::{BufRead, Seek};
 
 /// Diagonal of 36 mm x 24 mm film, which equivalents of focal lengths refer to, millimetres.
@@ -11,17 +13,58 @@ const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
 const SHAPE_TOLERANCE: f64 = 0.01;
 /// The same for sizes: no more than the middle of a lens is uncertain anyway.
 const SIZE_TOLERANCE: f64 = 0.005;
+/// In the names of programs that state the size which they made as the one that was taken; cameras
+/// name their firmware in the same place.
+const EDITORS: [&str; 20] = [
+    "acdsee",
+    "adobe",
+    "affinity",
+    "capture one",
+    "darktable",
+    "digikam",
+    "dxo",
+    "faststone",
+    "gimp",
+    "imagemagick",
+    "irfanview",
+    "lightroom",
+    "luminar",
+    "paint",
+    "photo",
+    "picasa",
+    "pixelmator",
+    "rawtherapee",
+    "snapseed",
+    "xnview",
+];
+/// Directories that a file may point to; cameras have three, and pixels may look like some.
+const MOST_POINTERS: usize = 8;
+/// What the reader says of notes that begin as none do.
+const NO_NOTES: [&str; 3] = [
+    "Truncated TIFF header",
+    "Invalid TIFF byte order",
+    "Invalid forty two",
+];
 
 /// The part of the EXIF data that means something here.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CameraNotes {
     pub(crate) orientation: Orientation,
     /// Focal length that would give the same view on 36 x 24 mm film, millimetres.
     pub(crate) focal_35mm: Option<f64>,
+    /// It is reckoned from the resolution of the sensor, which is wrong in a picture that was
+    /// resized.
+    pub(crate) focal_by_sensor: bool,
     /// The middle of the picture was enlarged.
     pub(crate) digital_zoom: bool,
     /// Size of the picture as it was taken, before anybody turned it.
     pub(crate) size: Option<[f64; 2]>,
+    /// By a program that may have cut the picture and stated its new size.
+    pub(crate) edited: bool,
+    /// Of a file without a colour profile; none for sRGB.
+    pub(crate) color: Option<ColorDescription>,
+    /// There are notes, and none of them can be read.
+    pub(crate) unreadable: bool,
 }
 
 impl Default for CameraNotes {
@@ -29,18 +72,47 @@ impl Default for CameraNotes {
         Self {
             orientation: Orientation(1),
             focal_35mm: None,
+            focal_by_sensor: false,
             digital_zoom: false,
             size: None,
+            edited: false,
+            color: None,
+            unreadable: false,
         }
     }
 }
 
 impl CameraNotes {
-    /// The notes in a JPEG, TIFF, PNG or HEIF file. A photo without notes, or with damaged ones, is as
-    /// good as another.
+    /// The notes in a JPEG, TIFF, PNG or HEIF file. A photo without notes is as good as another, and
+    /// a damaged note leaves the others.
     pub(crate) fn read(mut file: impl BufRead + Seek) -> Self {
-        let exif = read_exif(&mut file);
-        exif.map_or_else(Self::default, |exif| Self::from_exif(&exif))
+        // The reader follows every pointer, in circles too: thousands of them fill any memory.
+        if count_pointers(&mut file).is_ok_and(|count| count > MOST_POINTERS) {
+            return Self {
+                unreadable: true,
+                ..Self::default()
+            };
+        }
+        let mut reader = exif::Reader::new();
+        let exif = reader
+            .continue_on_error(true)
+            .read_from_container(&mut file);
+        match exif {
+            Ok(exif) => Self::from_exif(&exif),
+            Err(Error::PartialResult(part)) => Self::from_part(&part.into_inner().0),
+            Err(e) => Self {
+                unreadable: are_no_notes(&e),
+                ..Self::default()
+            },
+        }
+    }
+
+    /// What is left of damaged notes.
+    fn from_part(exif: &Exif) -> Self {
+        Self {
+            unreadable: exif.fields().next().is_none(),
+            ..Self::from_exif(exif)
+        }
     }
 
     /// The same of a picture that stands upright already.
@@ -53,13 +125,19 @@ impl CameraNotes {
 
     fn from_exif(exif: &Exif) -> Self {
         let orientation = integer(exif, Tag::Orientation).and_then(|v| u8::try_from(v).ok());
-        let size = noted_size(exif);
+        let (size, edited) = (noted_size(exif), is_edited(exif));
+        let by_camera = positive(exif, Tag::FocalLengthIn35mmFilm);
+        let taken = size.filter(|_| !edited && by_camera.is_none());
+        let by_sensor = taken.and_then(|size| focal_35mm_by_sensor(exif, size));
         Self {
             orientation: Orientation(orientation.unwrap_or(1)),
-            focal_35mm: positive(exif, Tag::FocalLengthIn35mmFilm)
-                .or_else(|| focal_35mm_by_sensor(exif, size?)),
+            focal_35mm: by_camera.or(by_sensor),
+            focal_by_sensor: by_sensor.is_some(),
             digital_zoom: has_digital_zoom(exif),
             size,
+            edited,
+            color: noted_color(exif),
+            unreadable: false,
         }
     }
 
@@ -67,7 +145,7 @@ impl CameraNotes {
     /// nothing was cut away.
     pub(crate) fn has_same_size(&self, stored: [usize; 2]) -> bool {
         let stored = longer_first(stored.map(|s| s as f64));
-        let taken = self.size.map(longer_first);
+        let taken = self.size.filter(|_| !self.edited).map(longer_first);
         taken.is_some_and(|taken| is_multiple(taken, stored))
     }
 
@@ -89,8 +167,57 @@ fn is_close(side: f64, expected: f64) -> bool {
     (side / expected - 1.0).abs() <= SIZE_TOLERANCE
 }
 
-fn read_exif(file: &mut (impl BufRead + Seek)) -> Option<Exif> {
-    exif::Reader::new().read_from_container(file).ok()
+/// Places in a file that look like a pointer to a directory; the file is at its start again then.
+fn count_pointers(file: &mut (impl BufRead + Seek)) -> std::io::Result<usize> {
+    let (mut last, mut count) = ([0; 4], 0);
+    loop {
+        let bytes = file.fill_buf()?;
+        for &byte in bytes {
+            last = [last[1], last[2], last[3], byte];
+            count += usize::from(is_pointer(last));
+        }
+        match bytes.len() {
+            0 => break,
+            length => file.consume(length),
+        }
+    }
+    file.rewind()?;
+    Ok(count)
+}
+
+/// An entry begins so, in either byte order, that points to a directory: of the camera, of its
+/// position, or of what it shares with others; as any integer.
+fn is_pointer([a, b, c, d]: [u8; 4]) -> bool {
+    [[a, b, c, d], [b, a, d, c]].into_iter().any(|entry| {
+        matches!(
+            entry,
+            [0x87, 0x69, 0, 1..=4] | [0x88, 0x25, 0, 1..=4] | [0xa0, 0x05, 0, 1..=4]
+        )
+    })
+}
+
+fn are_no_notes(e: &Error) -> bool {
+    matches!(e, Error::InvalidFormat(what) if NO_NOTES.contains(what))
+}
+
+/// The last program that wrote the file is one that edits pictures.
+fn is_edited(exif: &Exif) -> bool {
+    let program = text(exif, Tag::Software).unwrap_or_default().to_lowercase();
+    EDITORS.iter().any(|editor| program.contains(editor))
+}
+
+/// What a camera says in place of a colour profile: Adobe RGB by the index of its files (DCF 2.0,
+/// 4.2), or that it is another space than sRGB.
+fn noted_color(exif: &Exif) -> Option<ColorDescription> {
+    const SRGB: u32 = 1;
+    const UNCALIBRATED: u32 = 65_535;
+    let index = text(exif, Tag::InteroperabilityIndex);
+    match integer(exif, Tag::ColorSpace) {
+        Some(SRGB) => None,
+        _ if index.as_deref() == Some("R03") => Some(ColorDescription::AdobeRgb),
+        Some(UNCALIBRATED) => Some(ColorDescription::Uncalibrated),
+        _ => None,
+    }
 }
 
 fn noted_size(exif: &Exif) -> Option<[f64; 2]> {
@@ -136,6 +263,13 @@ fn integer(exif: &Exif, tag: Tag) -> Option<u32> {
     exif.get_field(tag, In::PRIMARY)?.value.get_uint(0)
 }
 
+fn text(exif: &Exif, tag: Tag) -> Option<String> {
+    match &exif.get_field(tag, In::PRIMARY)?.value {
+        Value::Ascii(parts) => Some(String::from_utf8_lossy(&parts.concat()).into_owned()),
+        _ => None,
+    }
+}
+
 /// An integer above 0.
 fn positive(exif: &Exif, tag: Tag) -> Option<f64> {
     integer(exif, tag).filter(|&v| v > 0).map(f64::from)
@@ -162,12 +296,67 @@ mod tests {
     use std::io::Cursor;
 
     #[test]
-    fn damaged_notes_are_no_notes() {
-        assert_eq!(
-            CameraNotes::read(Cursor::new(b"\xff\xd8\xff\xe1\x00\x08Exif\0\0II")),
-            CameraNotes::default()
-        );
-        assert_eq!(CameraNotes::read(Cursor::new(b"")), CameraNotes::default());
+    fn what_is_left_of_damaged_notes_is_told_from_none() {
+        let none = CameraNotes::default();
+        let unreadable = CameraNotes {
+            unreadable: true,
+            ..none.clone()
+        };
+        for (file, expected) in [
+            (&b"\xff\xd8\xff\xe1\x00\x0aExif\0\0II"[..], &unreadable),
+            (
+                b"\xff\xd8\xff\xe1\x00\x10Exif\0\0II*\0\xff\xff\xff\xff",
+                &unreadable,
+            ),
+            (b"\xff\xd8\xff\xd9", &none),
+            (b"\xff\xd8\xff\xe1\x00\x08", &none),
+            (b"", &none),
+        ] {
+            assert_eq!(CameraNotes::read(Cursor::new(file)), *expected, "{file:?}");
+        }
+    }
+
+    /// As piexif writes it: the orientation 6, and a directory of a position that no offset of a
+    /// further one ends, but its own data do.
+    fn unended() -> Vec<u8> {
+        let mut file = b"MM\0*\0\0\0\x08\0\x02".to_vec();
+        file.extend(b"\x01\x12\0\x03\0\0\0\x01\0\x06\0\0");
+        file.extend(b"\x88\x25\0\x04\0\0\0\x01\0\0\0\x26\0\0\0\0\0\x02");
+        file.extend(b"\0\x01\0\x02\0\0\0\x02N\0\0\0\0\x02\0\x05\0\0\0\x03\0\0\0\x40");
+        file.extend([0, 0, 0, 1].repeat(6));
+        file
+    }
+
+    #[test]
+    fn a_damaged_note_leaves_the_others() {
+        // Where the number begins that says where the value of the latitude, or the next directory,
+        // is.
+        const LATITUDE: usize = 60;
+        const NEXT: usize = 34;
+        let with = |at: usize, offset: u32| {
+            let mut file = unended();
+            file[at..at + 4].copy_from_slice(&offset.to_be_bytes());
+            file
+        };
+        for file in [unended(), with(LATITUDE, 60_000), with(NEXT, 60_000)] {
+            let notes = CameraNotes::read(Cursor::new(file));
+            assert_eq!(
+                (notes.orientation, notes.unreadable),
+                (Orientation(6), false)
+            );
+        }
+    }
+
+    /// A directory whose entries point to itself would be read a thousand times a thousand times.
+    #[test]
+    fn pointers_in_circles_are_not_followed() {
+        let mut file = b"MM\0*\0\0\0\x08".to_vec();
+        file.extend(2001_u16.to_be_bytes());
+        file.extend(b"\x01\x12\0\x03\0\0\0\x01\0\x06\0\0");
+        file.extend(b"\x87\x69\0\x04\0\0\0\x01\0\0\0\x08".repeat(1000));
+        file.extend(b"\xa0\x05\0\x04\0\0\0\x01\0\0\0\x08".repeat(1000));
+        file.extend([0; 4]);
+        assert!(CameraNotes::read(Cursor::new(file)).unreadable);
     }
 
     fn notes(fields: &[(Tag, Value)]) -> CameraNotes {
@@ -191,13 +380,17 @@ mod tests {
     }
 
     /// A 22.3 mm sensor of 3888 x 2592 pixels (Canon EOS 400D), with a lens of 50 mm.
-    fn reflex(per_unit: Value, unit: Option<u16>) -> CameraNotes {
-        let mut fields = vec![
+    fn reflex_fields(per_unit: Value) -> Vec<(Tag, Value)> {
+        vec![
             (Tag::FocalLength, rational(50, 1)),
             (Tag::FocalPlaneXResolution, per_unit),
             (Tag::PixelXDimension, Value::Long(vec![3888])),
             (Tag::PixelYDimension, Value::Long(vec![2592])),
-        ];
+        ]
+    }
+
+    fn reflex(per_unit: Value, unit: Option<u16>) -> CameraNotes {
+        let mut fields = reflex_fields(per_unit);
         fields.extend(unit.map(|u| (Tag::FocalPlaneResolutionUnit, Value::Short(vec![u]))));
         notes(&fields)
     }
@@ -218,6 +411,38 @@ mod tests {
         assert!((by_centimetre - 81.0).abs() < 0.2, "{by_centimetre}");
         assert_eq!(reflex(rational(1, 0), None).focal_35mm, None);
         assert_eq!(reflex(rational(0, 1), None).focal_35mm, None);
+    }
+
+    #[test]
+    fn a_size_that_an_editor_states_says_nothing() {
+        let written_by = |program: &str| {
+            let mut fields = reflex_fields(rational(3_888_000, 875));
+            let program = Value::Ascii(vec![program.into()]);
+            fields.push((Tag::Software, program));
+            notes(&fields)
+        };
+        let firmware = written_by("Ver.1.00");
+        assert!(firmware.focal_35mm.is_some() && firmware.focal_by_sensor);
+        assert!(firmware.has_same_size([3888, 2592]));
+        let edited = written_by("Adobe Photoshop Lightroom 6.0 (Windows)");
+        assert!(edited.focal_35mm.is_none() && !edited.focal_by_sensor);
+        assert!(!edited.has_same_size([3888, 2592]) && edited.has_other_shape([1000, 750]));
+    }
+
+    #[test]
+    fn a_camera_s_word_for_adobe_rgb_is_its_index() {
+        let color = |space: u16, index: &str| {
+            let index = Value::Ascii(vec![index.into()]);
+            let space = Value::Short(vec![space]);
+            notes(&[
+                (Tag::ColorSpace, space),
+                (Tag::InteroperabilityIndex, index),
+            ])
+            .color
+        };
+        assert_eq!(color(65_535, "R03"), Some(ColorDescription::AdobeRgb));
+        assert_eq!(color(65_535, "R98"), Some(ColorDescription::Uncalibrated));
+        assert_eq!((color(1, "R03"), color(1, "R98")), (None, None));
     }
 
     #[test]

@@ -293,13 +293,11 @@ impl Chroma {
     }
 }
 
-/// A picture as it comes back from a file of a quality, 1 to 100; nothing for one without pixels.
-pub fn through_jpeg(image: &Image<Srgb8>, quality: u8) -> Option<Image<Srgb8>> {
+/// A picture as it comes back from a file of a quality, 1 to 100; nothing for one that no file holds,
+/// as one without pixels.
+pub fn through_jpeg(image: &Image<Srgb8>, quality: u8, chroma: Chroma) -> Option<Image<Srgb8>> {
     let codes = bytemuck::cast_slice(image.pixels());
-    let coding = JpegCoding {
-        quality,
-        chroma: Chroma::Full,
-    };
+    let coding = JpegCoding { quality, chroma };
     let file = encode(image.size(), codes, coding, &[]).ok()?;
     let raster = decode(&file, &Limits::default()).ok()?;
     let Samples::U8(codes) = raster.samples else {

@@ -1,5 +1,5 @@
-//! How files describe their display codes: colour profiles (ICC), and the curve and primaries that
-//! a PNG names.
+//! How files describe their display codes: colour profiles (ICC), the curve and primaries that a
+//! PNG names, and a camera's word in EXIF.
 //!
 //! Profiles of three primaries and three curves (sRGB, Display P3, Adobe RGB, ProPhoto, ...) and of
 //! one grey curve are applied; others are named in a warning and the codes treated as sRGB.
@@ -24,6 +24,8 @@ const LARGEST_CODE: f32 = 65_535.0;
 const SRGB_TOLERANCE: f32 = 2e-3;
 /// The exponent of screens: files name it that mean sRGB, in steps of a hundredth and coarser.
 const SCREEN_EXPONENTS: std::ops::RangeInclusive<f64> = 2.16..=2.24;
+/// Adobe RGB (1998), 4.3.4.2.
+const ADOBE_EXPONENT: f64 = 563.0 / 256.0;
 /// Chromaticities that differ by less are the same, written with fewer digits.
 const CHROMATICITY_TOLERANCE: f64 = 1e-3;
 /// A triangle of primaries with less area (in x, y) holds no colours; Rec. 709 has 0.11.
@@ -41,6 +43,10 @@ pub(crate) enum ColorDescription {
     },
     /// Primaries and transfer function by their numbers in ITU-T H.273.
     CodePoints(u8, u8),
+    /// Adobe RGB (1998), by name.
+    AdobeRgb,
+    /// Not sRGB, and nothing says what.
+    Uncalibrated,
 }
 
 /// What code points of ITU-T H.273 stand for, of those that are applied: an exponent or the curve of
@@ -85,6 +91,13 @@ impl DisplayProfile {
                     .ok_or_else(|| format!("code points {primaries}/{transfer} for its colours"))?;
                 Self::from_curve(exponent, Some(space))
             }
+            ColorDescription::AdobeRgb => {
+                let matrix = to_rec709(&RgbSpace::ADOBE_RGB)?;
+                Self::from_power(Some(ADOBE_EXPONENT), matrix).map(Some)
+            }
+            ColorDescription::Uncalibrated => {
+                Err("colours other than sRGB by its EXIF data, and no colour profile".into())
+            }
         }
     }
 
@@ -97,11 +110,16 @@ impl DisplayProfile {
         if exponent.is_none() && matrix.is_none() {
             return Ok(None);
         }
+        Self::from_power(exponent, matrix).map(Some)
+    }
+
+    /// The curve of an exponent, or sRGB's, and the matrix of primaries other than Rec. 709.
+    fn from_power(exponent: Option<f64>, matrix: Option<ColorMatrix>) -> Result<Self, String> {
         let curve = power_or_srgb_table(exponent).ok_or("a gamma that is not a number")?;
-        Ok(Some(Self {
+        Ok(Self {
             to_rec709: matrix.unwrap_or_else(|| Matrix3::identity().into()),
             ..Self::from_grey_curve(&curve)
-        }))
+        })
     }
 
     /// The same curve for red, green and blue of Rec. 709.
@@ -308,10 +326,7 @@ mod tests {
     #[test]
     fn other_primaries_become_rec_709() {
         let p3 = RgbSpace::DISPLAY_P3;
-        let adobe = RgbSpace {
-            primaries: [[0.64, 0.33], [0.21, 0.71], [0.15, 0.06]],
-            white: [0.3127, 0.3290],
-        };
+        let adobe = RgbSpace::ADOBE_RGB;
         fn gamma(v: f64) -> f64 {
             libm::pow(v, 563.0 / 256.0)
         }

@@ -29,6 +29,10 @@ const LOWEST_BIT_FIRST: u16 = 2;
 const LZW_COMPRESSION: u16 = 5;
 /// TIFF 6.0, `PhotometricInterpretation`: codes are indices into a palette.
 const PALETTE_COLOR: u16 = 3;
+/// TIFF 6.0 and its supplements, the same: lightness and two differences of colour.
+const CIE_LAB: u16 = 8;
+const ICC_LAB: u16 = 9;
+const ITU_LAB: u16 = 10;
 /// TIFF 6.0, `NewSubfileType`: a smaller version of another picture. Nikon's and Sony's raw files
 /// begin with one.
 const REDUCED_RESOLUTION: u32 = 1;
@@ -71,7 +75,7 @@ fn open<R: Read + Seek>(
 ) -> Result<OpenedTiff<R>, Refusal> {
     let mut decoder = first_picture(file)?.with_limits(decoder_limits(limits));
     let (width, height) = decoder.dimensions()?;
-    refuse_missing_palette(&mut decoder)?;
+    refuse_misread_colors(&mut decoder)?;
     let (channels, bits) = stored_channels(&mut decoder)?;
     let bytes = u64::from(bits).div_ceil(8);
     limits.check(Demand::new([width, height], channels, bytes, file_bytes))?;
@@ -192,11 +196,23 @@ fn read_integer(file: &mut impl Read, bytes: usize, little: bool) -> std::io::Re
     Ok(u64::from_le_bytes(integer))
 }
 
-/// OpenImageIO, which reads palettes, makes a black picture where there is none.
-fn refuse_missing_palette(decoder: &mut Decoder<impl Read + Seek>) -> Result<(), Refusal> {
-    if decoder.find_tag_unsigned(Tag::PhotometricInterpretation)? != Some(PALETTE_COLOR) {
-        return Ok(());
+/// What OpenImageIO reads in wrong colours: CIELab in another white, and a palette that is not
+/// there as black.
+fn refuse_misread_colors(decoder: &mut Decoder<impl Read + Seek>) -> Result<(), Refusal> {
+    match color_kind(decoder)? {
+        Some(PALETTE_COLOR) => refuse_missing_palette(decoder),
+        Some(CIE_LAB | ICC_LAB | ITU_LAB) => {
+            Err("is a TIFF of CIELab, expected grey or RGB: convert it to RGB first".into())
+        }
+        _ => Ok(()),
     }
+}
+
+fn color_kind(decoder: &mut Decoder<impl Read + Seek>) -> Result<Option<u16>, TiffError> {
+    decoder.find_tag_unsigned(Tag::PhotometricInterpretation)
+}
+
+fn refuse_missing_palette(decoder: &mut Decoder<impl Read + Seek>) -> Result<(), Refusal> {
     let bits = integers(decoder, Tag::BitsPerSample)?.first().copied();
     let colors = bits.and_then(|bits| 1_usize.checked_shl(bits.into()));
     let expected = 3 * colors.unwrap_or(0);
@@ -233,6 +249,22 @@ pub(crate) fn camera_notes(mut file: impl BufRead + Seek) -> CameraNotes {
 #[cfg(feature = "oiio")]
 pub(crate) fn has_associated_alpha(bytes: &[u8]) -> bool {
     first_integer(Cursor::new(bytes), Tag::ExtraSamples) == Some(ASSOCIATED_ALPHA)
+}
+
+/// The entries of the palette are codes times 256, as Pillow writes them, in place of 257.
+#[cfg(feature = "oiio")]
+pub(crate) fn has_shifted_palette(bytes: &[u8]) -> bool {
+    let palette = palette(bytes).unwrap_or_default();
+    !palette.is_empty() && palette.iter().all(|entry| entry.is_multiple_of(256))
+}
+
+/// The entries of a picture whose codes are indices.
+#[cfg(feature = "oiio")]
+fn palette(bytes: &[u8]) -> Option<Vec<u16>> {
+    let mut decoder = Decoder::new(Cursor::new(bytes)).ok()?;
+    let kind = color_kind(&mut decoder).ok()?;
+    kind.filter(|&kind| kind == PALETTE_COLOR)?;
+    integers(&mut decoder, Tag::ColorMap).ok()
 }
 
 /// The first number of a tag of the first picture.
@@ -658,6 +690,17 @@ mod tests {
         ] {
             let told = decoded(raw).err().unwrap().to_string();
             assert!(told.starts_with("is a camera's raw file"), "{told}");
+        }
+    }
+
+    #[test]
+    fn lightness_and_differences_of_colour_are_refused() {
+        for kind in [CIE_LAB, ICC_LAB, ITU_LAB] {
+            let file = with_tag(Tag::PhotometricInterpretation, kind);
+            let refusal = decode(&file, &Limits::default()).err().unwrap();
+            assert!(matches!(refusal, Refusal::Broken(_)), "{refusal}");
+            let told = refusal.to_string();
+            assert!(told.ends_with("convert it to RGB first"), "{told}");
         }
     }
 

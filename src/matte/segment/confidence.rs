@@ -11,10 +11,10 @@ pub struct Confidence {
     /// Mean overlap (intersection over union) with what searches at other depths found, 0 to 1.
     pub agreement: f64,
     /// How far a side of the hull's box moves when edges must be stronger, or at another depth:
-    /// pixels of the picture that was searched.
+    /// pixels of the picture of `working_size`.
     pub drift_px: f64,
-    /// How far a side of the hull's box moves when edges may be weaker: pixels of the picture that
-    /// was searched.
+    /// How far a side of the hull's box moves when edges may be weaker: pixels of the picture of
+    /// `working_size`.
     #[serde(default)]
     pub faint_px: f64,
     /// How far a side of the hull's box lies beyond that of the outline: pixels of the picture
@@ -56,18 +56,34 @@ impl Confidence {
         self.support * self.agreement
     }
 
-    /// Why it is low; nothing where it is not.
-    pub(super) fn diagnostics(self) -> Vec<Diagnostic> {
+    /// Why it is low; nothing where it is not. Lengths are told in pixels of the photo: so many for
+    /// one of the picture of `working_size`, and for one of the picture that was searched.
+    pub(super) fn diagnostics(self, working: f64, searched: f64) -> Vec<Diagnostic> {
+        let shown = self.in_photo(working, searched);
         let warnings = [
-            (self.agreement < MIN_AGREEMENT).then(|| self.unstable_outline()),
-            (self.support < MIN_SUPPORT).then(|| self.weak_edges()),
-            (self.drift_px > MAX_DRIFT_PX).then(|| self.threshold_sensitive()),
-            (self.faint_px > MAX_FAINT_PX).then(|| self.faint_parts()),
-            (self.stray_px > MAX_STRAY_PX).then(|| self.box_beyond_outline()),
-            (self.blur_px > MAX_BLUR_PX).then(|| self.blurred()),
-            (self.width_px < MIN_WIDTH_PX).then(|| self.small_object()),
+            (self.agreement < MIN_AGREEMENT).then(|| shown.unstable_outline()),
+            (self.support < MIN_SUPPORT).then(|| shown.weak_edges()),
+            (self.drift_px > MAX_DRIFT_PX).then(|| shown.threshold_sensitive()),
+            (self.faint_px > MAX_FAINT_PX).then(|| shown.faint_parts()),
+            (self.stray_px > MAX_STRAY_PX).then(|| shown.box_beyond_outline()),
+            (self.blur_px > MAX_BLUR_PX).then(|| shown.blurred()),
+            (self.width_px < MIN_WIDTH_PX).then(|| shown.small_object(searched.max(1.0))),
         ];
         warnings.into_iter().flatten().collect()
+    }
+
+    /// The same with its lengths in pixels of the photo.
+    fn in_photo(self, working: f64, searched: f64) -> Self {
+        // Blur and width are never in finer pixels than the photo's.
+        let pixel = searched.max(1.0);
+        Self {
+            drift_px: working * self.drift_px,
+            faint_px: working * self.faint_px,
+            stray_px: searched * self.stray_px,
+            blur_px: pixel * self.blur_px,
+            width_px: pixel * self.width_px,
+            ..self
+        }
     }
 
     fn unstable_outline(self) -> Diagnostic {
@@ -130,11 +146,11 @@ impl Confidence {
         )
     }
 
-    fn small_object(self) -> Diagnostic {
+    fn small_object(self, accuracy_px: f64) -> Diagnostic {
         Diagnostic::warning(
             Code::SmallObject,
             format_args!(
-                "the object is only {:.0} px wide, and its outline is accurate to about 1 px; photograph it from closer up",
+                "the object is only {:.0} px wide, and its outline is accurate to about {accuracy_px:.0} px; photograph it from closer up",
                 self.width_px
             ),
         )
@@ -156,9 +172,9 @@ mod tests {
             blur_px: 0.7,
             width_px: 100.0,
         };
-        assert!(sure.diagnostics().is_empty());
+        assert!(sure.diagnostics(1.0, 1.0).is_empty());
         let said = |unsure: Confidence| {
-            let warnings = unsure.diagnostics();
+            let warnings = unsure.diagnostics(1.0, 1.0);
             assert!(warnings.iter().all(Diagnostic::needs_review));
             warnings.iter().map(ToString::to_string).collect::<Vec<_>>()
         };
@@ -218,6 +234,30 @@ mod tests {
                 "{:?}",
                 said(unsure)
             );
+        }
+    }
+
+    #[test]
+    fn lengths_are_told_in_pixels_of_the_photo() {
+        let unsure = Confidence {
+            support: 0.9,
+            agreement: 0.95,
+            drift_px: 7.0,
+            faint_px: 9.0,
+            stray_px: 5.0,
+            blur_px: 2.0,
+            width_px: 12.0,
+        };
+        let told = |working: f64, searched: f64| {
+            let warnings = unsure.diagnostics(working, searched);
+            warnings.iter().map(ToString::to_string).collect::<String>()
+        };
+        let (reduced, enlarged) = (told(4.0, 8.0), told(0.25, 0.25));
+        for expected in ["28 px", "36 px", "40 px", "16.0 px", "96 px", "about 8 px"] {
+            assert!(reduced.contains(expected), "{expected}: {reduced}");
+        }
+        for expected in ["moves 2 px", "1 px beyond", "2.0 px", "12 px", "about 1 px"] {
+            assert!(enlarged.contains(expected), "{expected}: {enlarged}");
         }
     }
 }

@@ -123,6 +123,30 @@ fn a_clipped_screen_is_told_with_its_photo() {
 }
 
 #[test]
+fn exposure_that_differs_between_the_photos_is_told_instead_of_tint() {
+    let told = |screens: &[LinearRgb], gain: f32| {
+        let exposed = |i: usize| if i == 1 { gain } else { 1.0 };
+        let (mut photos, mut plates) = (Vec::new(), Vec::new());
+        for (i, &screen) in screens.iter().enumerate() {
+            let clean = photo(screen, [0.0; 2], 0.002, i as u64);
+            photos.push(clean.map(|p| p.scale(exposed(i))));
+            plates.push(ScreenPlate::even(screen.scale(exposed(i)), SIZE));
+        }
+        let shots: Vec<_> = photos.iter().zip(&plates).collect();
+        let found = triangulate(&shots, &inside(), &TriangulateOptions::default()).unwrap();
+        let codes = found.diagnostics.into_iter().map(|d| d.code);
+        let doubts = [Code::MatteExposureDrift, Code::TintUncertain];
+        codes
+            .filter(|code| doubts.contains(code))
+            .collect::<Vec<_>>()
+    };
+    for screens in [&[GREEN, BLUE][..], &[GREEN, BLUE, RED]] {
+        assert_eq!(told(screens, 0.81), [Code::MatteExposureDrift]);
+        assert!(told(screens, 1.0).is_empty());
+    }
+}
+
+#[test]
 fn three_screens_determine_every_channel() {
     let found = solved(&[GREEN, BLUE, RED], [0.0; 2], 0.003).unwrap();
     assert_eq!(found.determined, [true; 3]);

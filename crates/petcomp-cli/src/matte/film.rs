@@ -48,7 +48,8 @@ pub(crate) struct FilmArgs {
 #[derive(clap::Args)]
 #[command(mut_arg("settings", |arg| arg.help("An option, such as film.max_sigma=0.1")))]
 pub(crate) struct TriangulateArgs {
-    /// Photos of one object that stays where it is, each on another screen
+    /// Photos of one object that stays where it is, each on another screen, with exposure and white
+    /// balance locked
     #[arg(required = true, num_args = 2..)]
     photos: Vec<PathBuf>,
     #[command(flatten)]

@@ -62,6 +62,13 @@ fn both_ways_of_reading_agree_on_every_kind() {
     assert!(wrong.is_empty(), "{wrong:?}");
 }
 
+/// Pillow writes the codes of a palette times 256 into a TIFF.
+#[test]
+fn a_palette_has_the_same_colours_in_every_file() {
+    let codes = |name| codes(&io::read::<StraightRgba>(file(name)).unwrap());
+    assert_eq!(codes("palette.tif"), codes("palette.png"));
+}
+
 /// The picture that was written, in those kinds that lose nothing.
 #[test]
 fn what_was_written_is_what_is_read() {

@@ -21,7 +21,8 @@ class Built:
     photos: int
     #: How many of these cut-outs were there before.
     kept: int
-    #: Lengths of the objects and their standard errors, metres, in the order of the list.
+    #: Lengths of the objects that lie wholly in their photos and their standard errors, metres, in the
+    #: order of the list.
     lengths: list[tuple[float, float]]
     #: Photos that gave no cut-out, and why.
     refused: list[str]

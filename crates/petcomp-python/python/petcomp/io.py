@@ -27,6 +27,7 @@ def write(path: str | os.PathLike[str], image: npt.NDArray[Any]) -> None:
     """A picture to a file whose extension names the format: exr, png, jpg or tif.
 
     ``image`` is height x width x 3 or 4: float32 (scene-linear, premultiplied) or uint8 (sRGB, straight
-    alpha).
+    alpha). An exr holds it scene-linear as 32-bit floats, so that nothing is lost; png and jpg hold sRGB codes
+    of 8 bits, tif of 16, clipped to 0 to 1.
     """
     _petcomp.write_picture(path_of("path", path), image)

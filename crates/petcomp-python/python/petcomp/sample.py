@@ -41,7 +41,7 @@ class Sample:
     ) -> Sample:
         """A picture from anywhere, to be written as a dataset.
 
-        ``image``: height x width x 3 or 4, float32 (scene-linear, premultiplied) or uint8 (sRGB).
+        ``image``: height x width x 3 or 4, float32 (scene-linear, premultiplied, alpha 0 to 1) or uint8 (sRGB).
         ``masks``: one for each object, height x width, bool or float32 (a pixel belongs to the object where
         it is above 0.5). ``object_classes``: its class, a place in ``classes``.
         """
@@ -56,7 +56,11 @@ class Sample:
 
     @cached_property
     def image(self) -> npt.NDArray[np.uint8]:
-        """As a display shows it, on black: height x width x 3, uint8, sRGB; what the program writes."""
+        """As a display shows it, on black: height x width x 3, uint8, sRGB.
+
+        Of ``Pipeline[k]`` as the program's file of it is read: with what a JPEG loses, where the recipe
+        writes those.
+        """
         return self._native.image()
 
     @cached_property

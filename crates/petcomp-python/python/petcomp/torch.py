@@ -10,6 +10,7 @@ from typing import Any
 import torch
 from torch.utils.data import Dataset as _Dataset
 
+from . import _petcomp
 from .errors import ArgumentTypeError
 from .pipeline import Pipeline, _number
 from .sample import Sample
@@ -43,9 +44,9 @@ class Dataset(_Dataset[Any]):
 
     Sample ``k`` is that of ``petcomp dataset generate``, whichever worker makes it, forked or spawned.
     Each worker opens the recipe once and computes with ``threads`` threads (1 where there are workers,
-    which share the processors already). ``transform`` gets the ``Sample``; by default ``to_tensors``, whose
-    target then has ``k`` as its ``image_id``. What leaves a worker must hold no ``Sample``, which stays in the
-    process that made it.
+    which share the processors already, and the memory for cut-outs and photos). ``transform`` gets the
+    ``Sample``; by default ``to_tensors``, whose target then has ``k`` as its ``image_id``. What leaves a worker
+    must hold no ``Sample``, which stays in the process that made it.
     """
 
     def __init__(
@@ -88,9 +89,10 @@ class Dataset(_Dataset[Any]):
         """In a worker, once."""
         from . import set_threads
 
-        process = os.getpid()
-        if torch.utils.data.get_worker_info() is not None and self._worker_process != process:
+        process, worker = os.getpid(), torch.utils.data.get_worker_info()
+        if worker is not None and self._worker_process != process:
             set_threads(self._threads)
+            _petcomp.share_memory(worker.num_workers)
             copyreg.pickle(Sample, _stays)
             self._worker_process = process
 

@@ -155,17 +155,8 @@ fn grid_box(i: usize) -> BBox {
 
 /// Boxes side by side: the first `truths` are true, the first `found` are found.
 fn grid_image(truths: usize, found: usize, confidence: fn(usize) -> f64) -> EvalImage {
-    let truth = (0..truths).map(|i| GroundTruth {
-        class: 0,
-        bbox: grid_box(i),
-        area: 100.0,
-        crowd: false,
-    });
-    let found = (0..found).map(|i| Detection {
-        class: 0,
-        bbox: grid_box(i),
-        confidence: confidence(i),
-    });
+    let truth = (0..truths).map(|i| GroundTruth::new(0, grid_box(i)));
+    let found = (0..found).map(|i| Detection::new(0, grid_box(i), confidence(i)));
     EvalImage {
         image: String::new(),
         truth: truth.collect(),
@@ -176,11 +167,10 @@ fn grid_image(truths: usize, found: usize, confidence: fn(usize) -> f64) -> Eval
 fn image_of_points() -> Vec<EvalImage> {
     let mut image = grid_image(3, 3, equal_confidence);
     for truth in &mut image.truth {
-        truth.bbox = corner_of(truth.bbox);
-        truth.area = 0.0;
+        *truth = GroundTruth::new(0, corner_of(truth.bbox));
     }
     for found in &mut image.found {
-        found.bbox = corner_of(found.bbox);
+        *found = Detection::new(0, corner_of(found.bbox), found.confidence);
     }
     vec![image]
 }

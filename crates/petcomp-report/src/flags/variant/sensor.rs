@@ -2,7 +2,7 @@
 
 use crate::matte::normal;
 use petcomp::color::{decode_srgb8, encode_srgb8, linear_to_srgb, srgb_to_linear};
-use petcomp::io;
+use petcomp::io::{self, Chroma};
 use petcomp::{Image, LinearRgb};
 
 /// A value as a camera of 8 bits stores it.
@@ -22,5 +22,6 @@ pub(super) fn noisy(photo: &Image<LinearRgb>, sigma: f32, seed: u64) -> Image<Li
 
 /// The photo as a JPEG file of a quality holds it; nothing where it cannot be one.
 pub(super) fn jpeg(photo: &Image<LinearRgb>, quality: u8) -> Option<Image<LinearRgb>> {
-    io::through_jpeg(&photo.map(encode_srgb8), quality).map(|codes| codes.map(decode_srgb8))
+    let codes = io::through_jpeg(&photo.map(encode_srgb8), quality, Chroma::Full)?;
+    Some(codes.map(decode_srgb8))
 }

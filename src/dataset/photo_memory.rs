@@ -1,0 +1,41 @@
+//! What of the photos of places is in memory: the plates and masks that pictures showed last.
+
+use crate::image::Image;
+use crate::lru::{LruCache, Shared};
+use crate::pixel::{Coverage, LinearRgb};
+use std::sync::{Arc, Weak};
+
+/// Plates and masks of all places of a recipe, at each size that was asked for.
+#[derive(Debug)]
+pub(crate) struct PhotoMemory {
+    pub(crate) plates: LruCache<Arc<Image<LinearRgb>>>,
+    pub(crate) masks: LruCache<Arc<Image<Coverage>>>,
+}
+
+impl PhotoMemory {
+    /// Room for so many bytes, as many plates as masks, beside what pictures in the making show.
+    pub(crate) fn of_bytes(most_bytes: usize) -> Self {
+        let [plate_px, mask_px] = [size_of::<LinearRgb>(), size_of::<Coverage>()];
+        let pixels = most_bytes / (plate_px + mask_px);
+        Self {
+            plates: LruCache::of_bytes(pixels * plate_px),
+            masks: LruCache::of_bytes(pixels * mask_px),
+        }
+    }
+}
+
+impl<P: Copy> Shared for Arc<Image<P>> {
+    type Weak = Weak<Image<P>>;
+
+    fn bytes(&self) -> usize {
+        size_of_val(self.pixels())
+    }
+
+    fn downgrade(&self) -> Self::Weak {
+        Arc::downgrade(self)
+    }
+
+    fn upgrade(weak: &Self::Weak) -> Option<Self> {
+        weak.upgrade()
+    }
+}

@@ -1,0 +1,155 @@
+//! A screen whose edge is seen, taken for the object.
+
+use super::outline::Outline;
+use super::screen::{is_keyable, strongest_channel};
+use super::screen_corners::{RIM_PX, at_search_size, four_corners, large_hue_regions};
+use super::segment::{SegmentOptions, segment};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::geom::Point2;
+use crate::image::{Image, Roi};
+use crate::pixel::LinearRgb;
+use std::ops::Range;
+
+/// A screen with its surroundings fills at least this share of a photo; a can or a carton that is
+/// green or blue seldom does.
+const MIN_PHOTO_SHARE: f64 = 0.25;
+/// Four corners enclose at least this share of a screen's hull. Of screens that were cut out they
+/// had 0.96 and more, of bottles 0.80 at most.
+const MIN_QUADRANGLE_SHARE: f64 = 0.93;
+/// The hull of what has the screen's hue has at least this share of the hull that was cut out.
+const MIN_HUE_SHARE: f64 = 0.9;
+/// The channel that no screen is strongest in.
+const RED_CHANNEL: usize = 0;
+
+/// The warning that what was found in a photo looks like a whole screen with the object on it.
+///
+/// `hull` is that of what was found, pixels of the photo, clockwise as seen; `background` is the
+/// mean colour around it. Where that is green or blue, it is the screen.
+///
+/// # Method
+/// A screen is a large quadrangle of one green or blue hue, and something lies on it: another
+/// colour, or, of clear plastic, what [`segment`] finds within the screen.
+pub(super) fn screen_edge_seen(
+    photo: &Image<LinearRgb>,
+    hull: &[Point2<f64>],
+    background: LinearRgb,
+    options: &SegmentOptions,
+) -> Option<Diagnostic> {
+    if is_screen_hue(background) || area(hull) < MIN_PHOTO_SHARE * photo.pixels().len() as f64 {
+        return None;
+    }
+    let corners = four_corners(hull)?;
+    let is_screen = area(&corners) >= MIN_QUADRANGLE_SHARE * area(hull)
+        && is_covered_screen(photo, hull, &corners, options);
+    is_screen.then(|| {
+        Diagnostic::warning(
+            Code::ScreenEdgeSeen,
+            "what was cut out looks like the whole screen with something on it: let the screen fill the photo, crop the \
+             photo to it, or give its size (screen_size)",
+        )
+    })
+}
+
+fn is_screen_hue(color: LinearRgb) -> bool {
+    is_keyable(color) && strongest_channel(color) != RED_CHANNEL
+}
+
+fn area(ring: &[Point2<f64>]) -> f64 {
+    Outline::from_ring(ring.to_vec()).area()
+}
+
+/// Most of what lies in a hull with these corners has one hue of a screen, and something lies on
+/// that.
+fn is_covered_screen(
+    photo: &Image<LinearRgb>,
+    hull: &[Point2<f64>],
+    corners: &[Point2<f64>; 4],
+    options: &SegmentOptions,
+) -> bool {
+    let picture = at_search_size(photo);
+    let scale = picture.width() as f64 / photo.width() as f64;
+    let reduced = |p: &Point2<f64>| Point2::from(p.coords * scale);
+    let hull: Vec<_> = hull.iter().map(reduced).collect();
+    let regions = large_hue_regions(&screen_hues(&picture, &hull));
+    regions.iter().any(|screen| {
+        let is_most = area(&screen.hull) >= MIN_HUE_SHARE * area(&hull);
+        is_most
+            && (screen.is_covered || shows_object(&picture, corners.map(|p| reduced(&p)), options))
+    })
+}
+
+/// The picture with what has a screen's hue inside a hull, and black elsewhere.
+fn screen_hues(picture: &Image<LinearRgb>, hull: &[Point2<f64>]) -> Image<LinearRgb> {
+    let (w, h) = picture.size();
+    let inside = Outline::from_ring(hull.to_vec()).coverage(w, h);
+    picture.zip_map(&inside, |p, c| {
+        if c.0 > 0.5 && is_screen_hue(p) {
+            p
+        } else {
+            LinearRgb::BLACK
+        }
+    })
+}
+
+/// Something is found between the corners of a screen.
+fn shows_object(
+    picture: &Image<LinearRgb>,
+    corners: [Point2<f64>; 4],
+    options: &SegmentOptions,
+) -> bool {
+    let within = Roi::spanning(
+        between_middle(corners.map(|p| p.x)),
+        between_middle(corners.map(|p| p.y)),
+    );
+    within.area() > 0 && segment(&picture.crop(within), options).is_ok()
+}
+
+/// The whole pixels from the second of four coordinates to the third, without a rim: the upright
+/// rectangle of two such lies within the corners.
+fn between_middle(mut coordinates: [f64; 4]) -> Range<usize> {
+    coordinates.sort_by(f64::total_cmp);
+    let [_, low, high, _] = coordinates;
+    (low + RIM_PX) as usize..(high - RIM_PX) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BROWN: LinearRgb = LinearRgb::new(0.2, 0.12, 0.06);
+    const WHITE: LinearRgb = LinearRgb::new(0.6, 0.62, 0.65);
+    const BLUE: LinearRgb = LinearRgb::new(0.05, 0.1, 0.4);
+    const GREEN: LinearRgb = LinearRgb::new(0.05, 0.4, 0.1);
+    const RED: LinearRgb = LinearRgb::new(0.5, 0.05, 0.05);
+
+    /// A sheet with a smaller sheet on it on a table, told that the outer one was cut out.
+    fn is_told(table: LinearRgb, sheet: LinearRgb, thing: LinearRgb) -> bool {
+        let photo = Image::from_fn(240, 180, |x, y| match (x, y) {
+            (80..150, 70..110) => thing,
+            (30..210, 25..155) => sheet,
+            _ => table,
+        });
+        let hull = [[30.0, 25.0], [210.0, 25.0], [210.0, 155.0], [30.0, 155.0]];
+        let hull = hull.map(Point2::from);
+        let told = screen_edge_seen(&photo, &hull, table, &SegmentOptions::default());
+        told.is_some()
+    }
+
+    #[test]
+    fn a_sheet_with_something_on_it_is_told_on_any_table() {
+        let clear = GREEN.scale(0.56) + LinearRgb::grey(0.02);
+        for table in [BROWN, WHITE, LinearRgb::grey(0.03)] {
+            for thing in [RED, WHITE, clear] {
+                assert!(is_told(table, GREEN, thing), "{table:?} {thing:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn objects_of_a_screen_s_hue_are_none() {
+        // Nothing on it; on a screen; of another hue than screens have.
+        assert!(!is_told(WHITE, GREEN, GREEN));
+        assert!(!is_told(BLUE, GREEN, WHITE));
+        assert!(!is_told(WHITE, RED, WHITE));
+    }
+}
