@@ -82,7 +82,10 @@ impl<V: Shared> LruCache<V> {
             kept: Some(value.clone()),
             weak: value.downgrade(),
         });
-        drop_oldest(&mut entries, own_share(self.most_bytes));
+        let oldest = take_oldest(&mut entries, own_share(self.most_bytes));
+        // Large memory is given back without the lock: others wait for it, and a fork would for ever.
+        drop(entries);
+        drop(oldest);
         value
     }
 
@@ -101,8 +104,9 @@ fn used<V: Shared>(entries: &mut [Entry<V>], name: &str) -> Option<V> {
     Some(value)
 }
 
-/// Drops the values that were used longest ago, until the others take little enough memory.
-fn drop_oldest<V: Shared>(entries: &mut [Entry<V>], most_bytes: usize) {
+/// Takes out the values that were used longest ago, until the others take little enough memory.
+fn take_oldest<V: Shared>(entries: &mut [Entry<V>], most_bytes: usize) -> Vec<V> {
+    let mut taken = Vec::new();
     let bytes = |entry: &Entry<V>| entry.kept.as_ref().map_or(0, V::bytes);
     let mut total: usize = entries.iter().map(bytes).sum();
     let others = entries.len().saturating_sub(1);
@@ -111,8 +115,9 @@ fn drop_oldest<V: Shared>(entries: &mut [Entry<V>], most_bytes: usize) {
             break;
         }
         total -= bytes(entry);
-        entry.kept = None;
+        taken.extend(entry.kept.take());
     }
+    taken
 }
 
 /// What [`Shared::upgrade`] is for a reference that is there or not.

@@ -312,10 +312,11 @@ fn warn_of_cameras(labels: &[LabelledPhoto], sightings: &[PhotoCamera]) {
     }
     let unreported = unreported_names(labels, sightings);
     if let [first, ..] = unreported.as_slice() {
-        let (count, of) = (unreported.len(), labels.len());
+        let solved = sightings.iter().filter(|seen| !seen.stored).count();
+        let count = unreported.len();
         let more = if count > 1 { ", ..." } else { "" };
         log::warn!(
-            "{count} of {of} cameras have warnings ({first}{more}): `petcomp camera doctor` explains them"
+            "{count} of {solved} cameras solved now have warnings ({first}{more}): `petcomp camera doctor` explains them"
         );
     }
 }

@@ -162,13 +162,13 @@ impl LabelConfig {
         (self.distinct_formats() == [Format::WebDataset]).then_some(self.webdataset)
     }
 
-    /// How much of an object labels in memory tell: as much as YOLO's where that is written, else as
-    /// those of the first layout with boxes.
+    /// How much of an object labels in memory tell: as much as YOLO's where that or no layout with
+    /// boxes is written, else as those of the first one.
     pub fn extent(&self) -> Extent {
         // YOLO is the first of all.
         let writers = self.writers(&Pictures::default());
         let extent = writers.iter().find_map(|writer| writer.extent());
-        extent.unwrap_or_default()
+        extent.unwrap_or(self.yolo.boxes)
     }
 
     fn distinct_formats(&self) -> Vec<Format> {
@@ -305,8 +305,16 @@ mod tests {
         assert_eq!(formats("['coco']"), Extent::Visible);
         assert_eq!(formats("['layers', 'coco', 'webdataset']"), Extent::Visible);
         assert_eq!(formats("['coco', 'yolo']"), Extent::Amodal);
-        assert_eq!(formats("['mot', 'voc']"), Extent::Amodal);
+        let voc = "voc = { boxes = 'visible' }\n";
+        assert_eq!(
+            extent(&format!("{voc}formats = ['mot', 'voc']")),
+            Extent::Visible
+        );
         assert_eq!(formats("[]"), Extent::Amodal);
+        assert_eq!(
+            extent("formats = []\nyolo = { boxes = 'visible' }"),
+            Extent::Visible
+        );
         assert_eq!(extent("yolo = { boxes = 'visible' }"), Extent::Visible);
     }
 

@@ -243,6 +243,7 @@ mod tests {
         let png = Pictures::default().shown(&frame, 3, 0).unwrap();
         assert_eq!(png, to_srgb8(&displayed));
         assert_ne!(png, jpg.shown(&frame, 3, 0).unwrap());
+        assert!(jpg.shown(&Image::new(0, 0), 3, 0).is_err());
     }
 
     #[test]

@@ -109,13 +109,17 @@ pub(super) fn warn_unreadable(notes: &CameraNotes, path: &Path) {
     if notes.unreadable {
         let path = path.display();
         log::warn!(
-            "{path}: its EXIF data cannot be read: orientation and focal length are unknown"
+            "{path}: its EXIF data cannot be read: focal length, and orientation if it stands only there, are unknown"
         );
     }
 }
 
 fn notes_of_source(source: &SourceFile) -> CameraNotes {
-    let file = Cursor::new(&source.bytes);
+    // Behind a JPEG's first scan may lie further pictures, with notes of their own.
+    let start = (source.format == Format::Jpeg)
+        .then(|| jpeg::read_before_scan(&mut &source.bytes[..], &Limits::default()).ok())
+        .flatten();
+    let file = Cursor::new(start.as_ref().unwrap_or(&source.bytes));
     catch_panic(|| Ok(read_notes(file, source.format))).unwrap_or_default()
 }
 
@@ -158,7 +162,7 @@ fn with_known_alpha(raster: Raster, source: &SourceFile) -> Raster {
 }
 
 /// OpenImageIO divides the entries of a palette by 257 and rounds down, which gives a code less
-/// where they are codes times 256.
+/// where they are codes times 256. A code of 1 cannot be told from 0 any more, and stays 0.
 #[cfg(feature = "oiio")]
 fn with_whole_palette(mut raster: Raster, source: &SourceFile) -> Raster {
     let is_less = source.format == Format::Tiff && tiff::has_shifted_palette(&source.bytes);

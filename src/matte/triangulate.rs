@@ -84,7 +84,8 @@ pub struct Triangulated {
 /// own screen.
 ///
 /// Photos are scene-linear, of one size, of the same object under the same light, with the same
-/// exposure and white balance; the more the screens differ, the better. `inside` is the object's coverage in the first photo.
+/// exposure and white balance; the more the screens differ, the better. `inside` is the object's
+/// coverage in the first photo.
 ///
 /// # Method
 /// [Smith and Blinn 1996], theorem 4, per channel: T is the slope and F the intercept of the

@@ -211,9 +211,15 @@ pub(crate) fn write_picture(
     })
 }
 
+/// What rounding may add to an alpha of 1, as where a picture is blurred.
+const ALPHA_ROUNDING: f32 = 1e-5;
+
 /// Refuses a picture with a pixel whose alpha no picture has.
 pub(crate) fn check_sound(name: &str, image: &Image<PremulRgba>) -> Result<()> {
-    let bad = image.pixels().iter().position(|pixel| !pixel.is_sound());
+    let is_sound = |pixel: &PremulRgba| {
+        pixel.color().is_finite() && (0.0..=1.0 + ALPHA_ROUNDING).contains(&pixel.a)
+    };
+    let bad = image.pixels().iter().position(|pixel| !is_sound(pixel));
     bad.map_or(Ok(()), |i| {
         let (x, y) = (i % image.width(), i / image.width());
         let what = format!(

@@ -190,6 +190,9 @@ def test_alpha_that_cannot_be_is_refused(tmp_path):
     sample.image_linear[3, 0, 3] = -1
     with pytest.raises(errors.InvalidValueError, match="^image_linear: alpha -1 in column 0, row 3"):
         petcomp.generate(lambda k: sample, 1, tmp_path / "set", classes=["a"])
+    image[1, 2, 3] = np.nextafter(np.float32(1), np.float32(2))
+    petcomp.io.write(tmp_path / "rounded.exr", image)
+    petcomp.Sample.from_masks(image, [], [], ["a"])
 
 
 def test_a_texture_seen_edge_on_or_from_behind_is_fine():

@@ -39,8 +39,8 @@ const EDITORS: [&str; 20] = [
 ];
 /// Directories that a file may point to; cameras have three, and pixels may look like some.
 const MOST_POINTERS: usize = 8;
-/// What the reader says of notes that begin as none do.
-const NO_NOTES: [&str; 3] = [
+/// What the reader says of notes whose first bytes are damaged.
+const DAMAGED_STARTS: [&str; 3] = [
     "Truncated TIFF header",
     "Invalid TIFF byte order",
     "Invalid forty two",
@@ -101,7 +101,7 @@ impl CameraNotes {
             Ok(exif) => Self::from_exif(&exif),
             Err(Error::PartialResult(part)) => Self::from_part(&part.into_inner().0),
             Err(e) => Self {
-                unreadable: are_no_notes(&e),
+                unreadable: is_damaged_start(&e),
                 ..Self::default()
             },
         }
@@ -196,8 +196,8 @@ fn is_pointer([a, b, c, d]: [u8; 4]) -> bool {
     })
 }
 
-fn are_no_notes(e: &Error) -> bool {
-    matches!(e, Error::InvalidFormat(what) if NO_NOTES.contains(what))
+fn is_damaged_start(e: &Error) -> bool {
+    matches!(e, Error::InvalidFormat(what) if DAMAGED_STARTS.contains(what))
 }
 
 /// The last program that wrote the file is one that edits pictures.

@@ -245,8 +245,8 @@ pub(crate) fn encode(
             "{width} x {height} pixels, expected sides of at most 65535 in a JPEG"
         ));
     };
-    let color = match codes.len() / (width * height) {
-        1 => ColorType::Luma,
+    let color = match codes.len().checked_div(width * height) {
+        Some(1) => ColorType::Luma,
         _ => ColorType::Rgb,
     };
     let mut bytes = Vec::new();

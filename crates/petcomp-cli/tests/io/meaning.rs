@@ -312,6 +312,19 @@ fn cameras_held_any_way_give_upright_pictures() {
     }
 }
 
+#[test]
+fn pictures_behind_the_first_of_a_jpeg_leave_its_orientation() {
+    let folder = Folder::new();
+    let stored = Image::filled(48, 32, Srgb8 { r: 9, g: 9, b: 9 });
+    let (jpeg, ..) = oriented(&folder, &stored, 6);
+    let burst = std::fs::read(&jpeg).unwrap().repeat(10);
+    std::fs::write(&jpeg, burst).unwrap();
+    let header = io::read_header(&jpeg).unwrap();
+    let upright = io::read::<LinearRgb>(&jpeg).unwrap();
+    assert_eq!((header.width, header.height), (32, 48));
+    assert_eq!(upright.size(), (32, 48));
+}
+
 /// The same stored picture as JPEG, PNG and TIFF, with an orientation noted in each format's own
 /// way.
 fn oriented(
