@@ -20,7 +20,7 @@ use super::check::{check_coverage, check_photo, check_positive, check_value};
 use super::clipping::{CLIPPED, clipped_screen, clipping_level};
 use super::plate::ScreenPlate;
 use super::prepared::{check_finite, longer_side};
-use super::screen::{is_keyable, strongest_channel};
+use super::screen::{is_keyable, screen_shade, strongest_channel};
 use super::stroke::Claims;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -32,7 +32,7 @@ use serde::{Deserialize, Serialize};
 use solve::{Factor, Solver};
 use std::borrow::Cow;
 use std::ops::RangeInclusive;
-use tint::{DARKEST_SHARE, Tint, TintSamples};
+use tint::{DARKEST_SHARE, Tint, TintSamples, is_bare_screen};
 
 /// How film is solved for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -317,7 +317,11 @@ impl<'a> FilmSolution<'a> {
             .calm
             .zip3_map(&plate.image, inside, |pixel, screen, inside| {
                 if inside.0 > 0.0 {
-                    factor(&solver, pixel.into(), screen.into())
+                    let [pixel, screen] = [pixel, screen].map(LinearRgb::into);
+                    Factor {
+                        is_bare: self.is_keyable && is_bare_screen(pixel, screen, self.key),
+                        ..factor(&solver, pixel, screen)
+                    }
                 } else {
                     Factor::default()
                 }
@@ -365,7 +369,11 @@ impl<'a> FilmSolution<'a> {
             longer_side,
             claims,
         );
-        let keyed_away = uncertainty::keyed_away(factors, inside, flat[self.key], longer_side);
+        let shades = self
+            .calm
+            .zip_map(&plate.image, |p, k| screen_shade(p.into(), k.into()));
+        let keyed_away =
+            uncertainty::keyed_away(factors, &shades, inside, flat[self.key], longer_side);
         watch.lap("paint");
         let clipped = bright::fill_glints(factors, photo, inside, clipped);
         claimed::make_opaque(factors, claims);
@@ -390,7 +398,7 @@ impl<'a> FilmSolution<'a> {
     /// F, T and V from the factors by which the pixels are flat plastic.
     fn composed(&self, factors: &Image<Factor>, flat: LinearRgb) -> FilmMatte {
         let inside = self.object.inside;
-        let plastic = factors.map(|f| flat.map(|t| (f.value * t).clamp(0.0, 1.0)));
+        let plastic = factors.map(|f| f.transmittance(flat));
         let transmittance = plastic.zip_map(inside, covered);
         let lit = claimed::without_shadow(&plastic, flat, self.object.claims);
         let seen = view(&lit, flat, inside);

@@ -1,6 +1,6 @@
 //! The colour of the screen, from what the object leaves free of it.
 
-use super::arrays::index_of_largest;
+use super::arrays::{dot, index_of_largest, largest};
 use super::check::refused;
 use super::prepared::longer_side;
 use crate::error::Result;
@@ -75,6 +75,19 @@ pub(super) fn is_keyable(screen: LinearRgb) -> bool {
 /// By how much the largest channel exceeds the mean of the others, as a share of it.
 fn excess_share([low, mid, high]: [f32; 3]) -> f32 {
     (high - 0.5 * (low + mid)) / high
+}
+
+/// Bare screen is its plate in some shade: so far from that, as a share of the plate's strongest
+/// channel, it may be.
+const MAX_SCREEN_DEVIATION: f32 = 0.06;
+
+/// How bright a pixel that is the screen in some shade is, 1 as its plate; none for one that is not.
+pub(super) fn screen_shade(pixel: [f32; 3], screen: [f32; 3]) -> Option<f32> {
+    let shade = dot(pixel, screen) / dot(screen, screen).max(f32::MIN_POSITIVE);
+    let strongest = largest(screen);
+    let is_screen =
+        (0..3).all(|c| (pixel[c] - shade * screen[c]).abs() <= MAX_SCREEN_DEVIATION * strongest);
+    is_screen.then_some(shade)
 }
 
 /// The two channels beside one, in order.

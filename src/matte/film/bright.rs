@@ -1,10 +1,11 @@
 //! Pixels that are not bare plastic: paint, and glints that hide what is behind them.
 
 use super::claimed;
-use super::object::{interior, is_screen, ramp, share, side_px};
+use super::object::{interior, ramp, share, side_px};
 use super::solve::Factor;
 use crate::filter;
 use crate::image::{Image, Mask};
+use crate::matte::screen::screen_shade;
 use crate::matte::stroke::Claims;
 use crate::pixel::{Coverage, LinearRgb};
 use rayon::prelude::*;
@@ -31,7 +32,7 @@ pub(super) fn make_opaque(
     claims: Option<&Claims>,
 ) -> f32 {
     let bright = brighter_than_screen(factors, photo, plate);
-    let painted = factors.zip_map(&bright, |f, bright| f.coloured || bright);
+    let painted = factors.zip_map(&bright, |f, bright| bright || f.coloured && !f.is_bare);
     if !painted.pixels().contains(&true) {
         return 0.0;
     }
@@ -65,7 +66,7 @@ fn brighter_than_screen(
     plate: &Image<LinearRgb>,
 ) -> Mask {
     factors.zip3_map(photo, plate, |f, p, k| {
-        f.unbounded > MIN_PAINT_FACTOR && !is_screen(p.into(), k.into())
+        f.unbounded > MIN_PAINT_FACTOR && screen_shade(p.into(), k.into()).is_none()
     })
 }
 

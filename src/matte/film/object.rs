@@ -2,7 +2,6 @@
 
 use crate::filter;
 use crate::image::{Image, Mask};
-use crate::matte::arrays::{dot, largest};
 use crate::pixel::Coverage;
 use std::ops::RangeInclusive;
 
@@ -12,21 +11,11 @@ pub(in crate::matte) const OPAQUE: f32 = 0.99;
 const RIM_WIDTH: f64 = 0.01;
 /// The same in small photos, pixels.
 const MIN_RIM_PX: f64 = 2.0;
-/// Bare screen is its plate in some shade: so far from that, as a share of the plate's strongest
-/// channel, it may be.
-const MAX_SCREEN_DEVIATION: f32 = 0.06;
 
 /// The object without its rim; `longer_side` is that of the whole photo, pixels.
 pub(super) fn interior(inside: &Image<Coverage>, longer_side: usize) -> Mask {
     let rim_px = (RIM_WIDTH * longer_side as f64).max(MIN_RIM_PX);
     filter::erode(&inside.map(|c| c.0 >= OPAQUE), rim_px)
-}
-
-/// A pixel is the screen in some shade.
-pub(super) fn is_screen(pixel: [f32; 3], screen: [f32; 3]) -> bool {
-    let shade = dot(pixel, screen) / dot(screen, screen).max(f32::MIN_POSITIVE);
-    let strongest = largest(screen);
-    (0..3).all(|c| (pixel[c] - shade * screen[c]).abs() <= MAX_SCREEN_DEVIATION * strongest)
 }
 
 /// How far a value is from the start of a range to its end, 0 to 1.

@@ -19,6 +19,8 @@ pub(super) struct Factor {
     pub(super) reflected: f32,
     /// Whether that light has a colour that this plastic cannot have.
     pub(super) coloured: bool,
+    /// Nothing lies on the screen there, as in a hole.
+    pub(super) is_bare: bool,
 }
 
 impl Factor {
@@ -29,7 +31,16 @@ impl Factor {
         unbounded: 0.0,
         reflected: 0.0,
         coloured: false,
+        is_bare: false,
     };
+
+    /// By what flat plastic passes; of bare screen all, whatever the dye is.
+    pub(super) fn transmittance(self, flat: LinearRgb) -> LinearRgb {
+        match self.is_bare {
+            true => LinearRgb::WHITE,
+            false => flat.map(|t| (self.value * t).clamp(0.0, 1.0)),
+        }
+    }
 
     /// As something that is plastic, whatever it looks like.
     fn of_plastic(self) -> Self {
@@ -176,6 +187,7 @@ impl Solver {
             unbounded,
             reflected: (0.5 * (a + b)).max(0.0),
             coloured: self.is_coloured(a, b),
+            is_bare: false,
         }
     }
 

@@ -543,4 +543,54 @@ fn a_label_of_the_screens_colour_is_keyed_away_and_that_is_said() {
     }
 }
 
+#[test]
+fn the_screen_in_a_hole_is_see_through_whatever_the_dye_seems_to_be() {
+    let (green, blue) = ([0.10, 0.45, 0.12], [0.05, 0.12, 0.50]);
+    for (screen, ring) in [
+        (green, [0.5, 0.06, 0.07]),
+        (green, [0.10, 0.04, 0.02]),
+        (blue, [0.012; 3]),
+    ] {
+        let distance = |x: usize, y: usize| (x as f64 - 60.0).hypot(y as f64 - 60.0);
+        let inside = Image::from_fn(120, 120, |x, y| Coverage(f32::from(distance(x, y) < 50.0)));
+        let photo = Image::from_fn(120, 120, |x, y| {
+            let is_ring = (25.0..50.0).contains(&distance(x, y));
+            LinearRgb::from(if is_ring { ring } else { screen })
+        });
+        let plate = ScreenPlate::even(screen.into(), (120, 120));
+        let found = film(&photo, &plate, &inside, &FilmOptions::default()).unwrap();
+        let hole = found.film[(60, 60)];
+        assert!(hole.opacity.max_channel() < 0.05, "{ring:?}: {hole:?}");
+        assert!(found.diagnostics.iter().any(|d| d.code == Code::KeyedAway));
+    }
+}
+
+#[test]
+fn a_print_of_the_screens_hue_on_something_opaque_is_told() {
+    let screen = [0.10, 0.45, 0.12];
+    let solved = |print: [f32; 3]| {
+        let inside = Image::from_fn(120, 120, |x, _| Coverage(f32::from((10..110).contains(&x))));
+        let photo = Image::from_fn(120, 120, |x, y| {
+            let color = match (x, y) {
+                (40..80, 40..80) => print,
+                (10..110, _) => [0.8; 3],
+                _ => screen,
+            };
+            LinearRgb::from(color)
+        });
+        let plate = ScreenPlate::even(screen.into(), (120, 120));
+        film(&photo, &plate, &inside, &FilmOptions::default()).unwrap()
+    };
+    let is_told = |print| {
+        let found = solved(print).diagnostics;
+        found
+            .iter()
+            .any(|d| d.code == Code::KeyedAway && d.needs_review())
+    };
+    for shade in [0.3, 0.5, 0.8, 1.0] {
+        assert!(is_told(screen.map(|c| shade * c)), "{shade}");
+    }
+    assert!(!is_told([0.5, 0.05, 0.05]) && !is_told([0.02; 3]) && !is_told([0.8; 3]));
+}
+
 mod world;

@@ -1,9 +1,10 @@
 //! The plastic of a photo: which dye, and how much of it, found from the pixels that reflect least.
 
-use super::object::{OPAQUE, is_screen};
+use super::object::OPAQUE;
 use crate::image::Image;
 use crate::matte::arrays::dot;
 use crate::matte::plate::ScreenPlate;
+use crate::matte::screen::screen_shade;
 use crate::pixel::{Coverage, LinearRgb};
 use crate::quantile::median;
 
@@ -74,6 +75,11 @@ const SCATTER_DEPTH: f32 = 0.5;
 const MAX_THICKNESS_FACTOR: f32 = 1.3;
 /// Misfit by which tints are as good as each other.
 const EQUAL_MISFIT: f32 = 0.1;
+
+/// Nothing lies on the screen there: plastic passes less of its strongest channel, `key`.
+pub(super) fn is_bare_screen(pixel: [f32; 3], screen: [f32; 3], key: usize) -> bool {
+    pixel[key] >= MIN_BARE_SHARE * screen[key] && screen_shade(pixel, screen).is_some()
+}
 
 /// What the light scattered by the plastic itself is multiplied by, per channel; 1 for clear.
 pub(super) fn scattered_tint(flat: [f32; 3]) -> [f32; 3] {
@@ -253,7 +259,7 @@ impl PhotoOnScreen<'_> {
 
 impl ScreenPair {
     fn is_bare(&self, key: usize) -> bool {
-        self.pixel[key] >= MIN_BARE_SHARE * self.screen[key] && is_screen(self.pixel, self.screen)
+        is_bare_screen(self.pixel, self.screen, key)
     }
 
     /// Light of the channels that the screen has little of.

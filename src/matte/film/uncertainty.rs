@@ -9,8 +9,9 @@ use crate::pixel::Coverage;
 /// What makes the colours of a cut-out wrong, 0 where nothing does.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ColorUncertainty {
-    /// Share of the object that looks like bare screen in its middle, where plastic is: it was
-    /// keyed away, and may be paint of the screen's hue.
+    /// Share of the object that looks like the screen in its middle, bare where plastic is, or in
+    /// some shade where most of it is opaque: it was keyed away, and may be paint of the screen's
+    /// hue.
     pub keyed_away: f32,
     /// Share of the object that is brighter in the screen's hue than the screen through plastic,
     /// and was treated as opaque.
@@ -68,13 +69,13 @@ impl ColorUncertainty {
         all.into_iter().flatten().collect()
     }
 
-    /// `share` of the object looks like bare screen, where plastic is.
+    /// `share` of the object looks like the screen.
     fn keyed_away(share: f32) -> Diagnostic {
         Diagnostic::new(
             Code::KeyedAway,
             warning_above(Self::NEEDS_REVIEW.keyed_away, share),
             format_args!(
-                "{:.1} % of the object looks like bare screen: keyed away, but it may be paint of the screen's hue; photograph it on another screen colour",
+                "{:.1} % of the object looks like the screen: keyed away, but it may be paint of the screen's hue; photograph it on another screen colour",
                 100.0 * share
             ),
         )
@@ -131,26 +132,43 @@ const MIN_REPORTED_CLIPPED: f32 = 0.03;
 /// clear walls pass 0.56, one of them three quarters.
 const BARE_TRANSMITTANCE: f32 = 0.85;
 
+/// Transmittance of the screen's channel below which nothing seems to be seen through something.
+const OPAQUE_TRANSMITTANCE: f32 = 0.1;
+/// Share of the object that is opaque from which on the rest may be paint, not plastic.
+const MIN_OPAQUE_SHARE: f64 = 0.6;
+/// Shade of the screen from which on paint of its hue is told from what is dark.
+const MIN_SHADE: f32 = 0.15;
+
 /// 1 without a cause, 0.5 where it reaches its limit.
 fn certainty(cause: f64, limit: f64) -> f64 {
     limit / (limit + cause)
 }
 
-/// The share of the object that looks like bare screen, away from its rim, and was left
-/// see-through. `flat` is what flat plastic passes in the screen's channel, `longer_side` that of
-/// the whole photo, pixels.
+/// The share of the object that looks like the screen, away from its rim, and was left see-through:
+/// like bare screen or, in something that is opaque for the most part, like the screen in some
+/// shade. `shades` are those of the photo, none where it is not like its screen; `flat` is what
+/// flat plastic passes in the screen's channel, `longer_side` that of the whole photo, pixels.
 pub(super) fn keyed_away(
     factors: &Image<Factor>,
+    shades: &Image<Option<f32>>,
     inside: &Image<Coverage>,
     flat: f32,
     longer_side: usize,
 ) -> f32 {
-    let bare = factors.map(|f| f.value * flat > BARE_TRANSMITTANCE);
-    if !bare.pixels().contains(&true) {
-        return 0.0;
-    }
-    let bare = bare.zip_map(&interior(inside, longer_side), |bare, inner| bare && inner);
-    share(bare.pixels().iter().copied(), inside)
+    let inner = interior(inside, longer_side);
+    let passed = |f: Factor| f.value * flat;
+    let is_opaque = factors.zip_map(&inner, |f, inner| inner && passed(f) < OPAQUE_TRANSMITTANCE);
+    let is_paint = is_opaque.count() as f64 > MIN_OPAQUE_SHARE * inner.count() as f64;
+    let looks_bare = |f: Factor, shade: Option<f32>| {
+        let is_shade = shade.is_some_and(|shade| shade > MIN_SHADE);
+        f.is_bare
+            || passed(f) > BARE_TRANSMITTANCE
+            || is_paint && is_shade && passed(f) > OPAQUE_TRANSMITTANCE
+    };
+    let gone = factors.zip3_map(shades, &inner, |f, shade, inner| {
+        inner && looks_bare(f, shade)
+    });
+    share(gone.pixels().iter().copied(), inside)
 }
 
 /// How much of a pixel's standard deviation is the prior's, 0 to 1.

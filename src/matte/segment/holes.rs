@@ -7,7 +7,7 @@ use crate::image::{Image, Mask};
 use crate::matte::arrays::largest;
 use crate::matte::plate::{PlateOptions, ScreenPlate};
 use crate::matte::prepared::longer_side;
-use crate::matte::screen::{is_keyable, masked_pixels};
+use crate::matte::screen::{is_keyable, masked_pixels, screen_shade};
 use crate::matte::stroke::{Claims, corrected};
 use crate::pixel::LinearRgb;
 
@@ -23,11 +23,15 @@ const LIKE_SIGMAS: f32 = 3.0;
 const UNLIKE_SHARE: f32 = 0.3;
 /// Least area of a hole as a share of what is enclosed; smaller ones are left to the matte.
 const MIN_HOLE_AREA: f64 = 0.005;
+/// A hole goes on where the screen lies in the shadow of its rim: no darker than this share of its plate.
+const LEAST_SHADE: f32 = 0.4;
 /// Share of the rim that must be unlike the screen: clear plastic is like it, and then what it
 /// encloses is the object.
 const OPAQUE_RIM_SHARE: f64 = 0.8;
-/// The rim lies so far around a hole: past the blur of its edge.
-const RIM_PX: [f64; 2] = [2.0, 5.0];
+/// A hole reaches so far beyond its core, to the middle of its edge.
+const EDGE_PX: f64 = 2.0;
+/// The rim lies so far around a hole's core: past the blur of its edge.
+const RIM_PX: [f64; 2] = [3.0, 5.0];
 
 /// What an object covers in the picture that was searched.
 pub(super) struct ObjectArea {
@@ -83,7 +87,12 @@ fn without_holes(picture: &Image<LinearRgb>, inside: &Mask, background: &Mask) -
         return inside.clone();
     };
     let smooth = filter::box_blur(picture, 1);
-    let candidates = large_groups(&screen_like(&smooth, &plate, inside), inside.count());
+    let like = screen_like(&smooth, &plate, inside);
+    let candidates = large_groups(
+        &with_shadows(&smooth, &plate, inside, &like),
+        &like,
+        inside.count(),
+    );
     if candidates.is_empty() {
         return inside.clone();
     }
@@ -112,9 +121,23 @@ fn is_like_screen(pixel: LinearRgb, plate: LinearRgb, noise: LinearRgb) -> bool 
     (0..3).all(|c| off[c] <= (LIKE_SHARE * plate[c]).max(LIKE_SIGMAS * noise[c]))
 }
 
-/// The cores of the groups that are large enough for a hole in an area of `area` pixels.
-fn large_groups(like: &Mask, area: usize) -> Vec<Mask> {
-    let groups = PixelGroups::new(&filter::erode(like, 1.0));
+/// The pixels that have the plate's colour, and those that have it in the shadow of the object.
+fn with_shadows(
+    smooth: &Image<LinearRgb>,
+    plate: &ScreenPlate,
+    inside: &Mask,
+    like: &Mask,
+) -> Mask {
+    let shaded = smooth.zip3_map(&plate.image, inside, |p, k, inside| {
+        inside && screen_shade(p.into(), k.into()).is_some_and(|shade| shade >= LEAST_SHADE)
+    });
+    shaded.zip_map(like, |shaded, like| shaded || like)
+}
+
+/// The cores of the groups of which so much is lit screen as is enough for a hole in an area of
+/// `area` pixels.
+fn large_groups(shaded: &Mask, like: &Mask, area: usize) -> Vec<Mask> {
+    let groups = PixelGroups::new(&filter::erode(shaded, 1.0));
     let sizes = groups.sizes(like);
     (0..sizes.len())
         .filter(|&group| sizes[group] as f64 >= MIN_HOLE_AREA * area as f64)
@@ -138,10 +161,11 @@ struct Hole {
 
 impl Hole {
     fn new(core: &Mask) -> Self {
-        let area = filter::dilate(core, RIM_PX[0]);
-        let near = filter::dilate(&area, RIM_PX[1] - RIM_PX[0]);
-        let rim = without(&near, &area);
-        Self { area, rim }
+        let [inner, outer] = RIM_PX.map(|reach| filter::dilate(core, reach));
+        Self {
+            area: filter::dilate(core, EDGE_PX),
+            rim: without(&outer, &inner),
+        }
     }
 
     /// It is enclosed all around, mostly by what is unlike the screen.
@@ -203,6 +227,28 @@ mod tests {
             (disc(20.0).count() as f64 / (disc(40.0).count() - kept.count()) as f64 - 1.0).abs()
                 < 0.15
         );
+    }
+
+    #[test]
+    fn a_hole_in_the_shadow_of_its_rim_is_a_hole() {
+        let ring = disc(40.0).zip_map(&disc(20.0), |outer, inner| outer && !inner);
+        let shadow = filter::gaussian_blur(&filter::dilate(&ring, 2.0).to_coverage(), 2.0);
+        for rim in [[0.5, 0.05, 0.05], [0.01, 0.01, 0.01], [0.6, 0.6, 0.6]] {
+            let sharp = ring.zip_map(&shadow, |ring, shadow| {
+                if ring {
+                    LinearRgb::from(rim)
+                } else {
+                    GREEN.scale(1.0 - 0.35 * shadow.0)
+                }
+            });
+            let photo = filter::gaussian_blur(&sharp, 1.0);
+            let outer = disc(40.0);
+            let kept = without_holes(&photo, &outer, &background(&outer, 8.0));
+            assert!(
+                !kept[(60, 50)] && !kept[(60, 66)] && kept[(60, 75)],
+                "{rim:?}"
+            );
+        }
     }
 
     #[test]
