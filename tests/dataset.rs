@@ -20,6 +20,7 @@ use petcomp::label::{Labels, ObjectLabel, RleMask};
 use petcomp::scene::{CameraSource, EdgeTreatment, Exposure, Grade, Object, Placement, Surface};
 use petcomp::{Coverage, Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -318,6 +319,32 @@ fn a_dataset_may_grow() {
     assert_eq!(make(&full_plan(grown.path(), 12)).unwrap().made, 7);
     make(&full_plan(at_once.path(), 12)).unwrap();
     assert_eq!(bytes(grown.path()), bytes(at_once.path()));
+}
+
+#[test]
+fn what_joins_samples_is_of_all_of_them_or_not_there() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&full_plan(dir.path(), 5)).unwrap();
+    let notes = dir.path().join("webdataset/notes.txt");
+    std::fs::write(&notes, "mine").unwrap();
+    let joined = [
+        "annotations/instances_train.json",
+        "voc/train.txt",
+        "webdataset/train-000000.tar",
+    ];
+    let there = || joined.map(|file| dir.path().join(file).exists());
+    let one = |k| Plan {
+        range: SampleRange::One(k),
+        ..full_plan(dir.path(), k + 1)
+    };
+    make(&one(4)).unwrap();
+    assert_eq!(there(), [true; 3], "nothing was added");
+    let report = make(&one(9)).unwrap();
+    assert_eq!(report.for_trainers, [Path::new("data.yaml")]);
+    assert_eq!(there(), [false; 3]);
+    make(&full_plan(dir.path(), 10)).unwrap();
+    assert_eq!(there(), [true; 3]);
+    assert!(notes.exists());
 }
 
 #[test]
@@ -1151,13 +1178,42 @@ fn a_run_broken_off_within_an_archive_goes_on_there() {
     let run = || generate(&archive_plan(broken.path(), 30), sample, &after_some, &stop);
     let e = threads(1, run).unwrap_err();
     assert!(
-        matches!(&e, Error::Interrupted { what } if what.starts_with("8 of 30 samples are in ")),
+        matches!(&e, Error::Interrupted { what } if what.starts_with("10 of 30 samples are in ")),
         "{e}"
     );
     assert_eq!(names(&broken.path().join("webdataset")).len(), 4);
-    assert_eq!(make(&archive_plan(broken.path(), 30)).unwrap().made, 20);
+    let told = Mutex::new(Vec::new());
+    let note = |p: Progress| told.lock().unwrap().push(p.done);
+    let go_on = AtomicBool::new(false);
+    let report = generate(&archive_plan(broken.path(), 30), sample, &note, &go_on).unwrap();
+    assert_eq!(report.made, 20);
+    let told = told.into_inner().unwrap();
+    assert!(told[0] == 10 && told.is_sorted(), "{told:?}");
+    assert_eq!(told[told.len() - 1], 30);
     assert_eq!(bytes(whole.path()), bytes(broken.path()));
     assert_eq!(names(broken.path()), ["dataset.json", "webdataset"]);
+}
+
+#[test]
+fn what_was_damaged_before_it_was_packed_is_found_and_made_again() {
+    let (whole, broken) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let one_archive = |folder: &Path| Plan {
+        archives: Some(WebDataset { samples: 400 }),
+        ..plan(folder, 400)
+    };
+    make(&one_archive(whole.path())).unwrap();
+    // More than the last lines, whose files every run compares.
+    let stop = AtomicBool::new(false);
+    let after_some = |p: Progress| stop.store(p.made >= 300, Ordering::Relaxed);
+    generate(&one_archive(broken.path()), sample, &after_some, &stop).unwrap_err();
+    let image = broken
+        .path()
+        .join(".archive-000000/images/train/000002.png");
+    let size = std::fs::metadata(&image).unwrap().len();
+    std::fs::write(&image, vec![0; size as usize]).unwrap();
+    repair_archives(broken.path(), SampleRange::All).unwrap();
+    make(&one_archive(broken.path())).unwrap();
+    assert_eq!(bytes(whole.path()), bytes(broken.path()));
 }
 
 #[test]
@@ -2144,6 +2200,31 @@ fn a_mask_beside_one_photo_of_several_is_known() {
     let [tray, wall] = [0, 1].map(|i| &recipe["backgrounds"][i]);
     assert!(tray["name"] == "tray" && tray["front"].is_null());
     assert!(wall["name"] == "wall" && wall["front"].is_string());
+}
+
+#[test]
+fn what_changes_after_a_dataset_was_planned_is_told() {
+    let write_other = |path: &Path| {
+        let grey = |w, h| Image::filled(w, h, LinearRgb::grey(0.5));
+        match path.extension().and_then(OsStr::to_str) {
+            Some("tif") => io::write(path, &grey(64, 48)),
+            Some("exr") => io::write(path, &grey(4, 2)),
+            _ => io::write(path, &Image::filled(64, 48, Coverage(1.0))),
+        }
+    };
+    for name in ["photos/tray.tif", "photos/tray.front.png", "sky.exr"] {
+        let dir = tempfile::tempdir().unwrap();
+        write_world(dir.path());
+        let mask = Image::filled(64, 48, Coverage(0.0));
+        io::write(dir.path().join("photos/tray.front.png"), &mask).unwrap();
+        let config = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
+        let pipeline = Pipeline::open(config).unwrap();
+        pipeline.plan(1, 1, dir.path().join("out")).unwrap();
+        write_other(&dir.path().join(name)).unwrap();
+        let told = pipeline.sample(1, 0).unwrap_err().to_string();
+        let what = format!("{name}: has other bytes than when its folder was opened");
+        assert!(told.ends_with(&what), "{told}");
+    }
 }
 
 #[cfg(unix)]

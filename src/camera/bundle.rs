@@ -196,6 +196,12 @@ impl Bundle {
             .collect()
     }
 
+    /// How many of its shared unknowns each photo can tell, at most.
+    pub(crate) fn shared_degrees_of_freedom(&self) -> Vec<usize> {
+        let own = self.degrees_of_freedom().into_iter();
+        own.map(|dof| dof.min(UNKNOWNS - POSE_UNKNOWNS)).collect()
+    }
+
     fn prior_cost(&self, states: &[State]) -> f64 {
         let values = self.shared_values(states);
         let shared = self.shared.iter().zip(values.iter());

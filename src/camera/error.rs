@@ -60,8 +60,8 @@ pub enum SolveError {
         /// What it was.
         value: f64,
     },
-    /// The albedo or the walls of a surface are none that it can have: which value, and what was
-    /// expected.
+    /// The albedo or the walls of a surface, or the camera's height over it, are none that it can
+    /// have: which value, and what was expected.
     #[error("{0}")]
     OutOfBounds(String),
     /// There are points instead of corners, and not both sides: in words, which are missing.
@@ -119,7 +119,10 @@ pub enum SolveError {
         photo: usize,
     },
     /// The best camera does not fit its label within the noise.
-    #[error("surface: no camera fits ({labelled} {rms_px:.1} px off, p = {p_value:.1e}): {}", remedy(*.exchanged))]
+    #[error(
+        "surface: no camera fits ({labelled} {rms_px:.1} px off, p = {p_value:.1e}): {}",
+        remedy(*.exchanged, *.heights_m)
+    )]
     NoFit {
         /// `corners` or, where none were labelled, `points`.
         labelled: &'static str,
@@ -129,6 +132,9 @@ pub enum SolveError {
         p_value: f64,
         /// Chi squared as labelled and with width and height exchanged, where that repairs it.
         exchanged: Option<[f64; 2]>,
+        /// Height of the camera above the surface as labelled, and without that, metres, where
+        /// leaving it out repairs it.
+        heights_m: Option<[f64; 2]>,
     },
     /// No pose has the camera above the surface with the whole rectangle in front of it.
     #[error("surface.corners_px: no camera above the surface sees these corners")]
@@ -145,14 +151,17 @@ pub(crate) const MISFIT_CAUSES: &str = "wrong dimensions, corners of different r
     picture, corner_sigma_px is too small, or an uncommon lens without EXIF data or camera.focal_px";
 
 /// What to do about a label that no camera fits.
-fn remedy(exchanged: Option<[f64; 2]>) -> String {
-    match exchanged {
-        Some([before, after]) => {
+fn remedy(exchanged: Option<[f64; 2]>, heights_m: Option<[f64; 2]>) -> String {
+    match (exchanged, heights_m) {
+        (Some([before, after]), _) => {
             format!(
                 "exchange width_m and height_m (chi squared {before:.1} as labelled, {after:.1} exchanged)"
             )
         }
-        None => MISFIT_CAUSES.into(),
+        (None, Some([stated, found])) => {
+            format!("camera.height_m: {stated} m, expected the {found:.3} m that the corners give")
+        }
+        (None, None) => MISFIT_CAUSES.into(),
     }
 }
 

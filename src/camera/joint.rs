@@ -1,7 +1,7 @@
 //! Several photos of one camera: one lens, and a pose for each.
 
 use super::bundle::Bundle;
-use super::chi;
+use super::chi::{self, CHI2_99};
 use super::error::SolveError;
 use super::hedge::is_off_center;
 use super::label::{Framing, Label};
@@ -27,7 +27,8 @@ pub struct Joint {
     /// One per label: with the shared lens, alone where the photo contradicts the others, or why
     /// it could not be used.
     pub photos: Vec<Result<Solution, SolveError>>,
-    /// The photos that were left out.
+    /// The photos that were left out; where nobody can tell which ones contradict the others, each
+    /// is solved alone, with a warning.
     pub outliers: Vec<OutlierPhoto>,
 }
 
@@ -95,10 +96,22 @@ impl Joint {
             outliers: misfit_outliers(&alone),
             photos: alone,
         };
-        if let Some(estimate) = together {
-            joint.apply(estimate);
+        match together {
+            Some(estimate) if estimate.is_contradictory(&joint.photos) => joint.warn(&estimate),
+            Some(estimate) => joint.apply(estimate),
+            None => {}
         }
         joint
+    }
+
+    /// Keeps what each photo gives alone, with a warning about all that were solved together.
+    fn warn(&mut self, contradictory: &JointEstimate) {
+        let left_out = contradictory.outliers.iter().map(|outlier| outlier.photo);
+        for photo in contradictory.used.iter().copied().chain(left_out) {
+            if let Ok(solution) = &mut self.photos[photo] {
+                solution.warnings.push(contradiction_warning());
+            }
+        }
     }
 
     /// Replaces the solutions of the photos that agree.
@@ -108,6 +121,11 @@ impl Joint {
         }
         self.outliers.extend(estimate.outliers);
     }
+}
+
+fn contradiction_warning() -> Diagnostic {
+    let what = "the photos contradict each other, and each was solved alone: another zoom needs another camera.id";
+    Diagnostic::warning(Code::OutlierPhoto, what)
 }
 
 /// The photos that no camera fits when they are alone.
@@ -139,6 +157,8 @@ struct JointEstimate {
     fits: Vec<PhotoFit>,
     solutions: Vec<Solution>,
     cost: f64,
+    /// How many of the shared unknowns each photo can tell.
+    shared_dof: Vec<usize>,
     outliers: Vec<OutlierPhoto>,
     /// Where what they give for the focal length contradicts its prior.
     conflict: Option<FocalConflict>,
@@ -228,6 +248,7 @@ impl JointSolver<'_> {
             states: best.states,
             fits: PhotoFit::of_all(&best.chi2, &bundle.degrees_of_freedom()),
             cost: best.cost,
+            shared_dof: bundle.shared_degrees_of_freedom(),
             outliers: Vec::new(),
         })
     }
@@ -281,6 +302,19 @@ fn worst_photo(fits: &[PhotoFit]) -> Option<usize> {
 }
 
 impl JointEstimate {
+    /// The photos do not share a camera, and which of them has another one cannot be told: one that
+    /// contradicts the others is left, or a camera of its own for each explains them clearly better.
+    fn is_contradictory(&self, alone: &[Result<Solution, SolveError>]) -> bool {
+        let alone = self.used.iter().filter_map(|&i| alone[i].as_ref().ok());
+        let apart: f64 = alone.map(|solution| solution.fit.chi2).sum();
+        // The first photo's camera is there in any case; CHI2_99 is for two degrees of freedom.
+        let gained: usize = self.shared_dof.iter().skip(1).sum();
+        let is_shared = self.used.len() > 1;
+        is_shared
+            && (worst_photo(&self.fits).is_some()
+                || self.cost > apart + CHI2_99 * gained as f64 / 2.0)
+    }
+
     /// With a warning about every photo.
     fn warned(mut self, warning: &Diagnostic) -> Self {
         let all = self.solutions.iter_mut();
@@ -475,6 +509,24 @@ mod tests {
                 s.camera.focal_px
             );
         }
+    }
+
+    #[test]
+    fn photos_at_two_zooms_are_solved_alone_and_say_so() {
+        let views = Scenario::default().views(31, 1, 3, [25.0, 40.0]);
+        let mut labels: Vec<Label> = views.into_iter().map(|view| view.label).collect();
+        let corners = labels[2].surface.corners_px.as_mut().unwrap();
+        for [x, y] in corners {
+            (*x, *y) = (2000.0 + 1.5 * (*x - 2000.0), 1500.0 + 1.5 * (*y - 1500.0));
+        }
+        let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
+        let photos: Vec<_> = joint.photos.iter().map(|p| p.as_ref().unwrap()).collect();
+        for photo in &photos {
+            let told = |w: &Diagnostic| w.message.contains("another zoom needs another camera.id");
+            assert!(photo.warnings.iter().any(told), "{:?}", photo.warnings);
+        }
+        let zoom = photos[2].camera.focal_px.x / photos[0].camera.focal_px.x;
+        assert!((1.3..1.7).contains(&zoom), "{zoom}");
     }
 
     #[test]

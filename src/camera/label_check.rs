@@ -2,7 +2,7 @@
 
 use super::error::SolveError;
 use super::label::{Crop, Label, LabelCamera, LabelPoint, LabelSurface, LabelWall};
-use crate::bounds::{ALBEDO, Bounds, SLOPE, WALL_HEIGHT};
+use crate::bounds::{ALBEDO, Bounds, CAMERA, SLOPE, WALL_HEIGHT};
 use crate::color::Albedo;
 
 /// No meaningful label holds larger numbers, or positive ones smaller than one over this.
@@ -76,6 +76,7 @@ fn check_camera(camera: &LabelCamera) -> Result<(), SolveError> {
         camera.principal_point_sigma_px,
     )?;
     check_positive("camera.height_m", camera.height_m)?;
+    check_within("camera.height_m", camera.height_m, &CAMERA)?;
     check_positive("camera.height_sigma_m", camera.height_sigma_m)
 }
 
@@ -164,6 +165,16 @@ mod tests {
                 )
             );
         }
+    }
+
+    #[test]
+    fn a_camera_height_in_millimetres_is_asked_about() {
+        let mut label = Scenario::default().view(1, 0).label;
+        label.camera.height_m = Some(1120.0);
+        let refusal = check_label(&label).unwrap_err().to_string();
+        let expected = "camera.height_m: 1120, expected 0.001 to 50 m";
+        assert!(refusal.starts_with(expected), "{refusal}");
+        assert!(refusal.ends_with("; is it in millimetres?"), "{refusal}");
     }
 
     #[test]

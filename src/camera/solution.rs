@@ -89,6 +89,9 @@ pub struct Fit {
     pub p_value: Option<f64>,
     /// Chi squared with width and height exchanged, where that fits clearly better.
     pub exchanged_chi2: Option<f64>,
+    /// Height of the camera above the surface as labelled, and without that, metres, where the
+    /// label fits only without it.
+    pub heights_m: Option<[f64; 2]>,
     /// Distance of each corner from where it was labelled, pixels; none where points alone were.
     pub per_corner_px: Option<[f64; 4]>,
     /// Iterations of the refinement.
@@ -232,6 +235,7 @@ impl Problem {
             dof,
             p_value: chi::exceeds(minimum.cost, dof),
             exchanged_chi2: None,
+            heights_m: None,
             per_corner_px,
             iterations: minimum.iterations,
             condition,
@@ -329,6 +333,7 @@ impl Solution {
             rms_px: self.rms_px,
             p_value: self.fit.p_value.unwrap_or(0.0),
             exchanged: exchanged.map(|exchanged| [self.fit.chi2, exchanged]),
+            heights_m: self.fit.heights_m,
         })
     }
 

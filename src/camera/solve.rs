@@ -46,7 +46,8 @@ pub fn solve(label: &Label, options: &SolveOptions) -> Result<Solution, SolveErr
         return solve_as_labelled(label, options).map(|solved| solved.solution);
     }
     let solution = solve_without_wrong_exif(label, options)?;
-    Ok(compare_exchanged_sides(label, options, solution))
+    let compared = compare_exchanged_sides(label, options, solution);
+    Ok(compare_without_height(label, options, compared))
 }
 
 /// A solution and what it comes from.
@@ -81,6 +82,13 @@ fn solve_perhaps_cropped(
 }
 
 impl SolvedProblem {
+    /// Where what the picture gives for the focal length contradicts its prior.
+    fn focal_conflict(&self) -> Option<FocalConflict> {
+        let prior = self.problem.residuals.priors.ln_focal;
+        let focal = Uncertainty::new(&self.minimum, prior).focal;
+        FocalConflict::new(&self.problem, &focal)
+    }
+
     /// The camera of a picture that turns out not to be whole, and beside it that of a whole one.
     fn off_center(self, whole: Option<Solution>) -> Self {
         Self {
@@ -150,15 +158,12 @@ fn search(problem: &Problem, options: &SolveOptions) -> Result<SearchResult, Sol
 }
 
 /// Solves; where the picture contradicts its own EXIF value, solves again without that and keeps
-/// the first answer as the alternative.
+/// the first answer as the alternative, unless it is the sides that are wrong.
 fn solve_without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
-    let SolvedProblem {
-        mut solution,
-        problem,
-        minimum,
-    } = solve_as_labelled(label, options)?;
-    let focal = Uncertainty::new(&minimum, problem.residuals.priors.ln_focal).focal;
-    let Some(conflict) = FocalConflict::new(&problem, &focal) else {
+    let solved = solve_as_labelled(label, options)?;
+    let conflict = solved.focal_conflict();
+    let mut solution = solved.solution;
+    let Some(conflict) = conflict else {
         return Ok(solution);
     };
     if !conflict.is_with_exif() {
@@ -167,7 +172,21 @@ fn solve_without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Sol
     }
     let second = solve_as_labelled(&without_exif_focal(label), options)?.solution;
     let warning = conflict.solved_without(&second).warning();
+    if second.misfit().is_none() && fits_exchanged_with_exif(label, options, solution.fit.chi2) {
+        solution.warnings.push(warning);
+        return Ok(solution);
+    }
     Ok(second.preferred_to(solution, warning))
+}
+
+/// With width and height exchanged the picture agrees with its EXIF value, and fits clearly better
+/// than this chi squared: seen straight on, exchanged sides look like a longer lens.
+fn fits_exchanged_with_exif(label: &Label, options: &SolveOptions, chi2: f64) -> bool {
+    exchanged(label)
+        .and_then(|exchanged| solve_as_labelled(&exchanged, options).ok())
+        .filter(|other| other.focal_conflict().is_none())
+        .map(|other| other.solution)
+        .is_some_and(|other| other.misfit().is_none() && other.fit.chi2 + CHI2_99 < chi2)
 }
 
 /// The label without what EXIF data say of the focal length, where that is what it goes by.
@@ -196,6 +215,8 @@ pub(super) struct FocalConflict {
     measured_px: f64,
     /// How far apart the two are, in standard deviations of the difference.
     sigmas: f64,
+    /// The label states the camera's height, from which the focal length follows, too.
+    has_height: bool,
 }
 
 impl FocalConflict {
@@ -207,6 +228,7 @@ impl FocalConflict {
             prior_px: problem.units.focal_px(prior.mean),
             measured_px: problem.units.focal_px(focal.from_data?.mean),
             sigmas: focal.prior_conflict(prior)?.abs(),
+            has_height: !problem.residuals.priors.ln_height.is_flat(),
         };
         (conflict.sigmas > CONFLICT_SIGMAS).then_some(conflict)
     }
@@ -233,9 +255,14 @@ impl FocalConflict {
             ..
         } = *self;
         let [source, causes] = source_and_causes(self.source);
+        let height = if self.has_height {
+            ", or a wrong camera.height_m"
+        } else {
+            ""
+        };
         let what = format!(
             "focal length: the corners give {measured_px:.0} px, {source} {prior_px:.0} px ({sigmas:.1} sigmas apart): \
-             {causes}"
+             {causes}{height}"
         );
         Diagnostic::warning(Code::FocalPriorConflict, what)
     }
@@ -284,26 +311,89 @@ fn exchange_warning(labelled_chi2: f64, exchanged_chi2: f64) -> Diagnostic {
 /// The solution with width and height exchanged, where it fits clearly better than this chi
 /// squared.
 fn with_exchanged_sides(label: &Label, options: &SolveOptions, chi2: f64) -> Option<Solution> {
-    let surface = &label.surface;
-    let (width_m, height_m) = (surface.width_m?, surface.height_m?);
-    if width_m == height_m || chi2 <= CHI2_99 {
-        return None;
-    }
-    let other = solve_without_wrong_exif(&exchanged(label), options).ok()?;
+    let exchanged = exchanged(label).filter(|_| chi2 > CHI2_99)?;
+    let other = solve_without_wrong_exif(&exchanged, options).ok()?;
     (other.fit.chi2 + CHI2_99 < chi2).then_some(other)
 }
 
-/// The label with width and height exchanged.
-fn exchanged(label: &Label) -> Label {
+/// The label with width and height exchanged; none where they are the same, or not both stated.
+fn exchanged(label: &Label) -> Option<Label> {
+    let surface = &label.surface;
+    let size = [surface.height_m?, surface.width_m?];
     let mut exchanged = label.clone();
-    let surface = &mut exchanged.surface;
-    std::mem::swap(&mut surface.width_m, &mut surface.height_m);
-    exchanged
+    exchanged.surface.set_size(size);
+    (size[0] != size[1]).then_some(exchanged)
+}
+
+/// Where a label does not fit but does without the height that it states, tells both heights.
+fn compare_without_height(
+    label: &Label,
+    options: &SolveOptions,
+    mut labelled: Solution,
+) -> Solution {
+    if let Some(stated_m) = label.camera.height_m
+        && labelled.misfit().is_some()
+    {
+        let other = solve_without_wrong_exif(&without_height(label), options).ok();
+        labelled.fit.heights_m = other
+            .filter(|other| other.misfit().is_none())
+            .filter(|other| other.fit.chi2 + CHI2_99 < labelled.fit.chi2)
+            .map(|other| [stated_m, other.camera.height_m()]);
+    }
+    labelled
+}
+
+fn without_height(label: &Label) -> Label {
+    let mut without = label.clone();
+    (without.camera.height_m, without.camera.height_sigma_m) = (None, None);
+    without
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::simulate::Scenario;
+
+    fn misfit(label: &Label) -> Option<SolveError> {
+        solve(label, &SolveOptions::default()).unwrap().misfit()
+    }
+
+    #[test]
+    fn exchanged_sides_seen_straight_on_are_not_blamed_on_the_exif_value() {
+        let scenario = Scenario {
+            focal_px: 3000.0,
+            size: [0.297, 0.21],
+            fill: 0.6,
+            azimuth: Some(0.0),
+            ..Scenario::default()
+        };
+        let mut label = scenario.tilted(35.0).view(1, 0).label;
+        let equivalent = 3000.0 / 5000.0 * 36f64.hypot(24.0);
+        label.camera.focal_35mm = Some(equivalent);
+        let refusal = misfit(&exchanged(&label).unwrap()).unwrap().to_string();
+        assert!(
+            refusal.contains("exchange width_m and height_m"),
+            "{refusal}"
+        );
+        for factor in [1.0, 1.5, 1.0 / 1.5] {
+            label.camera.focal_35mm = Some(factor * equivalent);
+            assert_eq!(misfit(&label), None, "{factor}");
+        }
+    }
+
+    #[test]
+    fn a_height_without_which_the_label_fits_is_named() {
+        let view = Scenario::default().tilted(30.0).view(1, 1);
+        let (mut label, height) = (view.label, view.camera.center().z);
+        (label.camera.focal_px, label.camera.focal_fixed) = (Some(3200.0), true);
+        label.surface.dimension_sigma_m = Some(1e-5);
+        label.camera.height_m = Some(1.3 * height);
+        label.camera.height_sigma_m = Some(0.01 * height);
+        let refusal = misfit(&label).unwrap().to_string();
+        let stated = 1.3 * height;
+        let expected = format!("camera.height_m: {stated} m, expected the {height:.3} m");
+        assert!(refusal.contains(&expected), "{refusal}");
+    }
 
     #[test]
     fn a_conflict_names_the_focal_length_that_is_taken() {

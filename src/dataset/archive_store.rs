@@ -3,8 +3,8 @@
 //! Nothing is ever overwritten. An archive counts as there once its receipt is, which is put last
 //! and says how long its files are and what their checksums are.
 
+use crate::dataset::Plan;
 use crate::dataset::folder::{self, IDENTITY};
-use crate::dataset::{Plan, Progress};
 use crate::error::{Error, Result};
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -124,16 +124,4 @@ fn put_or_compare(store: &dyn ArchiveStore, name: &str, content: Vec<u8>) -> Res
 
 fn url_of(store: &dyn ArchiveStore, name: &str) -> PathBuf {
     Path::new(store.url()).join(name)
-}
-
-/// Says how far a run is that was interrupted.
-pub(super) fn describe(
-    store: Option<&dyn ArchiveStore>,
-    folder: &Path,
-    so_far: Progress,
-) -> String {
-    match store {
-        Some(store) => so_far.describe(Path::new(store.url())),
-        None => so_far.describe(folder),
-    }
 }

@@ -5,7 +5,7 @@
 //! place in one step, and the folder goes.
 
 use crate::dataset::archive_store::{self, ArchiveStore};
-use crate::dataset::journal::lines_of;
+use crate::dataset::journal::{self, count_listed, lines_of};
 use crate::dataset::run::{Report, check_count};
 use crate::dataset::webdataset::{archive, is_whole, write_archive};
 use crate::dataset::{
@@ -15,17 +15,19 @@ use crate::error::{Error, Result};
 use crate::io;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Takes away the archives of a dataset that are not whole, so that the next run makes them again:
 /// returns how many are whole and how many were not. That run also reads every input file anew.
 ///
 /// Whole is one that ends as archives end and has all of its samples; what their files hold has no
-/// checksums there.
+/// checksums there. Samples that are not packed yet are compared as by
+/// [`repair`](crate::dataset::repair).
 ///
 /// # Errors
-/// A folder that holds no dataset of archives, or one that an older petcomp began.
+/// A folder that holds no dataset of archives, or one that an older petcomp began; an archive that
+/// a run is making.
 pub fn repair_archives(folder: &Path, range: SampleRange) -> Result<(usize, usize)> {
     check_range(range)?;
     let layout = ArchiveLayout::of_folder(folder)?;
@@ -41,6 +43,7 @@ pub fn repair_archives(folder: &Path, range: SampleRange) -> Result<(usize, usiz
                 bad += 1;
             }
         }
+        layout.repair_samples(number)?;
     }
     Ok((good, bad))
 }
@@ -65,7 +68,7 @@ pub(super) fn generate_archives(
     folder::share(plan)?;
     plan.inputs.keep(&plan.folder);
     let mut run = ArchiveRun::new(plan, archives)?;
-    progress(run.progress);
+    progress(run.so_far());
     for number in run.missing() {
         run.add(number, files, progress)?;
     }
@@ -147,6 +150,20 @@ impl<'a> ArchiveLayout<'a> {
         let _ = std::fs::remove_dir_all(self.samples_folder(number));
     }
 
+    /// Has the damaged samples of an archive that is not packed yet made again.
+    fn repair_samples(&self, number: u64) -> Result<()> {
+        let folder = self.samples_folder(number);
+        if folder::identity(&folder)?.is_none() {
+            return Ok(());
+        }
+        let (_, bad) = journal::repair(&folder)?;
+        if bad > 0 {
+            let folder = folder.display();
+            log::warn!("{folder}: {bad} images of an archive in the making are made again");
+        }
+        Ok(())
+    }
+
     /// The file of each part that has a sample in an archive.
     fn files(&self, number: u64) -> impl Iterator<Item = ArchiveFile> {
         let files = Part::ALL.map(|part| ArchiveFile {
@@ -186,6 +203,8 @@ struct ArchiveRun<'a> {
     present: BTreeSet<u64>,
     /// In archives that are whole.
     progress: Progress,
+    /// Samples of archives that were begun, by number.
+    begun: BTreeMap<u64, u64>,
     /// Of what this run has made.
     made: DatasetCounts,
 }
@@ -202,13 +221,31 @@ impl<'a> ArchiveRun<'a> {
             },
             present: BTreeSet::new(),
             progress: Progress::default(),
+            begun: BTreeMap::new(),
             made: DatasetCounts::new(&[], plan, plan.count, 0),
         };
         run.present = run.find_present()?;
         run.present.iter().for_each(|&n| run.layout.sweep(n));
         run.progress.count = run.numbers().map(|n| run.size(n)).sum();
         run.progress.done = run.present.iter().map(|&n| run.size(n)).sum();
+        run.missing().into_iter().for_each(|n| run.count_begun(n));
         Ok(run)
+    }
+
+    /// Notes the samples of an archive that is not whole.
+    fn count_begun(&mut self, number: u64) {
+        let samples = count_listed(&self.layout.samples_folder(number));
+        if samples > 0 {
+            self.begun.insert(number, samples);
+        }
+    }
+
+    /// With the samples of archives that were begun.
+    fn so_far(&self) -> Progress {
+        Progress {
+            done: self.progress.done + self.begun.values().sum::<u64>(),
+            ..self.progress
+        }
     }
 
     /// Those of this run's archives that are whole.
@@ -246,12 +283,16 @@ impl<'a> ArchiveRun<'a> {
     /// Makes an archive, or goes on with it.
     fn add(&mut self, number: u64, files: MakeFiles, progress: Report) -> Result<()> {
         let plan = self.plan_of(number);
-        let before = self.progress;
+        self.begun.remove(&number);
+        let before = self.so_far();
         let made = files(&plan, &|inner| progress(before.with(inner)));
-        let made = made.map_err(|error| self.told(error))?;
+        let made = made.map_err(|error| {
+            self.count_begun(number);
+            self.told(error)
+        })?;
         self.pack(number, &plan)?;
         self.present.insert(number);
-        self.progress = before.with(Progress {
+        self.progress = self.progress.with(Progress {
             done: self.size(number),
             count: 0,
             made: made.made,
@@ -277,9 +318,17 @@ impl<'a> ArchiveRun<'a> {
     fn told(&self, error: Error) -> Error {
         match error {
             Error::Interrupted { .. } => Error::Interrupted {
-                what: archive_store::describe(self.store(), &self.plan.folder, self.progress),
+                what: self.describe(),
             },
             other => other,
+        }
+    }
+
+    /// Says how far it is; a store has archives alone that are whole.
+    fn describe(&self) -> String {
+        match self.store() {
+            Some(store) => self.progress.describe(Path::new(store.url())),
+            None => self.so_far().describe(&self.plan.folder),
         }
     }
 

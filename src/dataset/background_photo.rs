@@ -157,6 +157,15 @@ impl BackgroundPhoto {
         files.into_iter().chain(self.front.clone())
     }
 
+    /// Fails where pictures were made of another photo or mask than those of these checksums; from
+    /// now on none are.
+    pub(crate) fn check_files(&self, photo: u32, front: Option<u32>) -> Result<()> {
+        let files = &self.memory.files;
+        files.check(&self.photo, photo)?;
+        let mut front = self.front.iter().zip(front);
+        front.try_for_each(|(mask, crc32)| files.check(mask, crc32))
+    }
+
     /// The part of the photo that pictures show.
     fn part(&self) -> f64 {
         let kept = [self.kept.width as f64, self.kept.height as f64];
@@ -280,7 +289,7 @@ impl BackgroundPhoto {
         path: &Path,
         [width, height]: [usize; 2],
     ) -> Result<Image<P>> {
-        let photo = io::read::<P>(path)?;
+        let photo = self.memory.files.read::<P>(path)?;
         self.check_size(path, photo.size())?;
         Ok(filter::resize(&photo.into_crop(self.kept), width, height))
     }

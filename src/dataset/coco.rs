@@ -1,7 +1,7 @@
 //! Labels as COCO writes them: one JSON document for each part of the dataset.
 
 use crate::dataset::formats::is_exact;
-use crate::dataset::paths::create_part_folders;
+use crate::dataset::paths::{create_part_folders, remove_files};
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::{Error, Result};
 use crate::geom::{BBox, Point2};
@@ -144,6 +144,10 @@ impl Writer for Coco {
 
     fn for_trainers(&self) -> Vec<PathBuf> {
         Part::ALL.map(document).into()
+    }
+
+    fn reopen(&self, folder: &Path) -> Result<()> {
+        remove_files(folder, Part::ALL.map(document))
     }
 
     fn finish(&self, folder: &Path, classes: &[String], samples: &[Written]) -> Result<()> {

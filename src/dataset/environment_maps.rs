@@ -2,8 +2,9 @@
 
 use crate::asset::{Panorama, warn_of_bits};
 use crate::dataset::DatasetConfig;
+use crate::dataset::known_files::KnownFiles;
 use crate::error::{Error, Result};
-use crate::io;
+use crate::io::{self, Checksum};
 use crate::lru::{LruCache, Shared};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Weak};
@@ -19,6 +20,8 @@ pub(crate) struct EnvironmentMaps {
     /// What the recipe lists.
     listed: Vec<String>,
     kept: LruCache<Arc<Panorama>>,
+    /// What they are read from.
+    known: KnownFiles,
 }
 
 impl EnvironmentMaps {
@@ -28,6 +31,7 @@ impl EnvironmentMaps {
             folder: config.folder.clone(),
             listed,
             kept: LruCache::of_bytes(KEPT_BYTES),
+            known: KnownFiles::default(),
         }
     }
 
@@ -43,17 +47,24 @@ impl EnvironmentMaps {
             .map(|name| (name.as_str(), self.folder.join(name)))
     }
 
+    /// Fails where light was taken from another picture than that of this checksum; from now on
+    /// none is.
+    pub(crate) fn check_file(&self, path: &Path, crc32: u32) -> Result<()> {
+        self.known.check(path, crc32)
+    }
+
     /// The picture that a scene names.
     ///
     /// # Errors
     /// A name that the recipe does not list and that leads out of its folder; a file that is no
-    /// panorama.
+    /// panorama, or has other bytes than it is known by.
     pub(crate) fn picture(&self, name: &str) -> Result<Arc<Panorama>> {
         if let Some(picture) = self.kept.get(name) {
             return Ok(picture);
         }
         let path = self.path(name)?;
         let picture = Panorama::read(&path)?;
+        self.check_file(&path, Checksum::from_file(&path)?.crc32)?;
         self.keep(name, picture, &path)
     }
 

@@ -18,7 +18,8 @@ use std::path::Path;
 /// Lists are in the order that draws choose by, so an entry that is added, lost or moved shows.
 ///
 /// # Errors
-/// A photo or an environment map that cannot be read.
+/// A photo or an environment map that cannot be read, or that pictures were made of when it had
+/// other bytes.
 pub(super) fn fingerprint(
     config: &DatasetConfig,
     library: &Library,
@@ -80,12 +81,13 @@ fn of_places(places: &[BackgroundPhoto], inputs: &mut Inputs) -> Result<Vec<Valu
     let photos = inputs.checksums(&photo_files(places))?;
     let mut fronts = inputs.checksums(&front_files(places))?.into_iter();
     let pairs = places.iter().zip(photos);
-    Ok(pairs
+    pairs
         .map(|(place, photo)| {
             let front = place.front.as_ref().and_then(|_| fronts.next());
-            of_place(place, photo, front)
+            place.check_files(photo, front)?;
+            Ok(of_place(place, photo, front))
         })
-        .collect())
+        .collect()
 }
 
 /// The masks beside backgrounds of what hides objects, by the names of their inputs.
@@ -153,9 +155,12 @@ fn of_surroundings(surroundings: &EnvironmentMaps, inputs: &mut Inputs) -> Resul
         .collect();
     let checksums = inputs.checksums(&named)?;
     let pairs = files.iter().zip(checksums);
-    Ok(pairs
-        .map(|((name, _), checksum)| json!({ "file": name, "content": shown(checksum) }))
-        .collect())
+    pairs
+        .map(|((name, path), checksum)| {
+            surroundings.check_file(path, checksum)?;
+            Ok(json!({ "file": name, "content": shown(checksum) }))
+        })
+        .collect()
 }
 
 /// Checksum of a value by its text: numbers are told to the last bit.

@@ -217,6 +217,11 @@ pub(crate) fn lines_of(folder: &Path) -> Result<Vec<JournalLine>> {
     Ok(by_number(read))
 }
 
+/// Samples that a folder's journal lists; none where there is no journal.
+pub(crate) fn count_listed(folder: &Path) -> u64 {
+    numbered_lines(folder).map_or(0, |read| by_number(read).len() as u64)
+}
+
 /// The files of the samples that a folder's journal lists.
 ///
 /// # Errors

@@ -27,6 +27,7 @@ mod contact_sheet;
 mod counts;
 mod environment_maps;
 mod estimate;
+mod eval_truth;
 mod falls;
 mod finding;
 mod fingerprint;
@@ -41,6 +42,7 @@ pub mod index;
 mod inputs;
 mod journal;
 mod journal_line;
+mod known_files;
 mod label_table;
 mod layers;
 mod listing;
@@ -90,6 +92,8 @@ pub use counts::ClassCount;
 pub use counts::DatasetCounts;
 #[doc(hidden)]
 pub use estimate::{LongRun, RunPace};
+#[doc(hidden)]
+pub use eval_truth::EvalTruth;
 pub use finding::Finding;
 #[doc(hidden)]
 pub use folder::JOURNAL;
@@ -334,6 +338,16 @@ pub trait Writer: Send + Sync {
     /// By default none.
     fn for_trainers(&self) -> Vec<PathBuf> {
         Vec::new()
+    }
+
+    /// Takes away the files that [`finish`](Self::finish) writes: samples are added that those do
+    /// not tell of. By default there are none.
+    ///
+    /// # Errors
+    /// When a file cannot be taken away.
+    fn reopen(&self, folder: &Path) -> Result<()> {
+        let _ = folder;
+        Ok(())
     }
 
     /// Writes the files that hold many samples, from `samples`' own files, which are in order of

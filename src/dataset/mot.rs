@@ -1,12 +1,13 @@
 //! Labels as the MOTChallenge has them: a folder for each sequence of pictures.
 
-use crate::dataset::paths::create_part_folders;
+use crate::dataset::paths::{create_part_folders, remove_file, remove_files};
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::scene::Belt;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -32,6 +33,10 @@ const KIND: &str = "mot";
 
 /// Folder of the shares that are joined: where sequences are, readers take every name for one.
 const SHARES_FOLDER: &str = "mot_frames";
+
+/// What readers know a sequence by, in its folder: its tracks and its description.
+const TRACKS: &str = "gt/gt.txt";
+const INFO: &str = "seqinfo.ini";
 
 /// One picture's share of its sequence.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -72,6 +77,11 @@ impl Writer for Mot {
         };
         io::write_json(folder.join(&path), &share)?;
         Ok(vec![path])
+    }
+
+    fn reopen(&self, folder: &Path) -> Result<()> {
+        let folders = Part::ALL.map(|part| folder.join(KIND).join(part.name()));
+        folders.iter().try_for_each(|part| remove_tracks(part))
     }
 
     fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {
@@ -139,8 +149,8 @@ impl Mot {
             let shown = format!("{:06}.{}", share.belt.frame + 1, self.pictures.extension());
             link(image, &pictures.join(shown))?;
         }
-        io::write_text(place.join("gt/gt.txt"), &text)?;
-        io::write_text(place.join("seqinfo.ini"), &self.info(name, frames))
+        io::write_text(place.join(TRACKS), &text)?;
+        io::write_text(place.join(INFO), &self.info(name, frames))
     }
 
     fn info(&self, name: &str, frames: &[SequenceFrame]) -> String {
@@ -156,13 +166,49 @@ impl Mot {
     }
 }
 
+/// Takes the tracks of a part's sequences away; their pictures stay, and what others put there.
+fn remove_tracks(folder: &Path) -> Result<()> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let mut sequences = entries.flatten().filter(|entry| {
+        let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+        is_folder && is_number(&entry.file_name())
+    });
+    sequences.try_for_each(|entry| remove_files(&entry.path(), [TRACKS, INFO]))
+}
+
+fn is_number(name: &OsStr) -> bool {
+    name.as_encoded_bytes().iter().all(u8::is_ascii_digit)
+}
+
 /// A second name of a file; a copy of it where there are no links.
 fn link(file: &Path, name: &Path) -> Result<()> {
-    match std::fs::remove_file(name) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::file(name, e)),
-        _ => (),
-    }
+    remove_file(name)?;
     let linked = std::fs::hard_link(file, name);
     let there = linked.or_else(|_| std::fs::copy(file, name).map(drop));
     there.map_err(|e| Error::file(name, e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tracks_of_sequences_alone_are_taken_away() {
+        let dir = tempfile::tempdir().unwrap();
+        Mot::default().begin(dir.path(), &[]).unwrap();
+        let own = ["000001/gt/gt.txt", "000001/seqinfo.ini"];
+        let others = [
+            "000001/det/det.txt",
+            "000001/img1/000001.png",
+            "mine/seqinfo.ini",
+        ];
+        let place = |name: &str| dir.path().join("mot/train").join(name);
+        for name in own.iter().chain(&others) {
+            std::fs::create_dir_all(place(name).parent().unwrap()).unwrap();
+            std::fs::write(place(name), "").unwrap();
+        }
+        Mot::default().reopen(dir.path()).unwrap();
+        assert_eq!(own.map(|name| place(name).exists()), [false; 2]);
+        assert_eq!(others.map(|name| place(name).exists()), [true; 3]);
+    }
 }

@@ -1,8 +1,9 @@
 //! Paths that several parts of a dataset need.
 
 use crate::dataset::Part;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::io;
+use std::io::ErrorKind;
 use std::path::Path;
 
 /// The folder that a file lies in; empty for a bare name.
@@ -21,4 +22,21 @@ pub(super) fn create_part_folders(folder: &Path, kind: &str) -> Result<()> {
     Part::ALL
         .iter()
         .try_for_each(|part| io::create_folder(folder.join(kind).join(part.name())))
+}
+
+/// Takes away those of the files below a folder that are there.
+pub(super) fn remove_files(
+    folder: &Path,
+    files: impl IntoIterator<Item = impl AsRef<Path>>,
+) -> Result<()> {
+    let mut files = files.into_iter();
+    files.try_for_each(|file| remove_file(&folder.join(file)))
+}
+
+/// Takes a file away if it is there.
+pub(super) fn remove_file(file: &Path) -> Result<()> {
+    match std::fs::remove_file(file) {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::file(file, e)),
+        _ => Ok(()),
+    }
 }

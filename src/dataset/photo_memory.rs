@@ -1,5 +1,6 @@
 //! What of the photos of places is in memory: the plates and masks that pictures showed last.
 
+use crate::dataset::known_files::KnownFiles;
 use crate::image::Image;
 use crate::lru::{LruCache, Shared};
 use crate::pixel::{Coverage, LinearRgb};
@@ -10,6 +11,8 @@ use std::sync::{Arc, Weak};
 pub(crate) struct PhotoMemory {
     pub(crate) plates: LruCache<Arc<Image<LinearRgb>>>,
     pub(crate) masks: LruCache<Arc<Image<Coverage>>>,
+    /// What they are read from.
+    pub(crate) files: KnownFiles,
 }
 
 impl PhotoMemory {
@@ -20,6 +23,7 @@ impl PhotoMemory {
         Self {
             plates: LruCache::of_bytes(pixels * plate_px),
             masks: LruCache::of_bytes(pixels * mask_px),
+            files: KnownFiles::default(),
         }
     }
 }

@@ -238,7 +238,7 @@ impl Pipeline {
     /// # Errors
     /// Classes that the config's policy for obstructed objects cannot add to; an asset that fits
     /// between the walls of some background in no direction; a photo or an environment map that
-    /// cannot be read.
+    /// cannot be read, or from which pictures were made when it had other bytes.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
         let (scene, labels) = (&self.config.scene, &self.config.labels);
         self.check_room_with(scene)?;

@@ -35,8 +35,12 @@ impl Progress {
         }
     }
 
+    fn is_done(&self) -> bool {
+        self.done >= self.count
+    }
+
     fn check_is_done(&self, folder: &Path) -> Result<()> {
-        if self.done >= self.count {
+        if self.is_done() {
             return Ok(());
         }
         let what = self.describe(folder);
@@ -97,13 +101,17 @@ pub(super) fn run(
     let journal = Journal::open(&plan.folder)?;
     let count = expected_count(plan, &journal);
     check_nothing_beyond(&journal, count, plan)?;
+    let state = RunState::new(journal, plan, count);
+    if !state.progress.is_done() {
+        part_samples(plan)?;
+    }
     let run = DatasetRun {
         plan,
         count,
         write,
         progress,
         stop,
-        state: Mutex::new(RunState::new(journal, plan, count)),
+        state: Mutex::new(state),
         began: Instant::now(),
     };
     run.report(&run.state());
@@ -239,6 +247,12 @@ impl<F: Fn(u64, Syncing) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, 
         }
         Ok(DatasetCounts::new(&lines, plan, count, made))
     }
+}
+
+/// Takes away the files that hold many samples: they would not hold those that are added.
+fn part_samples(plan: &Plan) -> Result<()> {
+    let mut writers = plan.writers.iter();
+    writers.try_for_each(|writer| writer.reopen(&plan.folder))
 }
 
 /// Writes the files that hold many samples.

@@ -1,6 +1,6 @@
 //! Labels as Pascal VOC writes them: one XML file for each image, and lists of images.
 
-use crate::dataset::paths::create_part_folders;
+use crate::dataset::paths::{create_part_folders, remove_files};
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::Result;
 use crate::geom::BBox;
@@ -55,6 +55,10 @@ impl Writer for Voc {
 
     fn for_trainers(&self) -> Vec<PathBuf> {
         Part::ALL.map(list).into()
+    }
+
+    fn reopen(&self, folder: &Path) -> Result<()> {
+        remove_files(folder, Part::ALL.map(list))
     }
 
     fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {

@@ -53,6 +53,12 @@ impl Writer for WebDataset {
         Part::ALL.map(|part| archive(Path::new(""), part, 0)).into()
     }
 
+    fn reopen(&self, folder: &Path) -> Result<()> {
+        let none = BTreeSet::new();
+        let mut parts = Part::ALL.into_iter();
+        parts.try_for_each(|part| remove_archives_but(&none, folder, part))
+    }
+
     fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {
         Part::ALL
             .into_iter()

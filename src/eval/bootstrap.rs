@@ -18,8 +18,9 @@ pub struct Interval {
 }
 
 /// mAP@0.5:0.95 with its percentile bootstrap interval over images: `rounds` times, as many images
-/// are drawn with replacement as there are. The same seed gives the same interval. A draw in which
-/// nothing is to be found has no score and does not count.
+/// are drawn with replacement as there are. Images of one [group](EvalImage::group) are alike, so
+/// they are drawn together, as many groups as there are. The same seed gives the same interval. A
+/// draw in which nothing is to be found has no score and does not count.
 ///
 /// # Method
 /// [Efron 1979], percentile interval.
@@ -39,8 +40,9 @@ impl Matches {
     pub fn bootstrap(&self, rounds: usize, seed: u64) -> Interval {
         let rounds = (0..rounds as u64).into_par_iter();
         let values = rounds.filter_map(|round| {
-            let times = drawn(self.images(), seed, round);
-            self.map_if_any(&times)
+            let times = drawn(self.group_count(), seed, round);
+            let weights: Vec<u32> = self.groups().iter().map(|&group| times[group]).collect();
+            self.map_if_any(&weights)
         });
         interval(self.map(&[]), values.collect())
     }
@@ -121,6 +123,29 @@ mod tests {
         let [few, many] = [12, 300].map(|n| bootstrap(&some(n), Definition::Coco, 200, 7));
         assert!(few.low < few.value && few.value < few.high);
         assert!(many.high - many.low < 0.5 * (few.high - few.low));
+    }
+
+    #[test]
+    fn images_of_a_sequence_are_drawn_together() {
+        let b = bbox(0.0, 0.0, 10.0, 10.0);
+        let image = |group: usize| {
+            let found = vec![found(0, b, 0.5); group % 2];
+            sheet(vec![there(0, b)], found)
+        };
+        let alone: Vec<EvalImage> = (0..12).map(image).collect();
+        let frames = alone.iter().enumerate().flat_map(|(group, image)| {
+            let frame = EvalImage {
+                group: group.to_string(),
+                ..image.clone()
+            };
+            vec![frame; 50]
+        });
+        let frames: Vec<EvalImage> = frames.collect();
+        let [alone, frames] =
+            [&alone, &frames].map(|sheets| bootstrap(sheets, Definition::Coco, 100, 7));
+        for (alone, frames) in [(alone.low, frames.low), (alone.high, frames.high)] {
+            assert!((alone - frames).abs() < 1e-9, "{alone} {frames}");
+        }
     }
 
     #[test]

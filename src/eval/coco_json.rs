@@ -27,6 +27,8 @@ struct ImageRecord {
     coco_url: String,
     width: Option<f64>,
     height: Option<f64>,
+    /// A number or a text.
+    video_id: Option<serde_json::Value>,
 }
 
 #[derive(Deserialize)]
@@ -106,8 +108,9 @@ impl CocoTruth {
         let categories = document.category_places()?;
         let records = document.images_at(images.values());
         let names = sheet_names(&records).into_iter();
+        let sheets = names.zip(&records).map(|(name, image)| image.sheet(name));
         Ok(Self {
-            sheets: names.map(|name| EvalImage::new(name, Vec::new())).collect(),
+            sheets: sheets.collect(),
             classes: document.category_names(categories.values()),
             files: records.iter().map(|image| image.file()).collect(),
             images: images.keys().copied().zip(0..).collect(),
@@ -255,6 +258,15 @@ fn look_up<T: Copy>(places: &BTreeMap<i64, T>, field: &str, id: i64) -> Result<T
 impl ImageRecord {
     fn file(&self) -> (String, Option<[f64; 2]>) {
         (self.listed_name().to_owned(), self.size())
+    }
+
+    /// With nothing in it yet.
+    fn sheet(&self, name: String) -> EvalImage {
+        let video = self.video_id.as_ref().map(ToString::to_string);
+        EvalImage {
+            group: video.unwrap_or_default(),
+            ..EvalImage::new(name, Vec::new())
+        }
     }
 
     fn listed_name(&self) -> &str {
@@ -431,6 +443,17 @@ mod tests {
             named,
             [["1", "2"], ["cam0/1", "cam1/1"], ["1.png", "1.jpg"]]
         );
+    }
+
+    #[test]
+    fn images_of_one_video_are_a_group() {
+        let groups = |more: &str| -> Vec<String> {
+            let text = TRUTH.replace("\"width\": 9", more);
+            let truth = CocoTruth::new(&io::parse_json(&text).unwrap()).unwrap();
+            truth.sheets.into_iter().map(|sheet| sheet.group).collect()
+        };
+        assert_eq!(groups(r#""video_id": 0"#), ["", "0"]);
+        assert_eq!(groups(r#""video_id": null"#), ["", ""]);
     }
 
     #[test]

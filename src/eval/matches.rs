@@ -5,13 +5,15 @@ use super::coco::{self, AreaRange};
 use super::rank::Ranking;
 use super::{Curves, Definition, EvalImage, Scores, check_weights, curve, mean, yolov5};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Detections matched with the truth once, which is what takes long: they can be scored for any
 /// weights of the images.
 #[derive(Clone, Debug)]
 pub struct Matches {
     definition: Definition,
-    images: usize,
+    /// Of each image.
+    groups: Vec<usize>,
     rankings: Vec<Ranking>,
 }
 
@@ -20,14 +22,24 @@ impl Matches {
     pub fn new(sheets: &[EvalImage], definition: Definition) -> Self {
         Self {
             definition,
-            images: sheets.len(),
+            groups: group_numbers(sheets),
             rankings: rankings_by(definition, sheets),
         }
     }
 
     /// How many images there are.
     pub fn images(&self) -> usize {
-        self.images
+        self.groups.len()
+    }
+
+    /// The group of each image, 0, 1, ..; an image without one is a group by itself.
+    pub(super) fn groups(&self) -> &[usize] {
+        &self.groups
+    }
+
+    /// How many groups there are.
+    pub(super) fn group_count(&self) -> usize {
+        self.groups.iter().max().map_or(0, |last| last + 1)
     }
 
     /// The scores, as [`evaluate`](super::evaluate) gives them.
@@ -75,8 +87,21 @@ impl Matches {
     }
 
     fn check(&self, weights: &[u32]) {
-        check_weights(weights, self.images);
+        check_weights(weights, self.images());
     }
+}
+
+/// In order of the first image of each.
+fn group_numbers(sheets: &[EvalImage]) -> Vec<usize> {
+    let (mut known, mut numbers) = (BTreeMap::new(), 0_usize..);
+    let mut next = || numbers.next().unwrap_or_default();
+    let groups = sheets.iter().map(|sheet| sheet.group.as_str());
+    groups
+        .map(|group| match group {
+            "" => next(),
+            group => *known.entry(group).or_insert_with(&mut next),
+        })
+        .collect()
 }
 
 /// The detections of every class, ranked as a definition matches them.

@@ -136,6 +136,8 @@ impl Detection {
 pub struct EvalImage {
     /// Name of the image, without folder and extension.
     pub image: String,
+    /// What images of one sequence have in common, by any name; empty of an image by itself.
+    pub group: String,
     /// What there is.
     pub truth: Vec<GroundTruth>,
     /// What was found, in any order.
@@ -147,6 +149,7 @@ impl EvalImage {
     pub fn new(image: impl Into<String>, truth: Vec<GroundTruth>) -> Self {
         Self {
             image: image.into(),
+            group: String::new(),
             truth,
             found: Vec::new(),
         }
@@ -300,9 +303,8 @@ pub(crate) mod tests {
 
     pub(crate) fn sheet(truth: Vec<GroundTruth>, found: Vec<Detection>) -> EvalImage {
         EvalImage {
-            image: String::new(),
-            truth,
             found,
+            ..EvalImage::new("", truth)
         }
     }
 

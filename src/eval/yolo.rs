@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::geom::{BBox, Point2};
 use crate::io::{self, Format};
 use rayon::prelude::*;
+use serde::Deserialize;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -103,15 +104,19 @@ impl LabelFolder {
     }
 
     fn read(&self, name: &str, size: Option<[u32; 2]>) -> Result<LabelledImage> {
-        let image = self.images.get(name);
+        let [label, image] =
+            [&self.labels, &self.images].map(|files| files.get(name).map(PathBuf::as_path));
         let size = match (size, image) {
             (Some(size), _) => size,
             (None, Some(image)) => image_size(image)?,
             (None, None) => return Err(self.missing_image(name)),
         };
-        let truth = truth_of(self.labels.get(name).map(PathBuf::as_path), size)?;
-        let picture = image.map(|path| picture_of(path.clone(), size));
-        Ok((EvalImage::new(name, truth), size, picture))
+        let sheet = EvalImage {
+            group: sequence_beside(image, label),
+            ..EvalImage::new(name, truth_of(label, size)?)
+        };
+        let picture = image.map(|path| picture_of(path.into(), size));
+        Ok((sheet, size, picture))
     }
 
     /// What is wrong with a label that has no image.
@@ -140,7 +145,48 @@ fn read_image(image: &Path) -> Result<LabelledImage> {
     let truth = truth_of(label.as_deref(), size)?;
     let picture = Some(picture_of(image.into(), size));
     let name = image.file_stem().unwrap_or_default().to_string_lossy();
-    Ok((EvalImage::new(name, truth), size, picture))
+    let sheet = EvalImage {
+        group: sequence_beside(Some(image), None),
+        ..EvalImage::new(name, truth)
+    };
+    Ok((sheet, size, picture))
+}
+
+/// What eval needs of a sidecar that petcomp writes: whether the picture is one of a belt.
+#[derive(Deserialize)]
+struct Sidecar {
+    scene: SidecarScene,
+}
+
+#[derive(Deserialize)]
+struct SidecarScene {
+    belt: Option<SidecarBelt>,
+}
+
+#[derive(Deserialize)]
+struct SidecarBelt {
+    sequence: u64,
+}
+
+/// The sequence of a belt that an image is of, with its dataset's folder, by the sidecar beside it
+/// or its label; empty of any other image.
+fn sequence_beside(image: Option<&Path>, label: Option<&Path>) -> String {
+    let sidecar =
+        |path: &Path, step| io::with_last_step(path, step, "scenes").with_extension("json");
+    let by_image = image.map(|path| sidecar(path, "images"));
+    let by_label = label.map(|path| sidecar(path, "labels"));
+    let mut sidecars = [by_image, by_label].into_iter().flatten();
+    let found = sidecars.find(|path| path.is_file());
+    found
+        .and_then(|path| sequence_in(&path))
+        .unwrap_or_default()
+}
+
+/// None of a JSON that is no sidecar of a belt's picture.
+fn sequence_in(sidecar: &Path) -> Option<String> {
+    let belt = io::read_json_data::<Sidecar>(sidecar).ok()?.scene.belt?;
+    let folder = sidecar.parent().unwrap_or(Path::new("")).display();
+    Some(format!("{folder}/{}", belt.sequence))
 }
 
 /// Where YOLO has the label of an image.
@@ -182,16 +228,16 @@ fn picture_of(path: PathBuf, size: [u32; 2]) -> Picture {
 }
 
 /// Adds what a detector found, from `NAME.txt` of a folder and of those below it: `class cx cy w h
-/// confidence`.
+/// confidence`, or with the id of a track behind it.
 ///
 /// An image without a file has no detections; a file without an image is refused, as it may be a
 /// misspelt name.
 ///
 /// # Errors
-/// [`Error::File`] for a folder that cannot be read, a name that the truth does not have, files of
-/// one name in several folders or whose names are not UTF-8, or a bad line.
+/// [`Error::File`] for a folder that cannot be read, a name that the truth does not have or has
+/// twice, files of one name in several folders or whose names are not UTF-8, or a bad line.
 pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
-    let (known, files) = (truth.places_by_name(), text_files(folder, |_| true)?);
+    let (known, files) = (truth.places_by_name()?, text_files(folder, |_| true)?);
     if files.is_empty() {
         let folder = folder.display();
         log::warn!("{folder}: no NAME.txt, so nothing was found in any image");
@@ -222,9 +268,21 @@ impl YoloTruth {
         truth
     }
 
-    fn places_by_name(&self) -> BTreeMap<&str, usize> {
-        let names = self.sheets.iter().map(|sheet| sheet.image.as_str());
-        names.zip(0..).collect()
+    fn places_by_name(&self) -> Result<BTreeMap<&str, usize>> {
+        let mut places = BTreeMap::new();
+        for (place, sheet) in self.sheets.iter().enumerate() {
+            if let Some(first) = places.insert(sheet.image.as_str(), place) {
+                return Err(same_name(self.path_of(place), self.path_of(first)));
+            }
+        }
+        Ok(places)
+    }
+
+    /// The path of an image, as far as it is known.
+    fn path_of(&self, place: usize) -> &Path {
+        let picture = self.pictures.get(place).and_then(Option::as_ref);
+        let name = Path::new(&self.sheets[place].image);
+        picture.map_or(name, |picture| picture.path.as_path())
     }
 }
 
@@ -346,18 +404,43 @@ fn parse_row(line: &str, extra: usize) -> std::result::Result<LabelRow, String> 
     let numbers: Vec<f64> = numbers.collect::<std::result::Result<_, _>>()?;
     let (place, rest) = split_extra(&numbers, extra)?;
     check_shares(place)?;
+    let shares = box_around(place).ok_or_else(|| too_few(&numbers, extra))?;
+    let confidence = rest.first().copied().unwrap_or(1.0);
+    check_confidence(confidence)?;
     Ok(LabelRow {
         class,
-        shares: box_around(place).ok_or_else(|| too_few(&numbers, extra))?,
-        confidence: rest.first().copied().unwrap_or(1.0),
+        shares,
+        confidence,
     })
 }
 
 /// The numbers of the place, and those behind them.
 fn split_extra(numbers: &[f64], extra: usize) -> std::result::Result<(&[f64], &[f64]), String> {
+    let extra = extra + usize::from(extra > 0 && has_track_id(numbers));
     let count = numbers.len().checked_sub(extra);
     let count = count.ok_or_else(|| too_few(numbers, extra))?;
     Ok(numbers.split_at(count))
+}
+
+/// Whether a tracker wrote them: `cx cy w h confidence id`.
+fn has_track_id(numbers: &[f64]) -> bool {
+    match *numbers {
+        [_, _, _, _, confidence, id] => is_share(confidence) && id >= 0.0 && id.fract() == 0.0,
+        _ => false,
+    }
+}
+
+fn is_share(number: f64) -> bool {
+    (0.0..=1.0).contains(&number)
+}
+
+fn check_confidence(number: f64) -> std::result::Result<(), String> {
+    if is_share(number) {
+        return Ok(());
+    }
+    Err(format!(
+        "{number}, expected a confidence, 0 to 1; is it the id of a track? (save_conf=True)"
+    ))
 }
 
 fn parse_class(text: &str) -> std::result::Result<u32, String> {
@@ -567,6 +650,40 @@ mod tests {
             ),
             (0, 0.25)
         );
+    }
+
+    #[test]
+    fn the_id_of_a_track_is_no_confidence() {
+        let parsed = |line: &str| parse_detections(line, [10, 10]);
+        let said =
+            "line 1: 7, expected a confidence, 0 to 1; is it the id of a track? (save_conf=True)";
+        assert_eq!(parsed("0 0.5 0.5 0.2 0.2 7").unwrap_err(), said);
+        let tracked = parsed("0 0.5 0.5 0.2 0.2 0.25 7").unwrap();
+        assert_eq!(tracked, parsed("0 0.5 0.5 0.2 0.2 0.25").unwrap());
+        for bad in ["0 0.5 0.5 0.2 0.2 7 0.25", "0 0.1 0.1 0.2 0.2 0.3 0.25"] {
+            let told = parsed(bad).unwrap_err();
+            assert!(told.contains("6 numbers behind the class"), "{told}");
+        }
+    }
+
+    #[test]
+    fn frames_of_a_belt_are_grouped_by_their_sidecars() {
+        let scene =
+            |belt: &str| format!(r#"{{"index": 3, "scene": {{"image": [8, 6], "belt": {belt}}}}}"#);
+        let [frame, still] = [r#"{"sequence": 4, "frame": 0}"#, "null"].map(scene);
+        let set = folder(&[
+            ("labels/val/a.txt", BOX),
+            ("labels/val/b.txt", BOX),
+            ("labels/val/c.txt", BOX),
+            ("scenes/val/a.json", frame.as_str()),
+            ("scenes/val/b.json", still.as_str()),
+        ]);
+        let labels = set.path().join("labels/val");
+        let truth = read_yolo_truth(&labels, None, Some([9, 9])).unwrap();
+        let groups = truth.sheets.iter().map(|sheet| sheet.group.as_str());
+        let groups: Vec<&str> = groups.collect();
+        assert!(groups[0].ends_with("scenes/val/4"), "{groups:?}");
+        assert_eq!(groups[1..], ["", ""]);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::codec::exr;
 use super::decode::catch_panic;
 use super::format::Format;
 use super::fs::write_bytes;
+use super::header::Canvas;
 use super::options::ReadOptions;
 use super::source::SourceFile;
 use crate::error::{Error, Result};
@@ -25,9 +26,22 @@ pub fn write_channels(
     channels: &[(&str, &[f32])],
     metadata: &[(String, String)],
 ) -> Result<()> {
-    let encoded = encode(size, channels, metadata, |samples| {
-        exr::float_samples(samples.to_vec())
-    });
+    let planes = float_planes(channels);
+    write_encoded(path.as_ref(), encode(size, planes, metadata))
+}
+
+/// As [`write_channels`], a picture somewhere on a canvas, without texts.
+///
+/// # Errors
+/// Those of [`write_channels`].
+pub fn write_channels_on(
+    path: impl AsRef<Path>,
+    size: (usize, usize),
+    canvas: Canvas,
+    channels: &[(&str, &[f32])],
+) -> Result<()> {
+    let planes = float_planes(channels);
+    let encoded = exr::encode(size, canvas, planes, exr::Compression::Zip, &[]);
     write_encoded(path.as_ref(), encoded)
 }
 
@@ -41,21 +55,31 @@ pub fn write_half_channels(
     channels: &[(&str, &[f32])],
     metadata: &[(String, String)],
 ) -> Result<()> {
-    let encoded = encode(size, channels, metadata, exr::half_samples);
-    write_encoded(path.as_ref(), encoded)
+    let planes = planes(channels, exr::half_samples);
+    write_encoded(path.as_ref(), encode(size, planes, metadata))
+}
+
+fn float_planes<'a>(channels: &[(&'a str, &[f32])]) -> Vec<(&'a str, exr::FlatSamples)> {
+    planes(channels, |samples| exr::float_samples(samples.to_vec()))
+}
+
+fn planes<'a>(
+    channels: &[(&'a str, &[f32])],
+    stored: impl Fn(&[f32]) -> exr::FlatSamples,
+) -> Vec<(&'a str, exr::FlatSamples)> {
+    let channels = channels.iter();
+    channels
+        .map(|&(name, samples)| (name, stored(samples)))
+        .collect()
 }
 
 fn encode(
     size: (usize, usize),
-    channels: &[(&str, &[f32])],
+    planes: Vec<(&str, exr::FlatSamples)>,
     metadata: &[(String, String)],
-    stored: impl Fn(&[f32]) -> exr::FlatSamples,
 ) -> std::result::Result<Vec<u8>, String> {
-    let planes = channels
-        .iter()
-        .map(|&(name, samples)| (name, stored(samples)))
-        .collect();
-    exr::encode(size, planes, exr::Compression::Zip, metadata)
+    let (canvas, compression) = (Canvas::default(), exr::Compression::Zip);
+    exr::encode(size, canvas, planes, compression, metadata)
 }
 
 /// Writes parts of one size (width, height) into one EXR file, losslessly compressed; the same

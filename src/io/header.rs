@@ -14,6 +14,25 @@ pub enum Window {
     Data,
 }
 
+/// The plane that an EXR's picture lies in: where, and of what pixels. Other formats have only the
+/// default.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Canvas {
+    /// Column and row of the picture's first pixel. Default: 0, 0.
+    pub at: [i32; 2],
+    /// Width of a pixel by its height. Default: 1.
+    pub pixel_aspect: f32,
+}
+
+impl Default for Canvas {
+    fn default() -> Self {
+        Self {
+            at: [0; 2],
+            pixel_aspect: 1.0,
+        }
+    }
+}
+
 /// How a picture file describes itself; reading it decodes no pixel.
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +43,8 @@ pub struct Header {
     pub width: usize,
     /// Rows of the upright picture.
     pub height: usize,
+    /// Where it lies, and of what pixels.
+    pub canvas: Canvas,
     /// Column and row of the first stored pixel, seen from the picture's first one. Other than (0,
     /// 0) only in EXR.
     pub data_at: [i64; 2],
@@ -60,6 +81,7 @@ impl Default for Header {
             format: Format::Png,
             width: 0,
             height: 0,
+            canvas: Canvas::default(),
             data_at: [0; 2],
             data_size: [0; 2],
             channels: Vec::new(),

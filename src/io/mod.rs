@@ -50,7 +50,7 @@
 //!   what a power cut tears of the last ones is made again.) A link in its place is replaced, not
 //!   followed, a file gives its permissions, a device or a pipe is refused; `refuse_links` keeps
 //!   outputs in their folder. No metadata of an input gets into an output, so neither positions
-//!   (GPS) nor serial numbers do.
+//!   (GPS) nor serial numbers do; keyers alone keep where an EXR lies and the shape of its pixels.
 //! * **Where a document leads.** A path in a document that may come from anywhere (journal and
 //!   manifest of a dataset or an asset folder, label, scene, scene for another renderer) is looked
 //!   for in the folder of that document alone: [`inside`] refuses `..`, links that lead out, and
@@ -123,7 +123,7 @@ pub(crate) use fs::{
 };
 pub use header::Header;
 #[doc(hidden)]
-pub use header::Window;
+pub use header::{Canvas, Window};
 #[doc(hidden)]
 pub(crate) use limits::machine_bytes;
 pub use limits::{LimitOverride, Limits};

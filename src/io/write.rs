@@ -6,6 +6,7 @@ use super::codec::jpeg::{Chroma, JpegCoding};
 use super::codec::{jpeg, png, tiff};
 use super::format::Format;
 use super::fs::write_bytes;
+use super::header::Canvas;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::quality::Quality;
@@ -30,6 +31,8 @@ pub struct WriteOptions {
     pub jpeg_chroma: Chroma,
     /// Texts to store with the picture, by name. Default: none.
     pub metadata: Vec<(String, String)>,
+    /// Where the picture of an EXR lies, and of what pixels. Default: [`Canvas::default`].
+    pub canvas: Canvas,
 }
 
 impl Default for WriteOptions {
@@ -41,6 +44,7 @@ impl Default for WriteOptions {
             jpeg_quality: 95,
             jpeg_chroma: Chroma::default(),
             metadata: Vec::new(),
+            canvas: Canvas::default(),
         }
     }
 }
@@ -181,7 +185,8 @@ fn encode_exr<P: ToFile>(
 ) -> std::result::Result<Vec<u8>, String> {
     let planes = exr_planes(image, bits);
     let metadata = with_colorspace(&options.metadata);
-    exr::encode(image.size(), planes, options.compression, &metadata)
+    let (size, compression) = (image.size(), options.compression);
+    exr::encode(size, options.canvas, planes, compression, &metadata)
 }
 
 fn exr_planes<P: ToFile>(image: &Image<P>, bits: Bits) -> Vec<(&'static str, exr::FlatSamples)> {

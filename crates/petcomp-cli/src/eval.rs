@@ -5,18 +5,16 @@ use crate::output::folder_parser;
 use crate::print;
 use crate::values::{check_companion, count, parse_pixel_size};
 use petcomp::Error;
-use petcomp::dataset::YoloSet;
+use petcomp::dataset::EvalTruth;
 use petcomp::eval::page::{self, EvalReportOptions, Metrics, Run};
-use petcomp::eval::{
-    ConfusionOptions, EvalImage, Tags, read_coco_results, read_coco_truth, read_tags,
-    read_yolo_detections, read_yolo_truth,
-};
-use std::path::{Path, PathBuf};
+use petcomp::eval::{ConfusionOptions, Tags, read_tags};
+use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct EvalArgs {
     /// Predictions of one or more runs, then the truth: folders of YOLO labels (`class cx cy w h
-    /// confidence`) or COCO JSON
+    /// confidence`, or with the id of a track behind it) or COCO JSON; the truth may be a list of
+    /// images (.txt), or a folder with a data.yaml and no labels: its images for validation
     #[arg(required = true, num_args = 2.., value_names = ["PREDICTIONS", "TRUTH"])]
     paths: Vec<PathBuf>,
     /// CSV with a line `image,light,..` and what each image of the truth is: scores per factor
@@ -38,7 +36,8 @@ pub(crate) struct EvalArgs {
     /// Most pictures of false alarms, and of misses, on the page
     #[arg(short = 'n', long, value_name = "N", default_value_t = EvalReportOptions::default().shown)]
     most: usize,
-    /// Rounds of the bootstrap over images, at most 100000; there is no interval of fewer than 40
+    /// Rounds of the bootstrap over images (sequences of a belt or video), at most 100000; there is
+    /// no interval of fewer than 40
     #[arg(long, value_name = "N", default_value_t = EvalReportOptions::default().rounds, value_parser = count(0..=100_000))]
     rounds: usize,
     /// Seed of the bootstrap
@@ -112,7 +111,8 @@ impl EvalArgs {
 
     /// Fails for an option that the truth has no use for, and for pictures that are nowhere.
     fn check_options(&self) -> petcomp::Result<()> {
-        let is_yolo = self.paths.last().is_some_and(|truth| !is_coco(truth));
+        let truth = self.paths.last();
+        let is_yolo = truth.is_some_and(|truth| !EvalTruth::is_coco(truth));
         let yolo = "a folder of YOLO labels as TRUTH: COCO has sizes itself";
         check_companion("--size", self.size.is_some(), yolo, is_yolo)?;
         match self.images.as_ref().filter(|folder| !folder.is_dir()) {
@@ -160,71 +160,15 @@ impl EvalArgs {
         let Some(truth) = self.paths.last() else {
             anyhow::bail!("expected PREDICTIONS TRUTH");
         };
-        if !is_coco(truth) {
-            YoloSet::check_labels(truth)?;
-        }
+        let truth = EvalTruth::read(truth, self.images.as_deref(), self.size)?;
         let (predictions, mut runs) = (self.predictions(), Vec::new());
         for (path, name) in predictions.iter().zip(page::run_names(predictions)) {
-            let sheets = self.read_predictions(path, truth, options)?;
+            let sheets = truth.with_detections(path)?;
             runs.push(Run { name, sheets });
         }
-        if options.classes.is_empty() && !is_coco(truth) {
-            options.classes = dataset_classes(truth);
-        }
+        truth.describe(options);
         Ok(runs)
     }
-
-    fn read_predictions(
-        &self,
-        path: &Path,
-        truth: &Path,
-        options: &mut EvalReportOptions,
-    ) -> petcomp::Result<Vec<EvalImage>> {
-        if is_coco(truth) {
-            self.read_coco(path, truth, options)
-        } else {
-            self.read_yolo(path, truth, options)
-        }
-    }
-
-    fn read_coco(
-        &self,
-        found: &Path,
-        truth: &Path,
-        options: &mut EvalReportOptions,
-    ) -> petcomp::Result<Vec<EvalImage>> {
-        let mut all = read_coco_truth(truth)?;
-        read_coco_results(found, &mut all)?;
-        if options.classes.is_empty() {
-            options.classes.clone_from(&all.classes);
-        }
-        options.pictures = all.pictures(truth, self.images.as_deref());
-        Ok(all.sheets)
-    }
-
-    fn read_yolo(
-        &self,
-        found: &Path,
-        truth: &Path,
-        options: &mut EvalReportOptions,
-    ) -> petcomp::Result<Vec<EvalImage>> {
-        let mut all = read_yolo_truth(truth, self.images.as_deref(), self.size)?;
-        read_yolo_detections(found, &mut all)?;
-        options.pictures = all.pictures;
-        Ok(all.sheets)
-    }
-}
-
-fn is_coco(truth: &Path) -> bool {
-    truth.extension().is_some_and(|e| e == "json")
-}
-
-/// Classes of the dataset that the labels belong to, if they have names.
-fn dataset_classes(labels: &Path) -> Vec<String> {
-    YoloSet::class_names_of(labels).unwrap_or_else(|error| {
-        log::warn!("{error}; classes are called by their numbers");
-        Vec::new()
-    })
 }
 
 #[cfg(test)]

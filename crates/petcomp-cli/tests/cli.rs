@@ -765,7 +765,7 @@ fn the_frames_of_a_sequence_are_keyed_into_folders() {
     let screen = ["--screen", "0.02,0.6,0.05"];
     std::fs::create_dir(desk.path("shot")).expect("a folder");
     for (k, brightest) in [0.3, 0.5, 0.7].into_iter().enumerate() {
-        let (frame, alone) = (format!("shot/{k}.png"), format!("alone_{k}.png"));
+        let (frame, alone) = (format!("shot/{k}.png"), format!("alone_{k}.exr"));
         write_green_ramp(&desk.path(&frame), brightest);
         desk.ok(&[&["matte", "key", &frame, "-o", &alone][..], &screen].concat());
     }
@@ -775,10 +775,10 @@ fn the_frames_of_a_sequence_are_keyed_into_folders() {
     let read = |name: String| std::fs::read(desk.path(name)).expect("a picture");
     for k in 0..3 {
         assert_eq!(
-            read(format!("keyed/{k}.png")),
-            read(format!("alone_{k}.png"))
+            read(format!("keyed/{k}.exr")),
+            read(format!("alone_{k}.exr"))
         );
-        assert!(desk.path(format!("mattes/{k}.png")).exists());
+        assert!(desk.path(format!("mattes/{k}.exr")).exists());
     }
     let same = ["matte", "key", "shot/0.png", "shot/0.png", "-o", "twice"];
     let refused = desk.run(&[&same[..], &screen].concat());
@@ -789,7 +789,7 @@ fn the_frames_of_a_sequence_are_keyed_into_folders() {
 fn nothing_that_a_keyer_reads_is_written_over() {
     let desk = Desk::new();
     std::fs::create_dir(desk.path("shot")).expect("a folder");
-    let frames = ["shot/0.png", "shot/1.png"];
+    let frames = ["shot/0.exr", "shot/1.exr"];
     for frame in frames {
         write_green_ramp(&desk.path(frame), 0.5);
     }
@@ -808,20 +808,20 @@ fn nothing_that_a_keyer_reads_is_written_over() {
         assert!(told.contains("is read and would be written over"), "{told}");
     }
     for more in [
-        &["-o", "shot/0.png"][..],
+        &["-o", "shot/0.exr"][..],
         &[
             "-o",
-            "0.png",
+            "0.exr",
             "--garbage",
-            "shot/1.png",
+            "shot/1.exr",
             "--matte",
-            "shot/1.png",
+            "shot/1.exr",
         ],
     ] {
         let told = refused(&frames[..1], more);
         assert!(told.contains("is read and would be written over"), "{told}");
     }
-    let told = refused(&frames[..1], &["-o", "0.png", "--matte", "./0.png"]);
+    let told = refused(&frames[..1], &["-o", "0.exr", "--matte", "./0.exr"]);
     assert!(told.contains("two files would go here"), "{told}");
     assert!(content() == before && !desk.path("keyed").exists());
 }
@@ -1037,7 +1037,7 @@ fn a_frame_that_cannot_be_keyed_does_not_stop_the_others() {
     let done = desk.run(&words(
         "matte key 0.png 1.png -o keyed --screen 0.02,0.6,0.05",
     ));
-    assert!(!done.status.success() && desk.path("keyed/0.png").exists());
+    assert!(!done.status.success() && desk.path("keyed/0.exr").exists());
     let said = text(&done.stderr);
     assert!(
         said.contains("1.png") && said.contains("1 of 2 files could not be used; the rest is done"),
@@ -1051,39 +1051,73 @@ fn a_frame_that_cannot_be_keyed_does_not_stop_the_others() {
 }
 
 #[test]
-fn keyed_frames_are_exr_where_their_own_format_would_lose_bits() {
+fn keyed_frames_are_exr_whatever_they_were() {
     let desk = Desk::new();
     std::fs::create_dir(desk.path("shot")).expect("a folder");
-    let frames = [
-        "shot/0.jpg",
-        "shot/1.jpeg",
-        "shot/2.png",
-        "shot/3.png",
-        "shot/4.tif",
-    ];
+    let frames = ["shot/0.jpg", "shot/1.png", "shot/2.tif", "shot/3.exr"];
     for frame in frames {
         write_green_ramp(&desk.path(frame), 0.5);
     }
-    let green = petcomp::Image::filled(24, 4, petcomp::LinearRgb::new(0.02, 0.6, 0.05));
-    let deep = petcomp::io::WriteOptions {
-        bits: Some(petcomp::io::Bits::Sixteen),
-        ..petcomp::io::WriteOptions::default()
-    };
-    petcomp::io::write_with(desk.path("shot/3.png"), &green, &deep).expect("a picture");
-    let more = [
-        "-o",
-        "cut",
-        "--matte",
-        "mattes",
-        "--screen",
-        "0.02,0.6,0.05",
-    ];
-    desk.ok(&[&["matte", "key"][..], &frames, &more].concat());
-    for name in ["0.exr", "1.exr", "2.png", "3.exr", "4.tif"] {
+    let more = words("-o cut --matte mattes --screen 0.02,0.6,0.05");
+    desk.ok(&[&["matte", "key"][..], &frames, &more[..]].concat());
+    for name in ["0.exr", "1.exr", "2.exr", "3.exr"] {
         for folder in ["cut", "mattes"] {
             assert!(desk.path(folder).join(name).exists(), "{folder}/{name}");
         }
     }
+}
+
+#[test]
+fn one_frame_goes_into_a_folder_and_several_into_no_file() {
+    let desk = Desk::new();
+    std::fs::create_dir(desk.path("there")).expect("a folder");
+    write_green_ramp(&desk.path("a.png"), 0.5);
+    write_green_ramp(&desk.path("b.png"), 0.5);
+    desk.ok(&words(
+        "matte key a.png -o there --matte new/ --edges e.png --screen 0.02,0.6,0.05",
+    ));
+    for name in ["there/a.exr", "new/a.exr", "e.png"] {
+        assert!(desk.path(name).is_file(), "{name}");
+    }
+    let told = desk.refused(&words(
+        "matte key a.png b.png -o cut.exr --screen 0.02,0.6,0.05",
+    ));
+    let why = "cut.exr: the name of a picture, expected a folder for 2 frames";
+    assert!(told.contains(why), "{told}");
+}
+
+#[test]
+fn what_is_keyed_lies_where_its_exr_does_and_lost_pixels_are_told() {
+    let desk = Desk::new();
+    let canvas = petcomp::io::Canvas {
+        at: [-3, 7],
+        pixel_aspect: 2.0,
+    };
+    let placed = petcomp::io::WriteOptions {
+        canvas,
+        ..petcomp::io::WriteOptions::default()
+    };
+    let grey = petcomp::Image::filled(24, 4, petcomp::LinearRgb::grey(0.3));
+    let photo = desk.path("a.exr");
+    petcomp::io::write_with(&photo, &grey, &placed).expect("a picture");
+    let key = words("matte key a.exr -o cut.exr --matte m.exr --screen 0.02,0.6,0.05");
+    let warned = "24 x 4 stored pixels, those outside the display window are not kept";
+    assert!(!text(&desk.run(&key).stderr).contains(warned));
+    for name in ["cut.exr", "m.exr"] {
+        let header = petcomp::io::read_header(desk.path(name)).expect("an EXR");
+        assert_eq!(header.canvas, canvas, "{name}");
+    }
+    // The last column of the display window, 20, moves four to the left.
+    let mut bytes = std::fs::read(&photo).expect("an EXR");
+    let name = b"displayWindow\0box2i\0\x10\0\0\0";
+    let found = bytes.windows(name.len()).position(|part| part == name);
+    let last = found.expect("an attribute") + name.len() + 8;
+    bytes[last..last + 4].copy_from_slice(&16_i32.to_le_bytes());
+    std::fs::write(&photo, bytes).expect("a file");
+    let told = text(&desk.run(&key).stderr);
+    assert!(told.contains(warned), "{told}");
+    let header = petcomp::io::read_header(desk.path("cut.exr")).expect("an EXR");
+    assert_eq!((header.width, header.height), (20, 4));
 }
 
 #[test]

@@ -3,12 +3,9 @@
 use crate::document::text;
 use crate::errors::to_python;
 use crate::work;
-use petcomp::dataset::YoloSet;
+use petcomp::dataset::EvalTruth;
 use petcomp::eval::page::{self, EvalReportOptions, Metrics, Run};
-use petcomp::eval::{
-    Detection, EvalImage, GroundTruth, read_coco_results, read_coco_truth, read_yolo_detections,
-    read_yolo_truth,
-};
+use petcomp::eval::{Detection, EvalImage, GroundTruth};
 use petcomp::geom::BBox;
 use petcomp::{Error, Result};
 use pyo3::prelude::*;
@@ -68,11 +65,9 @@ impl Files {
             let inputs = [&self.predictions, &self.truth];
             page::check_inputs_stay(inputs, folder, slice::from_ref(&name))?;
         }
-        let sheets = if self.truth.extension().is_some_and(|e| e == "json") {
-            self.read_coco(&mut options)?
-        } else {
-            self.read_yolo(&mut options)?
-        };
+        let truth = self.read_truth()?;
+        let sheets = truth.with_detections(&self.predictions)?;
+        truth.describe(&mut options);
         let run = Run { name, sheets };
         if let Some(folder) = output {
             page::write(folder, slice::from_ref(&run), &options)?;
@@ -82,38 +77,13 @@ impl Files {
         metrics_json(&metrics, &options)
     }
 
-    fn read_coco(&self, options: &mut EvalReportOptions) -> Result<Vec<EvalImage>> {
-        if self.size.is_some() {
+    fn read_truth(&self) -> Result<EvalTruth> {
+        if self.size.is_some() && EvalTruth::is_coco(&self.truth) {
             let what = "given without a folder of YOLO labels as truth: COCO has sizes itself";
             return Err(Error::value("size", what));
         }
-        let mut all = read_coco_truth(&self.truth)?;
-        read_coco_results(&self.predictions, &mut all)?;
-        if options.classes.is_empty() {
-            options.classes.clone_from(&all.classes);
-        }
-        options.pictures = all.pictures(&self.truth, None);
-        Ok(all.sheets)
+        EvalTruth::read(&self.truth, None, self.size)
     }
-
-    fn read_yolo(&self, options: &mut EvalReportOptions) -> Result<Vec<EvalImage>> {
-        YoloSet::check_labels(&self.truth)?;
-        let mut all = read_yolo_truth(&self.truth, None, self.size)?;
-        read_yolo_detections(&self.predictions, &mut all)?;
-        if options.classes.is_empty() {
-            options.classes = dataset_classes(&self.truth);
-        }
-        options.pictures = all.pictures;
-        Ok(all.sheets)
-    }
-}
-
-/// Classes of the dataset that the labels belong to, if they have names.
-fn dataset_classes(labels: &Path) -> Vec<String> {
-    YoloSet::class_names_of(labels).unwrap_or_else(|error| {
-        log::warn!("{error}; classes are called by their numbers");
-        Vec::new()
-    })
 }
 
 fn metrics_json(metrics: &Metrics, options: &EvalReportOptions) -> Result<String> {

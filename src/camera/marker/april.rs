@@ -1,6 +1,6 @@
 //! AprilTags of the family `tag36h11`, found by the AprilTag library.
 
-use super::edge::{EdgeSearch, RefinedCorners};
+use super::edge::{EdgeSearch, MOST_REACH_PX, RefinedCorners};
 use super::{Marker, dictionary, edge};
 use crate::camera::label::Artwork;
 use crate::color::linear_to_srgb;
@@ -110,10 +110,11 @@ fn fine_corners(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<RefinedC
         light,
         reach: REACH,
         min_rise: MIN_RISE * f64::from(white),
+        most_reach_px: MOST_REACH_PX,
     };
-    let fine = edge::refined(&search, rough).filter(|fine| are_near(fine, rough))?;
-    let cells = dictionary::read_cells::<CELLS>(light, &fine)?;
-    edge::by_cells(&search, &fine, &cells)
+    let fine = edge::refined(search, rough).filter(|fine| are_near(&fine.px, rough))?;
+    let cells = dictionary::read_cells::<CELLS>(light, &fine.px)?;
+    edge::by_cells(&fine, &cells)
 }
 
 fn are_near(fine: &[Point2<f64>; 4], rough: &[Point2<f64>; 4]) -> bool {

@@ -11,8 +11,13 @@ const SIDE_PROBES: usize = 32;
 const CORNER_PART: f64 = 0.12;
 /// Samples per pixel across a side.
 const SAMPLES_PER_PX: f64 = 4.0;
-/// Shortest and longest way across an edge that is looked at to either side, pixels.
-const REACH_PX: std::ops::RangeInclusive<f64> = 1.2..=5.0;
+/// Shortest and longest way across an edge that is looked at to either side, pixels; the longest
+/// grows where edges are out of focus.
+const MIN_REACH_PX: f64 = 1.2;
+pub(super) const MOST_REACH_PX: f64 = 5.0;
+/// Edges whose light rises over more of that way, root mean square, are cut off by it: their centre
+/// of gravity is drawn to the middle of the probe. A rise that is even over all of it has 0.58.
+const WIDE_EDGE_SHARE: f64 = 0.45;
 /// That way for edges inside the pattern, in cells.
 const INNER_REACH_CELLS: f64 = 0.45;
 /// White that has grown by more, pixels, has another cause; fewer edges than these are not
@@ -22,6 +27,9 @@ const MIN_EDGES: usize = 6;
 /// Times the sides are fitted anew, at most; corners that move by less stay.
 const MAX_ROUNDS: usize = 6;
 const SETTLED_PX: f64 = 0.01;
+/// Corners that still move are off by no more than so many of their last steps: those of an edge as
+/// wide as its probe shrink by 0.7 from one to the next.
+const STEPS_OFF: f64 = 3.0;
 /// Noise of a corner of a marker that is seen as sharp as can be, pixels.
 const MIN_SIGMA_PX: f64 = 0.03;
 /// Errors of the outline over those of the cells' edges, which are measured by fewer pixels: on
@@ -31,6 +39,7 @@ const OUTLINE_ERROR_SHARE: f64 = 0.5;
 const MAX_OFF_LINE_PX: f64 = 0.7;
 
 /// What counts as an edge in a photo.
+#[derive(Clone, Copy)]
 pub(super) struct EdgeSearch<'a> {
     /// The photo's luminance, scene-linear.
     pub(super) light: &'a Image<f32>,
@@ -39,6 +48,31 @@ pub(super) struct EdgeSearch<'a> {
     pub(super) reach: f64,
     /// Across an edge light rises by more than this, scene-linear.
     pub(super) min_rise: f64,
+    /// How far it is looked for at most, pixels.
+    pub(super) most_reach_px: f64,
+}
+
+impl EdgeSearch<'_> {
+    fn clamped_reach(&self, px: f64) -> f64 {
+        px.clamp(MIN_REACH_PX, self.most_reach_px)
+    }
+
+    /// Looks twice as far where the marker allows it.
+    fn widened(self) -> Self {
+        Self {
+            most_reach_px: 2.0 * self.most_reach_px,
+            ..self
+        }
+    }
+}
+
+/// Corners where the fitted sides of a dark quadrangle meet.
+pub(super) struct Outline<'a> {
+    pub(super) px: [Point2<f64>; 4],
+    /// What they were found with: it looks as far as the edges are wide.
+    search: EdgeSearch<'a>,
+    /// By how much one of them moved in the end, pixels.
+    last_step_px: f64,
 }
 
 /// Corners of a dark square, and how well they are known.
@@ -50,21 +84,57 @@ pub(super) struct RefinedCorners {
 }
 
 /// The corners where the fitted sides of a dark quadrangle meet; none where a side shows no edge.
-pub(super) fn refined(search: &EdgeSearch, rough: &[Point2<f64>; 4]) -> Option<[Point2<f64>; 4]> {
-    let mut corners = *rough;
-    // From the second time on the probes stand where the sides are.
-    for _ in 0..MAX_ROUNDS {
-        let before = corners;
-        corners = corners_between(&fitted_sides(search, &before)?)?;
-        if have_settled(&before, &corners) {
-            break;
+pub(super) fn refined<'a>(search: EdgeSearch<'a>, rough: &[Point2<f64>; 4]) -> Option<Outline<'a>> {
+    let mut outline = Outline::fitted(search, rough)?;
+    while outline.has_cut_off_edges() {
+        match Outline::fitted(outline.search.widened(), &outline.px) {
+            Some(wider) => outline = wider,
+            None => break,
         }
     }
-    Some(corners)
+    Some(outline)
 }
 
-fn have_settled(before: &[Point2<f64>; 4], after: &[Point2<f64>; 4]) -> bool {
-    (0..4).all(|i| (after[i] - before[i]).norm() < SETTLED_PX)
+impl<'a> Outline<'a> {
+    fn fitted(search: EdgeSearch<'a>, rough: &[Point2<f64>; 4]) -> Option<Self> {
+        let mut outline = Self {
+            px: *rough,
+            search,
+            last_step_px: f64::INFINITY,
+        };
+        // From the second time on the probes stand where the sides are.
+        for _ in 0..MAX_ROUNDS {
+            let before = outline.px;
+            outline.px = corners_between(&fitted_sides(&search, &before)?)?;
+            outline.last_step_px = longest_step(&before, &outline.px);
+            if outline.last_step_px < SETTLED_PX {
+                break;
+            }
+        }
+        Some(outline)
+    }
+
+    /// Its edges are wider than it is looked for them, and looking farther is possible.
+    fn has_cut_off_edges(&self) -> bool {
+        let sides = [0, 1, 2, 3].map(|first| Side::new(&self.search, &self.px, first));
+        let spread = sides.iter().map(|side| side.spread(&self.search));
+        let wide = WIDE_EDGE_SHARE * WIDE_EDGE_SHARE;
+        sides.iter().any(Side::is_capped) && spread.sum::<f64>() / 4.0 > wide
+    }
+
+    /// How far off a corner may be that has not settled, pixels.
+    fn unsettled_px(&self) -> f64 {
+        if self.last_step_px < SETTLED_PX {
+            0.0
+        } else {
+            STEPS_OFF * self.last_step_px
+        }
+    }
+}
+
+fn longest_step(before: &[Point2<f64>; 4], after: &[Point2<f64>; 4]) -> f64 {
+    let steps = (0..4).map(|i| (after[i] - before[i]).norm());
+    steps.fold(0.0, f64::max)
 }
 
 /// The line along each side of a quadrangle; none where a side shows no edge.
@@ -84,13 +154,13 @@ fn fitted_sides(search: &EdgeSearch, corners: &[Point2<f64>; 4]) -> Option<[Line
 /// by how much: each edge between them that rises along an axis has moved back, each that falls,
 /// forward, while the grid they should lie on has shrunk with the outline. Least squares over all
 /// edges of the pattern. How far they are off after that is the uncertainty of the outline: blur
-/// moves both where cells are narrow.
+/// moves both where cells are narrow. What an outline that has not settled may be off comes on top.
 pub(super) fn by_cells<const CELLS: usize>(
-    search: &EdgeSearch,
-    corners: &[Point2<f64>; 4],
+    outline: &Outline,
     cells: &MarkerCells<CELLS>,
 ) -> Option<RefinedCorners> {
-    let edges = EdgeShifts::measure(search, corners, &cells.white);
+    let corners = &outline.px;
+    let edges = EdgeShifts::measure(&outline.search, corners, &cells.white);
     let growth = if cells.is_overexposed() {
         edges.growth()
     } else {
@@ -100,7 +170,7 @@ pub(super) fn by_cells<const CELLS: usize>(
     let off = OUTLINE_ERROR_SHARE * edges.rms_px(growth) * mean_square_spread(&lines).sqrt();
     Some(RefinedCorners {
         px: corners_between(&lines)?,
-        sigma_px: libm::hypot(MIN_SIGMA_PX, off),
+        sigma_px: libm::hypot(libm::hypot(MIN_SIGMA_PX, off), outline.unsettled_px()),
     })
 }
 
@@ -213,7 +283,7 @@ impl<const CELLS: usize> InnerEdge<CELLS> {
         let foot = self.position(photo_from_square, along);
         let step = self.position(photo_from_square, along + 0.5)
             - self.position(photo_from_square, along - 0.5);
-        let reach = clamped_reach(INNER_REACH_CELLS * step.norm());
+        let reach = search.clamped_reach(INNER_REACH_CELLS * step.norm());
         let moved = crossing(search, foot, step.normalize() * self.rising, reach)?;
         Some([self.shift_per_growth(), moved * self.rising])
     }
@@ -222,10 +292,6 @@ impl<const CELLS: usize> InnerEdge<CELLS> {
     fn shift_per_growth(&self) -> f64 {
         2.0 * self.along as f64 / CELLS as f64 - self.rising - 1.0
     }
-}
-
-fn clamped_reach(px: f64) -> f64 {
-    px.clamp(*REACH_PX.start(), *REACH_PX.end())
 }
 
 fn inner_edges<const CELLS: usize>(white: &[[bool; CELLS]; CELLS]) -> Vec<InnerEdge<CELLS>> {
@@ -246,27 +312,72 @@ fn edges_of_line<const CELLS: usize>(
     (1..CELLS).filter_map(move |along| InnerEdge::between(white, upright, across, along))
 }
 
-/// The edge near the side from a corner to the next, dark on its right-hand side (clockwise
-/// corners, y down).
-fn fitted_side(search: &EdgeSearch, corners: &[Point2<f64>; 4], first: usize) -> Option<Line> {
-    let [a, b, c, d] = [0, 1, 2, 3].map(|i| corners[(first + i) % 4]);
-    let outward = outward_normal(a, b);
-    // From a steep side a marker is much longer than high, and so are its cells.
-    let across = (outward.dot(&(a - d)) + outward.dot(&(b - c))) / 2.0;
-    let reach = clamped_reach(search.reach * across);
-    let feet = (0..SIDE_PROBES).map(|i| a + (b - a) * probe_part(i));
-    let points = feet.filter_map(|foot| edge_point(search, foot, outward, reach));
-    line_through_most(points.collect())
+/// A side of a dark quadrangle as it is looked for.
+struct Side {
+    ends: [Point2<f64>; 2],
+    outward: Vector2<f64>,
+    /// How far it is looked for to either side, pixels.
+    reach: f64,
+    /// The same if the marker alone decided.
+    marker_reach: f64,
 }
 
-/// Where the light rises along a probe.
-fn edge_point(
-    search: &EdgeSearch,
-    foot: Point2<f64>,
-    outward: Vector2<f64>,
-    reach: f64,
-) -> Option<Point2<f64>> {
-    Some(foot + outward * crossing(search, foot, outward, reach)?)
+impl Side {
+    /// The side from a corner to the next, dark on its right-hand side (clockwise corners, y down).
+    fn new(search: &EdgeSearch, corners: &[Point2<f64>; 4], first: usize) -> Self {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|i| corners[(first + i) % 4]);
+        let outward = outward_normal(a, b);
+        // From a steep side a marker is much longer than high, and so are its cells.
+        let across = (outward.dot(&(a - d)) + outward.dot(&(b - c))) / 2.0;
+        let marker_reach = search.reach * across;
+        Self {
+            ends: [a, b],
+            outward,
+            reach: search.clamped_reach(marker_reach),
+            marker_reach,
+        }
+    }
+
+    fn is_capped(&self) -> bool {
+        self.reach < self.marker_reach
+    }
+
+    /// Where its probes stand.
+    fn feet(&self) -> impl Iterator<Item = Point2<f64>> {
+        let [a, b] = self.ends;
+        (0..SIDE_PROBES).map(move |i| a + (b - a) * probe_part(i))
+    }
+
+    /// How light rises along each probe that crosses an edge.
+    fn rises(&self, search: &EdgeSearch) -> impl Iterator<Item = Rise> {
+        self.feet()
+            .map(move |foot| Rise::along(search, foot, self.outward, self.reach))
+            .filter(move |rise| rise.edge(search, self.reach).is_some())
+    }
+
+    /// Mean square distance of where light rises from the edge, for a reach of 1; 0 where it does
+    /// not rise.
+    fn spread(&self, search: &EdgeSearch) -> f64 {
+        let (mut light, mut square) = (0.0, 0.0);
+        for rise in self.rises(search) {
+            light += rise.light;
+            square += rise.square_from_edge();
+        }
+        if light > 0.0 {
+            square / (light * self.reach * self.reach)
+        } else {
+            0.0
+        }
+    }
+}
+
+/// The edge near a side.
+fn fitted_side(search: &EdgeSearch, corners: &[Point2<f64>; 4], first: usize) -> Option<Line> {
+    let side = Side::new(search, corners, first);
+    let points = side.feet().filter_map(|foot| {
+        Some(foot + side.outward * crossing(search, foot, side.outward, side.reach)?)
+    });
+    line_through_most(points.collect())
 }
 
 /// The unit vector to the left of the way from a corner to the next.
@@ -308,19 +419,50 @@ fn crossing(
     direction: Vector2<f64>,
     reach: f64,
 ) -> Option<f64> {
-    let steps = (2.0 * reach * SAMPLES_PER_PX).ceil() as usize;
-    let (mut rise, mut moment, mut before) = (0.0, 0.0, 0.0);
-    for i in 0..=steps {
-        let at = foot + direction * along_probe(i as f64, steps, reach);
-        let now = f64::from(sample_bilinear_clamped(search.light, at.x, at.y));
-        if i > 0 {
-            rise += now - before;
-            moment += (now - before) * along_probe(i as f64 - 0.5, steps, reach);
+    Rise::along(search, foot, direction, reach).edge(search, reach)
+}
+
+/// How light rises along a probe.
+#[derive(Default)]
+struct Rise {
+    /// By how much, scene-linear.
+    light: f64,
+    /// That times the distance from the probe's middle, and times its square.
+    moment: f64,
+    square: f64,
+}
+
+impl Rise {
+    fn along(search: &EdgeSearch, foot: Point2<f64>, direction: Vector2<f64>, reach: f64) -> Self {
+        let steps = (2.0 * reach * SAMPLES_PER_PX).ceil() as usize;
+        let (mut rise, mut before) = (Self::default(), 0.0);
+        for i in 0..=steps {
+            let at = foot + direction * along_probe(i as f64, steps, reach);
+            let now = f64::from(sample_bilinear_clamped(search.light, at.x, at.y));
+            if i > 0 {
+                rise.add(now - before, along_probe(i as f64 - 0.5, steps, reach));
+            }
+            before = now;
         }
-        before = now;
+        rise
     }
-    let edge = moment / rise;
-    (rise > search.min_rise && edge.abs() <= reach).then_some(edge)
+
+    fn add(&mut self, light: f64, distance: f64) {
+        self.light += light;
+        self.moment += light * distance;
+        self.square += light * distance * distance;
+    }
+
+    /// Its centre of gravity; none where it is none of an edge.
+    fn edge(&self, search: &EdgeSearch, reach: f64) -> Option<f64> {
+        let edge = self.moment / self.light;
+        (self.light > search.min_rise && edge.abs() <= reach).then_some(edge)
+    }
+
+    /// Light times the square of the distance from its centre of gravity.
+    fn square_from_edge(&self) -> f64 {
+        self.square - self.moment * self.moment / self.light
+    }
 }
 
 /// The position of a sample along a probe of `steps` steps, from its middle.

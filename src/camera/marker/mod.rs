@@ -27,7 +27,7 @@ use crate::error::{Error, Result};
 use crate::geom::{Point2, Vector2};
 use crate::image::Image;
 use crate::pixel::LinearRgb;
-use edge::EdgeSearch;
+use edge::{EdgeSearch, MOST_REACH_PX};
 
 /// The family of markers that is always found.
 pub(crate) const FAMILY: &str = "DICT_4X4_50";
@@ -77,10 +77,11 @@ fn marker_at(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<Marker> {
         light,
         reach: REACH,
         min_rise: MIN_RISE,
+        most_reach_px: MOST_REACH_PX,
     };
-    let fine = edge::refined(&search, rough)?;
-    let reading = dictionary::read(light, &fine)?;
-    let corners = edge::by_cells(&search, &fine, &reading.cells)?;
+    let fine = edge::refined(search, rough)?;
+    let reading = dictionary::read(light, &fine.px)?;
+    let corners = edge::by_cells(&fine, &reading.cells)?;
     Some(Marker {
         id: reading.id,
         corners_px: [0, 1, 2, 3].map(|i| corners.px[(i + reading.turns) % 4]),
@@ -311,6 +312,28 @@ mod tests {
                 let error = (found[0].corners_px[i] - truth).norm();
                 assert!(error < 0.15, "{id} at {tilt}, corner {i}: {error}");
             }
+        }
+    }
+
+    #[test]
+    fn a_large_marker_is_found_out_of_focus() {
+        // 69 pixels to the cell, on a grey table.
+        let sheet = printed(3, 69);
+        let [left, top] = [300, 200];
+        let sharp = Image::from_fn(1200, 1000, |x, y| {
+            let on_sheet = (left..left + 552).contains(&x) && (top..top + 552).contains(&y);
+            match on_sheet {
+                true => sheet[(x - left, y - top)],
+                false => LinearRgb::BLACK.add_scaled_grey(0.3),
+            }
+        });
+        let found = find_markers(&crate::filter::gaussian_blur(&sharp, 6.0));
+        assert_eq!(found.iter().map(|m| m.id).collect::<Vec<_>>(), [3]);
+        let [x, y] = [left, top].map(|from| from as f64 + 69.0);
+        let truth = [[0.0, 0.0], [414.0, 0.0], [414.0, 414.0], [0.0, 414.0]];
+        for (px, [right, down]) in found[0].corners_px.iter().zip(truth) {
+            let off = (px - Point2::new(x + right, y + down)).norm();
+            assert!(off < 0.3, "{off}");
         }
     }
 

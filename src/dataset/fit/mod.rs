@@ -17,12 +17,12 @@ mod measured;
 mod moved_paths;
 mod places;
 mod plates;
+mod real;
 mod report;
 mod sequences;
 mod starts;
 mod statistics;
 
-use crate::dataset::page::labelled_pictures::LabelledSet;
 use crate::dataset::recipe_text::{KeyEdit, with_edits};
 use crate::dataset::{DatasetConfig, Format, LabelConfig, Pictures, Pipeline, Yolo, generate};
 use crate::error::{Error, Result};
@@ -182,13 +182,9 @@ impl Fitting<'_> {
         self.finish(plan, page)
     }
 
-    /// Those of a folder: on a belt one of each sequence.
+    /// Those of a folder, as far as they are labelled: on a belt one of each sequence.
     fn real_pictures(&self, folder: &Path) -> Result<MeasuredSet> {
-        let set = LabelledSet::read(folder)?;
-        let set = match &self.belt {
-            Some(belt) => sequences::one_of_each(&set, belt),
-            None => set,
-        };
+        let set = real::real_pictures(folder, self.belt.as_ref())?;
         Ok(MeasuredSet::new(set, self.config.scene.image[0]))
     }
 

@@ -389,9 +389,8 @@ mod tests {
         let found = |i: usize| Detection::new(0, at(i), 0.3 + (i % 7) as f64 / 10.0);
         let truth = (0..300).map(|i| GroundTruth::new(0, at(i))).collect();
         let sheet = EvalImage {
-            image: "a".into(),
-            truth,
             found: (0..5_000).map(found).collect(),
+            ..EvalImage::new("a", truth)
         };
         let run = Run {
             name: "run".into(),

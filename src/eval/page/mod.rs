@@ -35,7 +35,8 @@ pub struct EvalReportOptions {
     pub classes: Vec<String>,
     /// Light, camera position, ..: scores are given for each.
     pub tags: Tags,
-    /// Rounds of the bootstrap over images; tables show no interval of fewer than 40. Default: 200.
+    /// Rounds of the bootstrap over images, or their sequences; tables show no interval of fewer
+    /// than 40. Default: 200.
     pub rounds: usize,
     /// Where its draws come from. Default: 0.
     pub seed: u64,
@@ -75,7 +76,11 @@ pub struct Metrics {
     pub run: String,
     /// Number of images.
     pub images: usize,
-    /// mAP@0.5:0.95 as YOLOv5 has it, with its interval over images.
+    /// Number of [groups](EvalImage::group) that the images are of, one by itself counted as one;
+    /// none where all are by themselves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sequences: Option<usize>,
+    /// mAP@0.5:0.95 as YOLOv5 has it, with its interval over images, or over their sequences.
     pub map: Interval,
     /// By the definition of YOLOv5.
     pub yolov5: Scores,
@@ -87,9 +92,11 @@ impl Metrics {
     /// Scores of a run by both definitions.
     pub fn of(run: &Run, options: &EvalReportOptions) -> Self {
         let matches = Matches::new(&run.sheets, Definition::Yolov5);
+        let is_grouped = run.sheets.iter().any(|sheet| !sheet.group.is_empty());
         Self {
             run: run.name.clone(),
             images: run.sheets.len(),
+            sequences: is_grouped.then(|| matches.group_count()),
             map: matches.bootstrap(options.rounds, options.seed),
             yolov5: matches.scores(&[]),
             coco: eval::coco(&run.sheets, &[]),
@@ -363,7 +370,7 @@ pub fn scores_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
         "95 % interval",
     ]);
     for metrics in all {
-        let interval = interval_over_images(&metrics.map, options);
+        let interval = interval_text(metrics, options);
         table.push(metrics.scores_row("yolov5", &metrics.yolov5, interval));
         table.push(metrics.scores_row("coco", &metrics.coco.scores, String::new()));
     }
@@ -400,12 +407,16 @@ fn spread_row(spread: &Spread) -> [String; 7] {
     ]
 }
 
-/// Empty where the rounds are too few for one.
-fn interval_over_images(map: &Interval, options: &EvalReportOptions) -> String {
-    if options.rounds < MIN_ROUNDS {
+/// Empty where the rounds are too few for one, or a single sequence tells of no other.
+fn interval_text(metrics: &Metrics, options: &EvalReportOptions) -> String {
+    if options.rounds < MIN_ROUNDS || metrics.sequences == Some(1) {
         return String::new();
     }
-    range_text(map) + " over images"
+    let over = match metrics.sequences {
+        Some(_) => "sequences",
+        None => "images",
+    };
+    format!("{} over {over}", range_text(&metrics.map))
 }
 
 /// Of fewer rounds less than one is to be expected beyond either end of an interval.
@@ -609,12 +620,11 @@ mod tests {
         };
         let truth = GroundTruth::new(0, bbox);
         let sheet = |image: &str, found: &[f64]| EvalImage {
-            image: image.into(),
-            truth: vec![truth],
             found: found
                 .iter()
                 .map(|&confidence| Detection::new(0, bbox, confidence))
                 .collect(),
+            ..EvalImage::new(image, vec![truth])
         };
         Run {
             name: name.into(),
@@ -691,6 +701,11 @@ mod tests {
         assert!(cells(&runs[..1], 200)[0].ends_with(" over images"));
         assert_eq!(cells(&runs[..1], 1), ["", ""]);
         assert!(cells(&runs, 0)[4].ends_with(" over runs"));
+        let [mut belt, _] = runs;
+        belt.sheets[0].group = "7".into();
+        assert!(cells(&[belt.clone()], 200)[0].ends_with(" over sequences"));
+        belt.sheets[1].group = "7".into();
+        assert_eq!(cells(&[belt], 200)[0], "");
     }
 
     #[test]

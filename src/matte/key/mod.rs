@@ -42,8 +42,8 @@
 //! Blender's releases have behaved in three ways, which [`Profile`] names. They differ in roundings, in what lies beyond
 //! the border (cut off up to 4.3, repeated from 4.4 on), in the sizes of the blur and edge windows, and in the disc (up
 //! to 4.3 its left and bottom tip are missing). The fourth, `robust`, is 3.4 with a full disc and a final matte within 0
-//! to 1; it takes pixels that are no numbers for transparent ones, refuses keys too grey to work, levels in the wrong
-//! order, and fills holes in plates. What it changed it counts: [`Deviations`].
+//! to 1; it takes pixels that are no numbers for transparent ones of matte 0, refuses keys too grey to work, levels in the
+//! wrong order, and fills holes in plates. What it changed it counts: [`Deviations`].
 //!
 //! # What to watch
 //!
@@ -130,7 +130,7 @@ pub struct Keyed {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Deviations {
-    /// Photo pixels that were not finite, or beyond 1e30, and became transparent.
+    /// Photo pixels that were not finite, or beyond 1e30, and became transparent, of raw matte 0.
     pub unusable_pixels: usize,
     /// Pixels of the plate that were not finite or too grey to key against, and were filled from around them.
     pub filled_plate: usize,

@@ -23,10 +23,20 @@ pub(super) trait Model: 'static {
         (if first < p.b { first } else { p.b }) > 1.0
     }
 
-    /// The pixel as this model treats it.
+    /// The pixel cannot be keyed, and is background.
+    #[inline(always)]
+    fn is_lost(_: PremulRgba) -> bool {
+        false
+    }
+
+    /// The pixel, transparent where it is lost.
     #[inline(always)]
     fn seen(p: PremulRgba) -> PremulRgba {
-        p
+        if Self::is_lost(p) {
+            PremulRgba::TRANSPARENT
+        } else {
+            p
+        }
     }
 }
 
@@ -36,7 +46,7 @@ pub(super) struct V34;
 pub(super) struct V42;
 /// Blender 4.5.
 pub(super) struct V45;
-/// Blender 3.4, with unusable pixels made transparent.
+/// Blender 3.4, with unusable pixels lost.
 pub(super) struct Robust;
 
 impl Model for V34 {}
@@ -59,12 +69,8 @@ impl Model for V45 {
 
 impl Model for Robust {
     #[inline(always)]
-    fn seen(p: PremulRgba) -> PremulRgba {
-        if is_usable(p) {
-            p
-        } else {
-            PremulRgba::TRANSPARENT
-        }
+    fn is_lost(p: PremulRgba) -> bool {
+        !is_usable(p)
     }
 }
 

@@ -49,15 +49,12 @@ impl Terms {
     /// The raw matte of one pixel.
     #[inline(always)]
     pub(super) fn matte<M: Model, const PRIMARY: usize>(&self, p: PremulRgba) -> f32 {
-        let p = M::seen(p);
         let s = self.saturation_of::<M, PRIMARY>(p);
         let ratio = 1.0 - s / self.saturation;
         let inside = if s >= self.saturation { 0.0 } else { ratio };
-        if M::is_overexposed(p) | (s < 0.0) {
-            1.0
-        } else {
-            inside
-        }
+        let is_front = M::is_overexposed(p) | (s < 0.0);
+        let matte = if is_front { 1.0 } else { inside };
+        if M::is_lost(p) { 0.0 } else { matte }
     }
 }
 

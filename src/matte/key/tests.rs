@@ -372,3 +372,23 @@ fn subtracting_the_screen_leaves_the_foreground() {
     let c = keyed.cutout[(0, 0)];
     assert!([c.r, c.g, c.b].iter().all(|v| (v - 0.2).abs() < 1e-6));
 }
+
+#[test]
+fn pixels_that_are_no_numbers_are_background_to_the_robust_profile() {
+    let mut photo = Image::filled(5, 1, LinearRgb::grey(0.3));
+    photo[(2, 0)].b = f32::NAN;
+    let plate = Image::filled(5, 1, GREEN);
+    for blur_pre in [0, 2] {
+        let options = KeyOptions {
+            blur_pre,
+            ..KeyOptions::for_profile(Profile::Robust)
+        };
+        for screen in [Screen::Color(GREEN), Screen::Plate(&plate)] {
+            let keyed = Keying::new(&photo, screen).run(&options).unwrap();
+            let mattes: Vec<f32> = keyed.matte.pixels().iter().map(|m| m.0).collect();
+            assert_eq!(mattes[2], 0.0, "{blur_pre} {screen:?}");
+            assert!(mattes[1] > 0.9 && mattes[3] > 0.9, "{mattes:?}");
+            assert_eq!(keyed.cutout[(2, 0)], PremulRgba::TRANSPARENT);
+        }
+    }
+}

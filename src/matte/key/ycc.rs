@@ -77,10 +77,9 @@ fn color_from_codes(y: f32, cb: f32, cr: f32, alpha: f32) -> PremulRgba {
     PremulRgba::new(r / CODE_MAX, g / CODE_MAX, b / CODE_MAX, alpha)
 }
 
-/// The pixel with other colour differences, unit scale.
+/// The pixel with other colour differences, unit scale; a lost one stays as it is.
 #[inline(always)]
 pub(super) fn recolored<M: Model>(p: PremulRgba, cb: f32, cr: f32) -> PremulRgba {
-    let p = M::seen(p);
     let luma = code_value(p, LUMA_WEIGHTS, LUMA_OFFSET);
     // Blender 4.5 alone leaves brightness out of the journey to unit scale and back.
     let luma = if M::IS_LATE {
@@ -88,5 +87,6 @@ pub(super) fn recolored<M: Model>(p: PremulRgba, cb: f32, cr: f32) -> PremulRgba
     } else {
         luma * PER_CODE_MAX * CODE_MAX
     };
-    color_from_codes(luma, cb * CODE_MAX, cr * CODE_MAX, p.a)
+    let colored = color_from_codes(luma, cb * CODE_MAX, cr * CODE_MAX, p.a);
+    if M::is_lost(p) { p } else { colored }
 }

@@ -1,10 +1,12 @@
 //! `petcomp matte cut`: the object without its background.
 
+use super::picture_files::canvas_of;
 use crate::diagnostics::report_diagnostics;
 use crate::documents::read_options;
 use crate::global::GlobalArgs;
+use petcomp::LinearRgb;
+use petcomp::io::{self, WriteOptions};
 use petcomp::matte::{CutOutOptions, cut_out};
-use petcomp::{LinearRgb, io};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -25,7 +27,11 @@ pub(crate) fn run(args: &CutArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let options: CutOutOptions = read_options(args.options.as_deref())?;
     let photo = io::read::<LinearRgb>(&args.photo)?;
     let cut = cut_out(&photo, &options).map_err(|e| e.in_file(&args.photo))?;
-    io::write(&args.output, &cut.to_rgba())?;
+    let written = WriteOptions {
+        canvas: canvas_of(&args.photo)?,
+        ..WriteOptions::default()
+    };
+    io::write_with(&args.output, &cut.to_rgba(), &written)?;
     report_diagnostics(args.photo.display(), &cut.diagnostics);
     let (w, h) = cut.film.size();
     let method = cut.method;

@@ -1,10 +1,10 @@
 //! `petcomp matte film`, `triangulate`: film from one photo, or from several on different screens.
 
-use super::picture_files::{check_same_size, is_exr, write_optional};
+use super::picture_files::{canvas_of, check_same_size, is_exr, write_optional};
 use crate::diagnostics::report_diagnostics;
 use crate::global::GlobalArgs;
 use anyhow::Result;
-use petcomp::io::{self, Override, from_overrides};
+use petcomp::io::{self, Canvas, Override, from_overrides};
 use petcomp::matte::{
     FilmMatte, PlateOptions, ScreenPlate, SegmentOptions, Triangulated, film, film_planes, segment,
     triangulate,
@@ -64,8 +64,9 @@ impl FilmArgs {
         let inside = args.object_mask(&self.photo, &photo)?;
         let plate = args.screen_plate(0, &self.photo, &photo, &inside)?;
         let found = self.solve(&photo, &plate, &inside)?;
-        args.write_film(&found.film, &found.transmittance)?;
-        args.write_extras(&plate, &found.uncertainty)?;
+        let canvas = canvas_of(&self.photo)?;
+        args.write_film(&found.film, &found.transmittance, canvas)?;
+        args.write_extras(&plate, &found.uncertainty, canvas)?;
         global.print_written(&args.output, describe_plate(&plate, found.flat));
         Ok(())
     }
@@ -91,8 +92,9 @@ impl TriangulateArgs {
         let inside = args.object_mask(&self.photos[0], &photos[0])?;
         let plates = self.screen_plates(&photos, &inside)?;
         let found = self.triangulate(&photos, &plates, &inside)?;
-        args.write_film(&found.film, &found.transmittance)?;
-        args.write_extras(&plates[0], &found.uncertainty)?;
+        let canvas = canvas_of(&self.photos[0])?;
+        args.write_film(&found.film, &found.transmittance, canvas)?;
+        args.write_extras(&plates[0], &found.uncertainty, canvas)?;
         let what = describe_plate(&plates[0], found.flat);
         global.print_written(
             &args.output,
@@ -187,21 +189,31 @@ impl FilmOptionArgs {
         Ok(plate.map_err(|e| e.in_file(path))?)
     }
 
-    fn write_film(&self, film: &Image<Film>, transmittance: &Image<LinearRgb>) -> Result<()> {
+    fn write_film(
+        &self,
+        film: &Image<Film>,
+        transmittance: &Image<LinearRgb>,
+        canvas: Canvas,
+    ) -> Result<()> {
         let planes = film_planes(film, transmittance);
         let planes = planes.iter().map(|(name, plane)| (*name, &plane[..]));
         let planes: Vec<(&str, &[f32])> = planes.collect();
-        Ok(io::exr::write_channels(
+        Ok(io::exr::write_channels_on(
             &self.output,
             film.size(),
+            canvas,
             &planes,
-            &[],
         )?)
     }
 
-    fn write_extras(&self, plate: &ScreenPlate, uncertainty: &Image<f32>) -> Result<()> {
-        write_optional(&self.plate_out, &plate.image)?;
-        write_optional(&self.uncertainty, uncertainty)
+    fn write_extras(
+        &self,
+        plate: &ScreenPlate,
+        uncertainty: &Image<f32>,
+        canvas: Canvas,
+    ) -> Result<()> {
+        write_optional(&self.plate_out, &plate.image, canvas)?;
+        write_optional(&self.uncertainty, uncertainty, canvas)
     }
 }
 

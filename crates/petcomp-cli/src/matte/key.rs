@@ -1,6 +1,6 @@
 //! `petcomp matte key`: Blender's Keying node on a picture, or on the frames of a sequence.
 
-use super::picture_files::{check_same_size, write_optional, write_picture};
+use super::picture_files::{canvas_of, check_same_size, write_optional, write_picture};
 use crate::batch::FileBatch;
 use crate::diagnostics::report_diagnostics;
 use crate::global::GlobalArgs;
@@ -22,10 +22,10 @@ pub(crate) struct KeyArgs {
     /// The picture to key, or the frames of a sequence; alpha is taken as premultiplied
     #[arg(required = true, value_name = "PICTURE")]
     frames: Vec<PathBuf>,
-    /// Where the premultiplied cut-out goes, an EXR with 32-bit floats; of several frames, the
-    /// folder where each gets its own name, as --matte and --edges are then: with the ending .exr,
-    /// but for .png of 8 bits and .tif of 16, which keep theirs
-    #[arg(short, long, value_name = "FILE")]
+    /// Where the premultiplied cut-out goes, an EXR with 32-bit floats; or a folder that is there
+    /// or ends in /, where it gets the frame's name with the ending .exr, as for --matte and
+    /// --edges: of several frames all three are folders
+    #[arg(short, long, value_name = "FILE|FOLDER")]
     output: PathBuf,
     /// Where the matte goes
     #[arg(long, value_name = "FILE")]
@@ -71,15 +71,12 @@ impl KeyArgs {
         })
     }
 
-    /// What goes where: of several frames, everything into folders.
+    /// What goes where.
     fn files(&self) -> Result<Vec<FrameFiles>> {
-        let files = match &self.frames[..] {
-            [frame] => vec![self.files_of(frame, Path::to_owned)],
-            frames => {
-                let files = frames.iter().map(|frame| self.files_in_folders(frame));
-                files.collect::<Result<_>>()?
-            }
-        };
+        self.targets()
+            .try_for_each(|path| self.check_folder(path))?;
+        let files = self.frames.iter().map(|frame| self.files_of(frame));
+        let files = files.collect::<Result<Vec<_>>>()?;
         io::check_distinct(self.inputs(), files.iter().flat_map(FrameFiles::targets))?;
         Ok(files)
     }
@@ -90,43 +87,65 @@ impl KeyArgs {
         self.frames.iter().chain(common.into_iter().flatten())
     }
 
-    fn files_in_folders(&self, frame: &Path) -> Result<FrameFiles> {
-        let name = frame
-            .file_name()
-            .context(format!("{}: no file", frame.display()))?;
-        let name = match keeps_all(frame) {
-            true => PathBuf::from(name),
-            false => Path::new(name).with_extension("exr"),
-        };
-        Ok(self.files_of(frame, |folder| folder.join(&name)))
+    /// Files or folders.
+    fn targets(&self) -> impl Iterator<Item = &PathBuf> {
+        let optional = [&self.matte, &self.edges];
+        std::iter::once(&self.output).chain(optional.into_iter().flatten())
+    }
+
+    /// Several frames do not go into one file.
+    fn check_folder(&self, path: &Path) -> Result<()> {
+        let count = self.frames.len();
+        anyhow::ensure!(
+            count == 1 || !is_picture_name(path),
+            "{}: the name of a picture, expected a folder for {count} frames",
+            path.display()
+        );
+        Ok(())
+    }
+
+    /// Of several frames, everything goes into folders.
+    fn is_folder(&self, path: &Path) -> bool {
+        self.frames.len() > 1 || is_named_folder(path)
     }
 
     fn create_folders(&self) -> petcomp::Result<()> {
-        let folders = [Some(&self.output), self.matte.as_ref(), self.edges.as_ref()];
-        folders
-            .into_iter()
-            .flatten()
-            .try_for_each(io::create_folder)
+        let mut folders = self.targets().filter(|path| self.is_folder(path));
+        folders.try_for_each(io::create_folder)
     }
 
-    fn files_of(&self, frame: &Path, place: impl Fn(&Path) -> PathBuf) -> FrameFiles {
-        FrameFiles {
+    fn files_of(&self, frame: &Path) -> Result<FrameFiles> {
+        let place = |path: &PathBuf| self.place(path, frame);
+        Ok(FrameFiles {
             frame: frame.to_owned(),
-            cutout: place(&self.output),
-            matte: self.matte.as_deref().map(&place),
-            edges: self.edges.as_deref().map(&place),
+            cutout: place(&self.output)?,
+            matte: self.matte.as_ref().map(place).transpose()?,
+            edges: self.edges.as_ref().map(place).transpose()?,
+        })
+    }
+
+    /// The file that was asked for, or one of the frame's name in a folder.
+    fn place(&self, path: &Path, frame: &Path) -> Result<PathBuf> {
+        if !self.is_folder(path) {
+            return Ok(path.to_owned());
         }
+        let name = frame
+            .file_name()
+            .context(format!("{}: no file", frame.display()))?;
+        // No other format keeps all that a cut-out has: alpha, colours of any gamut, floats.
+        Ok(path.join(name).with_extension("exr"))
     }
 }
 
-/// Bits of a sample that are kept in a file of an ending with alpha.
-const KEPT_BITS: [(&str, u32); 4] = [("exr", 32), ("tif", 16), ("tiff", 16), ("png", 8)];
+/// A folder that is there, or that is meant by its last character.
+fn is_named_folder(path: &Path) -> bool {
+    path.is_dir() || path.to_string_lossy().ends_with(std::path::is_separator)
+}
 
-/// A file of the frame's ending keeps all bits of its samples.
-fn keeps_all(frame: &Path) -> bool {
-    let mut known = KEPT_BITS.iter();
-    let known = known.find(|(ending, _)| io::has_extension(frame, ending));
-    known.is_some_and(|(_, kept)| io::read_header(frame).is_ok_and(|header| header.bits <= *kept))
+fn is_picture_name(path: &Path) -> bool {
+    let written = ["exr", "png", "tif", "tiff", "jpg", "jpeg"];
+    let is_written = written.iter().any(|ending| io::has_extension(path, ending));
+    is_written && !is_named_folder(path)
 }
 
 /// A frame, and where what is made of it goes.
@@ -189,6 +208,7 @@ pub(crate) fn run(args: &KeyArgs, global: &GlobalArgs) -> Result<()> {
         plate: read_optional(&args.plate)?,
         args,
     };
+    args.create_folders()?;
     match &files[..] {
         [one] => work.key(one, &mut Keyed::default()),
         frames => work.key_sequence(frames, global),
@@ -226,7 +246,6 @@ impl KeyerWork<'_> {
     /// Frames side by side: while some are read or written, others are keyed. A frame that cannot
     /// be keyed does not stop the others.
     fn key_sequence(&self, frames: &[FrameFiles], global: &GlobalArgs) -> Result<()> {
-        self.args.create_folders()?;
         let progress = global.start_progress("frames");
         let batch = Mutex::new((FileBatch::default(), 0));
         frames
@@ -255,10 +274,11 @@ impl KeyerWork<'_> {
         if keyed.deviations != Deviations::default() {
             log::warn!("{}: {}", files.frame.display(), keyed.deviations);
         }
-        write_picture(&files.cutout, &keyed.cutout)?;
-        write_optional(&files.matte, &keyed.matte)?;
+        let canvas = canvas_of(&files.frame)?;
+        write_picture(&files.cutout, &keyed.cutout, canvas)?;
+        write_optional(&files.matte, &keyed.matte, canvas)?;
         match &files.edges {
-            Some(path) => write_picture(path, &keying.edges(&self.options)?),
+            Some(path) => write_picture(path, &keying.edges(&self.options)?, canvas),
             None => Ok(()),
         }
     }

@@ -1,7 +1,7 @@
 //! `petcomp matte chroma-key`, `channel-key`, `difference-key`, `color-spill`, `keying-screen`:
 //! Blender's other keyers.
 
-use super::picture_files::{write_optional, write_picture};
+use super::picture_files::{canvas_of, write_optional, write_picture};
 use crate::values::{parse_color, parse_pixel};
 use anyhow::Result;
 use nalgebra::Point2;
@@ -85,7 +85,7 @@ impl KeyingScreenArgs {
         let points = self.points.iter().map(|&at| screen_point(&photo, at));
         let points = points.collect::<Result<Vec<_>>>()?;
         let plate = keying_screen(photo.size(), &points, self.smoothness)?;
-        write_picture(&self.output, &plate)
+        write_picture(&self.output, &plate, canvas_of(&self.input)?)
     }
 }
 
@@ -108,7 +108,8 @@ impl NodePicture {
         let photo = self.read_photo(&None)?;
         let options: ColorSpillOptions = from_overrides("key", &self.settings)?;
         options.check()?;
-        write_picture(&self.output, &color_spill(&photo, &options))
+        let spilled = color_spill(&photo, &options);
+        write_picture(&self.output, &spilled, canvas_of(&self.input)?)
     }
 
     /// Not where it would be written over, or where the matte goes to the same file.
@@ -146,8 +147,9 @@ impl KeyerPictures {
     }
 
     fn write_pair(&self, cutout: &Image<PremulRgba>, matte: &Image<Coverage>) -> Result<()> {
-        write_picture(&self.picture.output, cutout)?;
-        write_optional(&self.matte, matte)
+        let canvas = canvas_of(&self.picture.input)?;
+        write_picture(&self.picture.output, cutout, canvas)?;
+        write_optional(&self.matte, matte, canvas)
     }
 }
 

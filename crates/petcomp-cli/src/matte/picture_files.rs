@@ -2,14 +2,19 @@
 
 use anyhow::Result;
 use petcomp::Image;
-use petcomp::io::{self, Bits, ToFile, WriteOptions};
+use petcomp::io::{self, Bits, Canvas, Header, ToFile, WriteOptions};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 /// Writes a picture, in an EXR with all its bits.
-pub(crate) fn write_picture<P: ToFile>(path: &Path, image: &Image<P>) -> Result<()> {
+pub(super) fn write_picture<P: ToFile>(
+    path: &Path,
+    image: &Image<P>,
+    canvas: Canvas,
+) -> Result<()> {
     let options = WriteOptions {
         bits: is_exr(path).then_some(Bits::Float),
+        canvas,
         ..WriteOptions::default()
     };
     Ok(io::write_with(path, image, &options)?)
@@ -18,6 +23,29 @@ pub(crate) fn write_picture<P: ToFile>(path: &Path, image: &Image<P>) -> Result<
 /// The file is called `.exr`.
 pub(super) fn is_exr(path: &Path) -> bool {
     io::has_extension(path, "exr")
+}
+
+/// Where a photo's picture lies, for what is made of it; warns of what that does not keep.
+pub(super) fn canvas_of(photo: &Path) -> petcomp::Result<Canvas> {
+    if !is_exr(photo) {
+        return Ok(Canvas::default());
+    }
+    let header = io::read_header(photo)?;
+    if stores_more_than_shown(&header) {
+        let (photo, [w, h]) = (photo.display(), header.data_size);
+        log::warn!(
+            "{photo}: of {w} x {h} stored pixels, those outside the display window are not kept"
+        );
+    }
+    Ok(header.canvas)
+}
+
+fn stores_more_than_shown(header: &Header) -> bool {
+    let shown = [header.width, header.height];
+    (0..2).any(|axis| {
+        let at = header.data_at[axis];
+        at < 0 || at + header.data_size[axis] as i64 > shown[axis] as i64
+    })
 }
 
 /// Fails where a picture has not the size of a photo; both are named as the user does.
@@ -36,6 +64,11 @@ pub(super) fn check_same_size(
 }
 
 /// Writes a picture where one was asked for.
-pub(crate) fn write_optional<P: ToFile>(path: &Option<PathBuf>, image: &Image<P>) -> Result<()> {
-    path.iter().try_for_each(|path| write_picture(path, image))
+pub(super) fn write_optional<P: ToFile>(
+    path: &Option<PathBuf>,
+    image: &Image<P>,
+    canvas: Canvas,
+) -> Result<()> {
+    path.iter()
+        .try_for_each(|path| write_picture(path, image, canvas))
 }

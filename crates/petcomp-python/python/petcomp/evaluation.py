@@ -37,8 +37,11 @@ class Metrics:
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """Range of ``map`` by bootstrap over images; None of fewer than 40 rounds."""
-        if self._rounds < _LEAST_ROUNDS:
+        """Range of ``map`` by bootstrap over images, or over the sequences that they are of.
+
+        None of fewer than 40 rounds, and of a single sequence.
+        """
+        if self._rounds < _LEAST_ROUNDS or self._document.get("sequences") == 1:
             return None
         record = self._document["map"]
         return float(record["low"]), float(record["high"])
@@ -77,7 +80,8 @@ def evaluate(
 ) -> Metrics:
     """Scores of predictions against the truth, as ``petcomp eval`` gives them.
 
-    Both are folders of YOLO labels or COCO JSON files; ``size`` (width and height, pixels) is for YOLO
+    Both are folders of YOLO labels or COCO JSON files; the truth may also be a list of images (``.txt``), or a folder
+    with a ``data.yaml`` and no labels, for its images of validation. ``size`` (width and height, pixels) is for YOLO
     labels alone, which need it without images beside them, ``output`` is a folder for the whole report. Or both are
     lists, one mapping for each image: ``boxes`` (n x 4: left, top, right, bottom, pixels) and ``classes``
     (n), of predictions ``scores`` (n), and of the truth, where some are neither to be found nor missed,

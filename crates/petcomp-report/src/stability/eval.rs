@@ -158,9 +158,8 @@ fn grid_image(truths: usize, found: usize, confidence: fn(usize) -> f64) -> Eval
     let truth = (0..truths).map(|i| GroundTruth::new(0, grid_box(i)));
     let found = (0..found).map(|i| Detection::new(0, grid_box(i), confidence(i)));
     EvalImage {
-        image: String::new(),
-        truth: truth.collect(),
         found: found.collect(),
+        ..EvalImage::new("", truth.collect())
     }
 }
 

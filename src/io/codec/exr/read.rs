@@ -9,7 +9,7 @@ use crate::io::codec::profile::{convert_primaries, to_rec709};
 use crate::io::codec::raster::{Raster, Samples};
 use crate::io::codec::refusal::Refusal;
 use crate::io::format::Format;
-use crate::io::header::{Header, Notes, Window};
+use crate::io::header::{Canvas, Header, Notes, Window};
 use crate::io::limits::{Demand, Limits, affordable, at_most};
 use exr::meta::attribute::{AttributeValue, ChannelList, Chromaticities};
 use exr::prelude::{IntegerBounds, MetaData, Vec2};
@@ -279,6 +279,7 @@ pub(crate) fn header(
         format: Format::Exr,
         width,
         height,
+        canvas: canvas(first),
         channels: in_default_order(listed_names(&first.channels)),
         bits: 8 * widest_sample(&first.channels) as u32,
         data_at: data_offset(first),
@@ -314,6 +315,15 @@ fn widest_sample(channels: &ChannelList) -> usize {
 
 fn data_window(header: &exr::meta::header::Header) -> IntegerBounds {
     IntegerBounds::new(header.own_attributes.layer_position, header.layer_size)
+}
+
+fn canvas(header: &exr::meta::header::Header) -> Canvas {
+    let shared = &header.shared_attributes;
+    let shown = shared.display_window.position;
+    Canvas {
+        at: [shown.x(), shown.y()],
+        pixel_aspect: shared.pixel_aspect,
+    }
 }
 
 /// Column and row of the first stored pixel in the display window.
@@ -437,6 +447,7 @@ mod tests {
         let file = || {
             encode(
                 (2, 1),
+                Canvas::default(),
                 vec![("Z", float_samples(vec![1.0, 2.0]))],
                 Compression::Zip,
                 &notes(12),
@@ -456,7 +467,7 @@ mod tests {
         let (channel, key, value) = ("grün.Z", "petcomp:größe", "grün, 瓶子");
         let notes = vec![(key.to_owned(), value.to_owned())];
         let planes = vec![(channel, float_samples(vec![1.0]))];
-        let file = encode((1, 1), planes, Compression::None, &notes).unwrap();
+        let file = encode((1, 1), Canvas::default(), planes, Compression::None, &notes).unwrap();
         for text in [channel, key, value] {
             let mut places = file.windows(text.len());
             assert!(places.any(|bytes| bytes == text.as_bytes()), "{text}");
@@ -466,6 +477,20 @@ mod tests {
             (read.channels, read.metadata),
             (vec![channel.to_owned()], notes)
         );
+    }
+
+    #[test]
+    fn a_picture_is_read_where_it_was_placed() {
+        let canvas = Canvas {
+            at: [-3, 7],
+            pixel_aspect: 2.0,
+        };
+        let planes = vec![("Z", float_samples(vec![1.0, 2.0]))];
+        let file = encode((2, 1), canvas, planes, Compression::Zip, &[]).unwrap();
+        let read = header(file.as_slice(), 10_000, &Limits::default()).unwrap();
+        assert_eq!((read.canvas, read.data_at), (canvas, [0, 0]));
+        let (size, planes) = channels(&file, &Limits::default()).unwrap();
+        assert_eq!((size, &planes[0].samples[..]), ((2, 1), &[1.0, 2.0][..]));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::attributes::{FIRST_ATTRIBUTE, add_texts, sort_attributes, utf8_text};
 use super::parts::check_count;
+use crate::io::header::Canvas;
 use exr::prelude::Compression as Method;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Vec2,
@@ -34,6 +35,7 @@ impl Compression {
 /// A whole file; the same input gives the same bytes.
 pub(crate) fn encode(
     size: (usize, usize),
+    canvas: Canvas,
     planes: Vec<(&str, FlatSamples)>,
     compression: Compression,
     metadata: &[(String, String)],
@@ -45,9 +47,12 @@ pub(crate) fn encode(
         compression: compression.method(),
         ..Encoding::SMALL_LOSSLESS
     };
-    let layer = Layer::new(Vec2(size.0, size.1), attributes, encoding, channels);
+    let mut layer = Layer::new(Vec2(size.0, size.1), attributes, encoding, channels);
+    layer.attributes.layer_position = Vec2(canvas.at[0], canvas.at[1]);
+    let mut image = Image::from_layer(layer);
+    image.attributes.pixel_aspect = canvas.pixel_aspect;
     let mut out = Cursor::new(Vec::new());
-    Image::from_layer(layer)
+    image
         .write()
         .to_buffered(&mut out)
         .map_err(|e| e.to_string())?;

@@ -1,0 +1,241 @@
+//! The truth that detections are measured against, however it is named: by labels, by a choice of
+//! images, by a COCO document.
+
+use crate::dataset::YoloSet;
+use crate::dataset::listing::{images_in, is_list, whole_path};
+use crate::error::{Error, Result};
+use crate::eval::page::EvalReportOptions;
+use crate::eval::{
+    CocoTruth, EvalImage, Picture, YoloTruth, is_class_list, read_coco_results, read_coco_truth,
+    read_yolo_detections, read_yolo_truth, read_yolo_truth_of,
+};
+use crate::io;
+use std::path::{Path, PathBuf};
+
+/// What detections of any number of runs are measured against.
+#[derive(Debug)]
+pub struct EvalTruth {
+    boxes: Boxes,
+    pictures: Vec<Option<Picture>>,
+}
+
+#[derive(Debug)]
+enum Boxes {
+    Coco(CocoTruth),
+    Yolo {
+        truth: YoloTruth,
+        /// Below the `data.yaml` that names the classes, if there is one.
+        place: PathBuf,
+    },
+}
+
+impl EvalTruth {
+    /// Whether a path is that of a COCO document, by its name.
+    pub fn is_coco(path: &Path) -> bool {
+        path.extension().is_some_and(|e| e == "json")
+    }
+
+    /// Reads a COCO document, a folder of YOLO labels, or a choice of images: a list of them
+    /// (`.txt`), or a folder with a `data.yaml` and no labels of its own, whose images for
+    /// validation count.
+    ///
+    /// The images are in the folder `images`, if not where they are by custom; `size` is the width
+    /// and height of all, pixels, for YOLO labels without images. A choice takes neither.
+    ///
+    /// # Errors
+    /// Those of [`read_coco_truth`] and [`read_yolo_truth`]; [`Error::File`] for labels with
+    /// keypoints, a list that cannot be read, a choice without images, and [`Error::Field`] for one
+    /// with `images` or `size`.
+    pub fn read(path: &Path, images: Option<&Path>, size: Option<[u32; 2]>) -> Result<Self> {
+        if Self::is_coco(path) {
+            return Self::of_coco(path, images);
+        }
+        if is_list(path) && !path.is_dir() {
+            check_alone(images, size)?;
+            return Self::of_images(path, path.into(), images_in(path)?);
+        }
+        if is_choice(path)? {
+            check_alone(images, size)?;
+            return Self::of_images(path, path.join("data.yaml"), YoloSet::read(path)?.val);
+        }
+        YoloSet::check_labels(path)?;
+        let truth = read_yolo_truth(path, images, size)?;
+        Ok(Self::of_yolo(truth, path.into()))
+    }
+
+    fn of_coco(path: &Path, images: Option<&Path>) -> Result<Self> {
+        let truth = read_coco_truth(path)?;
+        Ok(Self {
+            pictures: truth.pictures(path, images),
+            boxes: Boxes::Coco(truth),
+        })
+    }
+
+    fn of_images(path: &Path, place: PathBuf, images: Vec<PathBuf>) -> Result<Self> {
+        YoloSet::check_labels(&place)?;
+        if images.is_empty() {
+            let what = "no images to validate with, expected at least one";
+            return Err(Error::file(path, what));
+        }
+        let truth = read_yolo_truth_of(&by_name(images))?;
+        Ok(Self::of_yolo(truth, place))
+    }
+
+    fn of_yolo(truth: YoloTruth, place: PathBuf) -> Self {
+        Self {
+            pictures: truth.pictures.clone(),
+            boxes: Boxes::Yolo { truth, place },
+        }
+    }
+
+    /// The images with what a run found in them: COCO results, or a folder of YOLO labels with
+    /// confidences.
+    ///
+    /// # Errors
+    /// Those of [`read_coco_results`] and [`read_yolo_detections`].
+    pub fn with_detections(&self, predictions: &Path) -> Result<Vec<EvalImage>> {
+        match &self.boxes {
+            Boxes::Coco(truth) => {
+                let mut truth = truth.clone();
+                read_coco_results(predictions, &mut truth)?;
+                Ok(truth.sheets)
+            }
+            Boxes::Yolo { truth, .. } => {
+                let mut truth = truth.clone();
+                read_yolo_detections(predictions, &mut truth)?;
+                Ok(truth.sheets)
+            }
+        }
+    }
+
+    /// Gives a report the pictures, and the names of the classes where it has none.
+    pub fn describe(&self, options: &mut EvalReportOptions) {
+        options.pictures.clone_from(&self.pictures);
+        if options.classes.is_empty() {
+            options.classes = self.class_names();
+        }
+    }
+
+    /// None where nothing tells them.
+    fn class_names(&self) -> Vec<String> {
+        match &self.boxes {
+            Boxes::Coco(truth) => truth.classes.clone(),
+            Boxes::Yolo { place, .. } => YoloSet::class_names_of(place).unwrap_or_else(|error| {
+                log::warn!("{error}; classes are called by their numbers");
+                Vec::new()
+            }),
+        }
+    }
+}
+
+/// Whether a folder has a `data.yaml` and no labels: it chooses images of others.
+fn is_choice(folder: &Path) -> Result<bool> {
+    if !folder.join("data.yaml").is_file() {
+        return Ok(false);
+    }
+    let folder = whole_path(folder)?;
+    // A data.yaml that trainers would not take chooses nothing.
+    let lists = YoloSet::choosing_files(&folder).unwrap_or_default();
+    let is_label =
+        |path: &Path| is_list(path) && !is_class_list(path) && !lists.iter().any(|l| l == path);
+    Ok(io::files_below(&folder, is_label, usize::MAX)?.is_empty())
+}
+
+/// A choice names its images, which tell their sizes.
+fn check_alone(images: Option<&Path>, size: Option<[u32; 2]>) -> Result<()> {
+    for (name, is_given) in [("images", images.is_some()), ("size", size.is_some())] {
+        if is_given {
+            let what = "given with a list of images as truth, expected a folder of labels";
+            return Err(Error::value(name, what));
+        }
+    }
+    Ok(())
+}
+
+/// In the order that a folder of labels gives them, each once.
+fn by_name(mut images: Vec<PathBuf>) -> Vec<PathBuf> {
+    images.sort_by(|a, b| (a.file_stem(), a).cmp(&(b.file_stem(), b)));
+    images.dedup();
+    images
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Image, LinearRgb};
+
+    /// A set of three images and a choice of two of them, beside each other.
+    fn set_and_choice() -> tempfile::TempDir {
+        let root = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| {
+            let path = root.path().join(name);
+            io::create_folder(path.parent().unwrap()).unwrap();
+            std::fs::write(path, text).unwrap();
+        };
+        let yaml = "train: images/val\nval: images/val\nnames: [cap]\n";
+        write("set/data.yaml", yaml);
+        write("choice/data.yaml", &yaml.replace("images/val", "val.txt"));
+        write(
+            "choice/val.txt",
+            "../set/images/val/b.png\n../set/images/val/a.png\n",
+        );
+        write("set/labels/val/a.txt", "0 0.5 0.5 0.5 0.5\n");
+        write("found/a.txt", "0 0.5 0.5 0.5 0.5 0.9\n");
+        io::create_folder(root.path().join("set/images/val")).unwrap();
+        let image = Image::filled(8, 6, LinearRgb::WHITE);
+        for name in ["a", "b", "c"] {
+            let path = root.path().join("set/images/val").join(name);
+            io::write(path.with_extension("png"), &image).unwrap();
+        }
+        root
+    }
+
+    #[test]
+    fn a_choice_of_images_is_a_truth() {
+        let root = set_and_choice();
+        for name in ["choice", "choice/val.txt"] {
+            let truth = EvalTruth::read(&root.path().join(name), None, None).unwrap();
+            let sheets = truth.with_detections(&root.path().join("found")).unwrap();
+            let counts = sheets.iter().map(|sheet| {
+                let counts = [sheet.truth.len(), sheet.found.len()];
+                (sheet.image.as_str(), counts)
+            });
+            assert_eq!(Vec::from_iter(counts), [("a", [1, 1]), ("b", [0, 0])]);
+            let mut options = EvalReportOptions::default();
+            truth.describe(&mut options);
+            assert_eq!(
+                (options.classes, options.pictures.len()),
+                (vec!["cap".into()], 2)
+            );
+        }
+    }
+
+    #[test]
+    fn what_a_choice_does_not_take_is_refused() {
+        let root = set_and_choice();
+        let refused = |name: &str, images, size| {
+            let told = EvalTruth::read(&root.path().join(name), images, size);
+            told.unwrap_err().to_string()
+        };
+        let told = refused("choice", None, Some([8, 6]));
+        assert!(told.starts_with("size: given with a list"), "{told}");
+        let told = refused("choice/val.txt", Some(root.path()), None);
+        assert!(told.starts_with("images: given with a list"), "{told}");
+        let double = "../set/images/val/a.png\n../other/a.png\n";
+        std::fs::create_dir(root.path().join("other")).unwrap();
+        let [from, to] = ["set/images/val/a.png", "other/a.png"].map(|name| root.path().join(name));
+        std::fs::copy(from, to).unwrap();
+        std::fs::write(root.path().join("choice/val.txt"), double).unwrap();
+        let truth = EvalTruth::read(&root.path().join("choice"), None, None).unwrap();
+        let told = truth.with_detections(&root.path().join("found"));
+        assert!(told.unwrap_err().to_string().contains("a.png: named as "));
+        let told = refused("set", None, None);
+        assert!(told.contains("a dataset (it has data.yaml)"), "{told}");
+        std::fs::write(root.path().join("choice/val.txt"), "").unwrap();
+        let told = refused("choice", None, None);
+        assert!(
+            told.contains("choice: no images to validate with"),
+            "{told}"
+        );
+    }
+}
