@@ -111,7 +111,7 @@ codes! {
     PoorFit "camera.poor_fit" "No camera fits the corners within their noise"
     SidesSwapped "camera.sides_swapped" "Width and height of the surface look exchanged"
     PoseAmbiguous "camera.pose_ambiguous" "Another pose fits almost as well"
-    OutlierPhoto "camera.outlier_photo" "A photo contradicts the others and was left out"
+    OutlierPhoto "camera.outlier_photo" "A photo contradicts the others and was left out, or all contradict each other and were solved alone"
     // Asset.
     SizeMismatch "asset.size_mismatch" "The given size has other proportions than the outline"
     ScreenSizeMismatch "asset.screen_size_mismatch" "The screen does not look like one of the given size"

@@ -159,7 +159,9 @@ fn remedy(exchanged: Option<[f64; 2]>, heights_m: Option<[f64; 2]>) -> String {
             )
         }
         (None, Some([stated, found])) => {
-            format!("camera.height_m: {stated} m, expected the {found:.3} m that the corners give")
+            format!(
+                "camera.height_m: {stated} m, expected the {found:.3} m that the corners give, unless both sides or the focal length are wrong"
+            )
         }
         (None, None) => MISFIT_CAUSES.into(),
     }

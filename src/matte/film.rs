@@ -20,7 +20,7 @@ use super::check::{check_coverage, check_photo, check_positive, check_value};
 use super::clipping::{CLIPPED, clipped_screen, clipping_level};
 use super::plate::ScreenPlate;
 use super::prepared::{check_finite, longer_side};
-use super::screen::{is_keyable, screen_shade, strongest_channel};
+use super::screen::{is_keyable, strongest_channel};
 use super::stroke::Claims;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -338,7 +338,10 @@ impl<'a> FilmSolution<'a> {
         let plastic = self.calm.zip3_map(plate, claims, |pixel, screen, claim| {
             (claim == Some(true)).then(|| solver.see_through(pixel.into(), screen.into()))
         });
-        factors = factors.zip_map(&plastic, |factor, plastic| plastic.unwrap_or(factor));
+        factors = factors.zip_map(&plastic, |factor, plastic| Factor {
+            is_bare: factor.is_bare,
+            ..plastic.unwrap_or(factor)
+        });
         claimed::make_opaque(&mut factors, Some(claims));
         factors
     }
@@ -369,11 +372,9 @@ impl<'a> FilmSolution<'a> {
             longer_side,
             claims,
         );
-        let shades = self
-            .calm
-            .zip_map(&plate.image, |p, k| screen_shade(p.into(), k.into()));
+        let photos = [&*self.calm, &plate.image];
         let keyed_away =
-            uncertainty::keyed_away(factors, &shades, inside, flat[self.key], longer_side);
+            uncertainty::keyed_away(factors, photos, inside, flat[self.key], longer_side);
         watch.lap("paint");
         let clipped = bright::fill_glints(factors, photo, inside, clipped);
         claimed::make_opaque(factors, claims);
@@ -421,7 +422,10 @@ impl<'a> FilmSolution<'a> {
 
 /// Expected error of the largest channel of the transmittance.
 fn uncertainty_of(factors: &Image<Factor>, inside: &Image<Coverage>, most: f32) -> Image<f32> {
-    factors.zip_map(inside, |f, c| (c.0 * f.sigma * most).min(1.0))
+    factors.zip_map(inside, |f, c| match f.is_bare {
+        true => 0.0,
+        false => (c.0 * f.sigma * most).min(1.0),
+    })
 }
 
 impl FilmOptions {

@@ -27,9 +27,9 @@ const MIN_EDGES: usize = 6;
 /// Times the sides are fitted anew, at most; corners that move by less stay.
 const MAX_ROUNDS: usize = 6;
 const SETTLED_PX: f64 = 0.01;
-/// Corners that still move are off by no more than so many of their last steps: those of an edge as
-/// wide as its probe shrink by 0.7 from one to the next.
-const STEPS_OFF: f64 = 3.0;
+/// Standard deviation of corners that still move, in their last steps: those of an edge as wide as
+/// its probe shrink by 0.7 from one to the next, and so are off by 2.3 of them at most.
+const STEPS_OFF: f64 = 1.0;
 /// Noise of a corner of a marker that is seen as sharp as can be, pixels.
 const MIN_SIGMA_PX: f64 = 0.03;
 /// Errors of the outline over those of the cells' edges, which are measured by fewer pixels: on
@@ -122,7 +122,7 @@ impl<'a> Outline<'a> {
         sides.iter().any(Side::is_capped) && spread.sum::<f64>() / 4.0 > wide
     }
 
-    /// How far off a corner may be that has not settled, pixels.
+    /// Standard deviation of corners that have not settled, pixels.
     fn unsettled_px(&self) -> f64 {
         if self.last_step_px < SETTLED_PX {
             0.0
@@ -154,7 +154,7 @@ fn fitted_sides(search: &EdgeSearch, corners: &[Point2<f64>; 4]) -> Option<[Line
 /// by how much: each edge between them that rises along an axis has moved back, each that falls,
 /// forward, while the grid they should lie on has shrunk with the outline. Least squares over all
 /// edges of the pattern. How far they are off after that is the uncertainty of the outline: blur
-/// moves both where cells are narrow. What an outline that has not settled may be off comes on top.
+/// moves both where cells are narrow. That of an outline that has not settled comes on top.
 pub(super) fn by_cells<const CELLS: usize>(
     outline: &Outline,
     cells: &MarkerCells<CELLS>,

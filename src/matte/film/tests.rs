@@ -566,6 +566,20 @@ fn the_screen_in_a_hole_is_see_through_whatever_the_dye_seems_to_be() {
 }
 
 #[test]
+fn clear_plastic_beside_a_large_label_is_no_print() {
+    let screen = LinearRgb::new(0.10, 0.45, 0.12);
+    let inside = Image::from_fn(120, 120, |x, _| Coverage(f32::from((10..110).contains(&x))));
+    let photo = Image::from_fn(120, 120, |x, _| match x {
+        10..80 => LinearRgb::grey(0.8),
+        80..110 => screen.scale(0.56) + LinearRgb::grey(0.01),
+        _ => screen,
+    });
+    let plate = ScreenPlate::even(screen, (120, 120));
+    let found = film(&photo, &plate, &inside, &FilmOptions::default()).unwrap();
+    assert!(!found.diagnostics.iter().any(|d| d.code == Code::KeyedAway));
+}
+
+#[test]
 fn a_print_of_the_screens_hue_on_something_opaque_is_told() {
     let screen = [0.10, 0.45, 0.12];
     let solved = |print: [f32; 3]| {

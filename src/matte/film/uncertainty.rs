@@ -4,7 +4,8 @@ use super::object::{interior, share};
 use super::solve::Factor;
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::image::Image;
-use crate::pixel::Coverage;
+use crate::matte::screen::screen_shade;
+use crate::pixel::{Coverage, LinearRgb};
 
 /// What makes the colours of a cut-out wrong, 0 where nothing does.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -135,7 +136,7 @@ const BARE_TRANSMITTANCE: f32 = 0.85;
 /// Transmittance of the screen's channel below which nothing seems to be seen through something.
 const OPAQUE_TRANSMITTANCE: f32 = 0.1;
 /// Share of the object that is opaque from which on the rest may be paint, not plastic.
-const MIN_OPAQUE_SHARE: f64 = 0.6;
+const MIN_OPAQUE_SHARE: f32 = 0.8;
 /// Shade of the screen from which on paint of its hue is told from what is dark.
 const MIN_SHADE: f32 = 0.15;
 
@@ -146,35 +147,44 @@ fn certainty(cause: f64, limit: f64) -> f64 {
 
 /// The share of the object that looks like the screen, away from its rim, and was left see-through:
 /// like bare screen or, in something that is opaque for the most part, like the screen in some
-/// shade. `shades` are those of the photo, none where it is not like its screen; `flat` is what
-/// flat plastic passes in the screen's channel, `longer_side` that of the whole photo, pixels.
+/// shade. `flat` is what flat plastic passes in the screen's channel, `longer_side` that of the
+/// whole photo, pixels.
 pub(super) fn keyed_away(
     factors: &Image<Factor>,
-    shades: &Image<Option<f32>>,
+    [photo, plate]: [&Image<LinearRgb>; 2],
     inside: &Image<Coverage>,
     flat: f32,
     longer_side: usize,
 ) -> f32 {
-    let inner = interior(inside, longer_side);
-    let passed = |f: Factor| f.value * flat;
-    let is_opaque = factors.zip_map(&inner, |f, inner| inner && passed(f) < OPAQUE_TRANSMITTANCE);
-    let is_paint = is_opaque.count() as f64 > MIN_OPAQUE_SHARE * inner.count() as f64;
-    let looks_bare = |f: Factor, shade: Option<f32>| {
-        let is_shade = shade.is_some_and(|shade| shade > MIN_SHADE);
-        f.is_bare
-            || passed(f) > BARE_TRANSMITTANCE
-            || is_paint && is_shade && passed(f) > OPAQUE_TRANSMITTANCE
+    let passed = factors.map(|f| if f.is_bare { 1.0 } else { f.value * flat });
+    let limit = match is_mostly_opaque(&passed, inside) {
+        true => OPAQUE_TRANSMITTANCE,
+        false => BARE_TRANSMITTANCE,
     };
-    let gone = factors.zip3_map(shades, &inner, |f, shade, inner| {
-        inner && looks_bare(f, shade)
+    let gone = photo.zip3_map(plate, &passed, |p, k, passed| {
+        passed > BARE_TRANSMITTANCE || passed > limit && is_in_its_hue(p, k)
     });
+    if !gone.pixels().contains(&true) {
+        return 0.0;
+    }
+    let gone = gone.zip_map(&interior(inside, longer_side), |gone, inner| gone && inner);
     share(gone.pixels().iter().copied(), inside)
+}
+
+fn is_mostly_opaque(passed: &Image<f32>, inside: &Image<Coverage>) -> bool {
+    let opaque = passed.pixels().iter().map(|&t| t < OPAQUE_TRANSMITTANCE);
+    share(opaque, inside) > MIN_OPAQUE_SHARE
+}
+
+/// A pixel is the screen in some shade, and no deep shadow.
+fn is_in_its_hue(pixel: LinearRgb, screen: LinearRgb) -> bool {
+    screen_shade(pixel.into(), screen.into()).is_some_and(|shade| shade > MIN_SHADE)
 }
 
 /// How much of a pixel's standard deviation is the prior's, 0 to 1.
 #[inline]
 fn prior_share(factor: &Factor, spread: f32) -> f64 {
-    if factor.coloured {
+    if factor.coloured || factor.is_bare {
         0.0
     } else {
         f64::from((factor.sigma / spread).min(1.0))

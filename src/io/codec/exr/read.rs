@@ -322,7 +322,16 @@ fn canvas(header: &exr::meta::header::Header) -> Canvas {
     let shown = shared.display_window.position;
     Canvas {
         at: [shown.x(), shown.y()],
-        pixel_aspect: shared.pixel_aspect,
+        pixel_aspect: writable_aspect(shared.pixel_aspect),
+    }
+}
+
+/// Files with an aspect that cannot be written have square pixels.
+fn writable_aspect(aspect: f32) -> f32 {
+    if (1e-6..=1e6).contains(&aspect) {
+        aspect
+    } else {
+        1.0
     }
 }
 
