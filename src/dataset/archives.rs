@@ -43,7 +43,9 @@ pub fn repair_archives(folder: &Path, range: SampleRange) -> Result<(usize, usiz
                 bad += 1;
             }
         }
-        layout.repair_samples(number)?;
+        if layout.files(number).any(|file| !file.path.exists()) {
+            layout.repair_samples(number)?;
+        }
     }
     Ok((good, bad))
 }

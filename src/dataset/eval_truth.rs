@@ -77,8 +77,15 @@ impl EvalTruth {
             let what = "no images to validate with, expected at least one";
             return Err(Error::file(path, what));
         }
-        let truth = read_yolo_truth_of(&by_name(images))?;
-        Ok(Self::of_yolo(truth, place))
+        let images = by_name(images);
+        if !images
+            .iter()
+            .any(|image| YoloSet::label_of(image).is_file())
+        {
+            let what = "no label files of its images, expected NAME.txt in labels";
+            return Err(Error::file(path, what));
+        }
+        Ok(Self::of_yolo(read_yolo_truth_of(&images)?, place))
     }
 
     fn of_yolo(truth: YoloTruth, place: PathBuf) -> Self {
@@ -231,6 +238,9 @@ mod tests {
         assert!(told.unwrap_err().to_string().contains("a.png: named as "));
         let told = refused("set", None, None);
         assert!(told.contains("a dataset (it has data.yaml)"), "{told}");
+        std::fs::remove_file(root.path().join("set/labels/val/a.txt")).unwrap();
+        let told = refused("choice/val.txt", None, None);
+        assert!(told.contains("no label files"), "{told}");
         std::fs::write(root.path().join("choice/val.txt"), "").unwrap();
         let told = refused("choice", None, None);
         assert!(

@@ -175,10 +175,11 @@ fn sequence_beside(image: Option<&Path>, label: Option<&Path>) -> String {
         |path: &Path, step| io::with_last_step(path, step, "scenes").with_extension("json");
     let by_image = image.map(|path| sidecar(path, "images"));
     let by_label = label.map(|path| sidecar(path, "labels"));
+    // Most often the same file.
+    let by_label = by_label.filter(|path| by_image.as_ref() != Some(path));
     let mut sidecars = [by_image, by_label].into_iter().flatten();
-    let found = sidecars.find(|path| path.is_file());
-    found
-        .and_then(|path| sequence_in(&path))
+    sidecars
+        .find_map(|path| sequence_in(&path))
         .unwrap_or_default()
 }
 
@@ -422,10 +423,12 @@ fn split_extra(numbers: &[f64], extra: usize) -> std::result::Result<(&[f64], &[
     Ok(numbers.split_at(count))
 }
 
-/// Whether a tracker wrote them: `cx cy w h confidence id`.
+/// Whether a tracker wrote them: a place, which is an even count of numbers, `confidence id`.
 fn has_track_id(numbers: &[f64]) -> bool {
     match *numbers {
-        [_, _, _, _, confidence, id] => is_share(confidence) && id >= 0.0 && id.fract() == 0.0,
+        [_, _, _, _, .., confidence, id] if numbers.len().is_multiple_of(2) => {
+            is_share(confidence) && id >= 1.0 && id.fract() == 0.0
+        }
         _ => false,
     }
 }
@@ -660,6 +663,11 @@ mod tests {
         assert_eq!(parsed("0 0.5 0.5 0.2 0.2 7").unwrap_err(), said);
         let tracked = parsed("0 0.5 0.5 0.2 0.2 0.25 7").unwrap();
         assert_eq!(tracked, parsed("0 0.5 0.5 0.2 0.2 0.25").unwrap());
+        let outline = "0 0.2 0.2 0.4 0.2 0.4 0.4 0.9";
+        assert_eq!(
+            parsed(&format!("{outline} 7")).unwrap(),
+            parsed(outline).unwrap()
+        );
         for bad in ["0 0.5 0.5 0.2 0.2 7 0.25", "0 0.1 0.1 0.2 0.2 0.3 0.25"] {
             let told = parsed(bad).unwrap_err();
             assert!(told.contains("6 numbers behind the class"), "{told}");

@@ -80,10 +80,11 @@ impl GlobalArgs {
     }
 
     fn start_logger(&self) {
-        env_logger::Builder::new()
+        // Fails only if a logger exists already, and then that one tells.
+        let _ = env_logger::Builder::new()
             .filter_module("petcomp", self.log_level())
             .format(|out, record| writeln!(out, "{}", log_line(record)))
-            .init();
+            .try_init();
     }
 
     fn log_level(&self) -> log::LevelFilter {

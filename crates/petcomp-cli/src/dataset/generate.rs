@@ -38,7 +38,8 @@ pub(crate) struct GenerateArgs {
     #[arg(long)]
     quality: Option<Quality>,
     /// Go on with a dataset that was begun before: refuse a new folder, and check every file
-    /// against its checksum (archives have none: whether they are whole), inputs too
+    /// against its checksum (archives have none: whether they are whole, and the samples
+    /// that are not packed yet), inputs too
     #[arg(long)]
     resume: bool,
     /// Make only image K, whether it is there or not
