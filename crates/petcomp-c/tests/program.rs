@@ -1,7 +1,7 @@
 //! A C program makes what petcomp itself makes, and valgrind has nothing to say of it.
 
 use petcomp::asset;
-use std::ffi::OsString;
+use petcomp::dataset::{self, DatasetConfig, Pipeline};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::atomic::AtomicBool;
@@ -50,14 +50,11 @@ fn write_recipe(folder: &Path, more: &str) -> PathBuf {
 
 /// As somebody types it.
 fn generate(recipe: &Path, folder: &Path) {
-    let words = [
-        "petcomp", "dataset", "generate", "-q", "-n", "2", "--seed", SEED, "-o",
-    ];
-    let paths = [folder, recipe].map(|path| path.as_os_str().to_owned());
-    assert_eq!(
-        petcomp_cli::run(words.map(OsString::from).into_iter().chain(paths)),
-        0
-    );
+    let pipeline = Pipeline::open(DatasetConfig::read(recipe, &[]).unwrap()).unwrap();
+    let seed = SEED.parse().unwrap();
+    let plan = pipeline.plan(2, seed, folder).unwrap();
+    let sample = |k| pipeline.sample(seed, k);
+    dataset::generate(&plan, sample, &|_| {}, &AtomicBool::new(false)).unwrap();
 }
 
 /// Every warning is an error.
