@@ -65,7 +65,10 @@ impl<V: Shared> LruCache<V> {
 
     /// The value of a name, which is now the one used last.
     pub(crate) fn get(&self, name: &str) -> Option<V> {
-        used(&mut self.entries(), name)
+        let mut entries = self.entries();
+        let value = used(&mut entries, name)?;
+        self.drop_oldest(entries);
+        Some(value)
     }
 
     /// Keeps a value, unless another thread was faster: then that one's. It is made before it comes
@@ -82,11 +85,16 @@ impl<V: Shared> LruCache<V> {
             kept: Some(value.clone()),
             weak: value.downgrade(),
         });
+        self.drop_oldest(entries);
+        value
+    }
+
+    /// Keeps no more than its bytes. Large memory is given back without the lock: others wait for
+    /// it, and a fork would for ever.
+    fn drop_oldest(&self, mut entries: MutexGuard<'_, Vec<Entry<V>>>) {
         let oldest = take_oldest(&mut entries, own_share(self.most_bytes));
-        // Large memory is given back without the lock: others wait for it, and a fork would for ever.
         drop(entries);
         drop(oldest);
-        value
     }
 
     fn entries(&self) -> MutexGuard<'_, Vec<Entry<V>>> {
@@ -176,6 +184,17 @@ mod tests {
         drop((found, held));
         cache.insert("c", Arc::new(8));
         assert!(cache.get("a").is_none());
+    }
+
+    #[test]
+    fn what_is_used_again_takes_the_place_of_others() {
+        let cache = LruCache::of_bytes(10);
+        let held = cache.insert("a", Arc::new(8));
+        cache.insert("b", Arc::new(8));
+        assert_eq!(found(&cache, "a"), Some(8));
+        assert_eq!(found(&cache, "b"), None);
+        drop(held);
+        assert_eq!(found(&cache, "a"), Some(8));
     }
 
     #[test]

@@ -73,7 +73,7 @@ pub use open_photo::OpenPhoto;
 pub use panorama::Panorama;
 pub(crate) use panorama::warn_of_bits;
 pub use pixels::Pixels;
-pub(crate) use pixels::most_bytes;
+pub(crate) use pixels::{check_unchanged, most_bytes};
 pub use review::{Review, Verdict};
 #[doc(hidden)]
 pub use role::Role;

@@ -172,7 +172,8 @@ impl CutOutFiles {
     }
 }
 
-fn check_unchanged(found: u32, expected: u32) -> std::result::Result<(), String> {
+/// Bytes of a file have the checksum that they had when its folder was opened.
+pub(crate) fn check_unchanged(found: u32, expected: u32) -> std::result::Result<(), String> {
     if found == expected {
         return Ok(());
     }

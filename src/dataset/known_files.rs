@@ -1,5 +1,6 @@
 //! Files that pictures are made from: the bytes that each had when it was first looked at.
 
+use crate::asset;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::io::{self, FromFile};
@@ -31,9 +32,7 @@ impl KnownFiles {
     fn compare(&self, path: &Path, crc32: u32) -> std::result::Result<(), String> {
         let checksums = self.checksums.lock();
         let mut checksums = checksums.unwrap_or_else(PoisonError::into_inner);
-        if *checksums.entry(path.to_owned()).or_insert(crc32) == crc32 {
-            return Ok(());
-        }
-        Err("has other bytes than when its folder was opened".into())
+        let known = checksums.entry(path.to_owned()).or_insert(crc32);
+        asset::check_unchanged(crc32, *known)
     }
 }

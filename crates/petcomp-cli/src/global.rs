@@ -80,11 +80,10 @@ impl GlobalArgs {
     }
 
     fn start_logger(&self) {
-        // Fails only if a logger exists already, and then that one tells.
-        let _ = env_logger::Builder::new()
+        env_logger::Builder::new()
             .filter_module("petcomp", self.log_level())
             .format(|out, record| writeln!(out, "{}", log_line(record)))
-            .try_init();
+            .init();
     }
 
     fn log_level(&self) -> log::LevelFilter {

@@ -119,7 +119,7 @@ def test_many_processes_keep_their_share_in_memory(world, recipe, tmp_path):
     def second_picture(processes):
         assets = tmp_path / str(processes)
         shutil.copytree(world / "assets", assets)
-        pipeline = petcomp.Pipeline(recipe, set={"assets": str(assets), "scene.objects": 2})
+        pipeline = petcomp.Pipeline(recipe, set={"assets": str(assets), "scene.objects": 10})
         petcomp._petcomp.share_memory(processes)
         try:
             assert len({item["asset"] for item in pipeline[0].scene["objects"]}) == 2
