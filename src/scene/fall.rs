@@ -39,8 +39,8 @@ pub struct SettleOptions {
     /// Iterations of the contact solver in the shortest step, 1 to 100; longer ones have up to twice
     /// as many. Default: 4.
     pub iterations: u32,
-    /// Times in a step that a body may be stopped at what it would fly through, 0 to 100. Default:
-    /// 1.
+    /// Times in a step that a body may be stopped at an object that stands already, which it would
+    /// fly through, 0 to 100. Default: 1.
     pub ccd: u32,
     /// Most work for one picture, all attempts and redraws together, before it is refused: objects
     /// and pairs of objects near to each other, summed over time steps, 1 to 1e12. Heaps of 30

@@ -1,6 +1,6 @@
 //! Error of the settle stage against run time.
 //!
-//! Time step, solver iterations and CCD are changed one against another; each setting sees the same
+//! Time step and solver iterations are changed one against the other; each setting sees the same
 //! heaps and the same closed-form cases. Overlap is measured by the stage's own separating-axis
 //! test, which shares nothing with the engine.
 //!
@@ -34,8 +34,6 @@ use std::path::Path;
 /// Time steps, as the number of them in a second.
 const RATES: [u32; 5] = [240, 360, 480, 960, 1920];
 const ITERATIONS: [u32; 4] = [1, 2, 4, 8];
-/// CCD stops in a step, at the default step and iterations.
-const CCD_STOPS: [u32; 3] = [0, 1, 4];
 const HEAP_CARDS: usize = 20;
 const MS_PER_SECOND: f64 = 1e3;
 const MM_PER_M: f64 = 1e3;
@@ -60,8 +58,6 @@ pub struct SettleRow {
     pub rate: u32,
     /// Solver iterations in a step.
     pub iterations: u32,
-    /// CCD stops in a step.
-    pub ccd: u32,
     /// Heaps settled, and how many of them came to rest at the first attempt.
     pub heaps: usize,
     /// See [`heaps`](Self::heaps).
@@ -86,13 +82,7 @@ impl SettleRow {
 
     fn is_default(&self) -> bool {
         let default = SettleOptions::default();
-        self.has_default_ccd()
-            && self.iterations == default.iterations
-            && self.is_step(default.step)
-    }
-
-    fn has_default_ccd(&self) -> bool {
-        self.ccd == SettleOptions::default().ccd
+        self.iterations == default.iterations && self.is_step(default.step)
     }
 }
 
@@ -121,11 +111,8 @@ fn settings() -> Vec<SettleOptions> {
         attempts: 1,
         ..SettleOptions::default()
     };
-    let swept = RATES.iter().flat_map(|rate| at_rate(*rate, default));
-    let stops = CCD_STOPS.into_iter().filter(|ccd| *ccd != default.ccd);
-    swept
-        .chain(stops.map(|ccd| SettleOptions { ccd, ..default }))
-        .collect()
+    let rates = RATES.iter();
+    rates.flat_map(|rate| at_rate(*rate, default)).collect()
 }
 
 /// A number of steps a second, with every number of iterations.
@@ -142,7 +129,6 @@ fn measure_setting(options: &SettleOptions, heaps: &[Scene]) -> Result<SettleRow
     Ok(SettleRow {
         rate: libm::round(1.0 / options.step) as u32,
         iterations: options.iterations,
-        ccd: options.ccd,
         heaps: ends.len(),
         rested: count_rested(&ends),
         overlap_mm: median_and_worst(ends.iter().map(|end| end.overlap * MM_PER_M)),

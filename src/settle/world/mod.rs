@@ -8,6 +8,7 @@
 //! mm long, masses so that the typical one is 30 g, and time so that gravity is 9.81 m/s^2. The
 //! result does not depend on the unit of length, of mass, or on the strength of gravity.
 
+mod collider;
 mod prism;
 mod run;
 mod stride;
@@ -169,9 +170,7 @@ impl Drop<'_> {
     }
 
     fn add_standing(&self, world: &mut PhysicsWorld, units: &WorldUnits) {
-        let objects = self.scene.objects.iter();
-        let standing = objects.filter(|o| matches!(o.placement, Placement::At(_)));
-        for object in standing {
+        for object in self.standing() {
             self.add_body(world, object, 0.0, units);
         }
     }
@@ -221,12 +220,25 @@ impl Drop<'_> {
     }
 
     fn set_parameters(&self, p: &mut IntegrationParameters, step: f32) {
-        p.max_ccd_substeps = self.options.ccd as usize;
+        p.max_ccd_substeps = self.ccd_substeps();
         p.length_unit = LENGTH_UNIT_M as f32;
         p.normalized_max_corrective_velocity = MAX_CORRECTIVE_SPEED;
         p.num_internal_stabilization_iterations = STABILIZATION_ITERATIONS;
         p.normalized_max_linear_velocity = (MAX_SPEED_M_PER_S / LENGTH_UNIT_M) as f32;
         set_step(p, step, self.options.iterations);
+    }
+
+    /// The engine stops bodies at what is fixed, which takes a quarter of a fall's time. Floor and
+    /// walls need no such search: of 600 falls into trays whose walls lean by 8 to 75 degrees 26
+    /// attempts were rejected with it, 29 without.
+    fn ccd_substeps(&self) -> usize {
+        let mut standing = self.standing();
+        standing.next().map_or(0, |_| self.options.ccd as usize)
+    }
+
+    fn standing(&self) -> impl Iterator<Item = &Object> {
+        let objects = self.scene.objects.iter();
+        objects.filter(|object| matches!(object.placement, Placement::At(_)))
     }
 
     fn add_room(&self, world: &mut PhysicsWorld, units: &WorldUnits, members: &[usize]) {
@@ -289,21 +301,21 @@ impl Drop<'_> {
         units: &WorldUnits,
     ) -> RigidBodyHandle {
         let body = world.insert_body(rigid_body(object, height, units));
-        for part in self.colliders(object, units) {
-            world.insert_collider(part, Some(body));
-        }
+        world.insert_collider(self.collider(object, units), Some(body));
         let activation = world.bodies[body].activation_mut();
         activation.normalized_linear_threshold = SLEEP_SPEED;
         body
     }
 
     /// The shape of an object, of its mass.
-    fn colliders(&self, object: &Object, units: &WorldUnits) -> Vec<ColliderBuilder> {
+    fn collider(&self, object: &Object, units: &WorldUnits) -> ColliderBuilder {
         let half = self.options.half_body(object) * units.length;
-        prism::colliders(object, &half, units.length, body_mass(object, units))
-            .into_iter()
-            .map(|part| self.with_contacts(part))
-            .collect()
+        self.with_contacts(collider::collider(
+            object,
+            &half,
+            units.length,
+            body_mass(object, units),
+        ))
     }
 
     fn with_contacts(&self, collider: ColliderBuilder) -> ColliderBuilder {

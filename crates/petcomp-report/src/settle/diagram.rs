@@ -95,12 +95,6 @@ impl SettleRow {
     }
 
     fn curve_and_setting(&self) -> [String; 2] {
-        if !self.has_default_ccd() {
-            return [
-                format!("1/{} s, other CCD", self.rate),
-                format!("{} CCD stops", self.ccd),
-            ];
-        }
         let plural = if self.iterations == 1 { "" } else { "s" };
         [
             format!("1/{} s", self.rate),
@@ -110,9 +104,7 @@ impl SettleRow {
 
     fn is_used_by(&self, quality: Quality) -> bool {
         let settings = quality.settle(SettleOptions::default());
-        self.has_default_ccd()
-            && settings.iterations == self.iterations
-            && self.is_step(settings.step)
+        settings.iterations == self.iterations && self.is_step(settings.step)
     }
 
     /// Every error of a setting is as small as it should be.
@@ -143,12 +135,11 @@ fn why_default(rows: &[SettleRow]) -> String {
     format!(
         "A setting is right where every heap comes to rest at the first attempt, all three errors are under their limits, and \
          plates slide on slopes as the closed form says: {} of {} are, and the default {judged} one of them. The cheapest of them is \
-         1/{} s with {} iterations and {} CCD stops, at {} of the default's cost.",
+         1/{} s with {} iterations, at {} of the default's cost.",
         right.len(),
         rows.len(),
         best.rate,
         best.iterations,
-        best.ccd,
         three(best.cpu_ms / default.cpu_ms)
     )
 }
@@ -157,11 +148,10 @@ fn why_default(rows: &[SettleRow]) -> String {
 mod tests {
     use super::*;
 
-    fn row(rate: u32, iterations: u32, ccd: u32) -> SettleRow {
+    fn row(rate: u32, iterations: u32) -> SettleRow {
         SettleRow {
             rate,
             iterations,
-            ccd,
             heaps: 4,
             rested: 3,
             overlap_mm: [0.01, 0.02],
@@ -174,22 +164,23 @@ mod tests {
 
     #[test]
     fn each_error_has_a_diagram_and_the_default_its_ring() {
-        let found = diagrams(&[row(360, 4, 1), row(240, 4, 1), row(360, 4, 0)]);
+        let found = diagrams(&[row(360, 4), row(240, 4)]);
         assert_eq!(found.len(), 3);
         assert!(
             found
                 .iter()
                 .all(|d| d.points.iter().filter(|p| p.is_default()).count() == 1)
         );
-        assert_eq!(found[0].points[2].curve, "1/360 s, other CCD");
+        assert_eq!(found[0].points[1].curve, "1/240 s");
     }
+
     #[test]
     fn the_cheapest_setting_that_is_right_in_everything_is_named() {
         let fine = |rate, cpu_ms| SettleRow {
             rested: 4,
             wrong_slopes: 0,
             cpu_ms,
-            ..row(rate, 4, 1)
+            ..row(rate, 4)
         };
         let why = why_default(&[
             fine(360, 20.0),

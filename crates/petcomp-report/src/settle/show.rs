@@ -4,10 +4,9 @@ use super::{RATES, SettleRow};
 use crate::columns::{Column, table_of};
 use petcomp::plot::{Axis, Chart, Curve, Table};
 
-const COLUMNS: [Column<SettleRow>; 12] = [
+const COLUMNS: [Column<SettleRow>; 11] = [
     ("steps per s", |r| r.rate.to_string()),
     ("iterations", |r| r.iterations.to_string()),
-    ("ccd", |r| r.ccd.to_string()),
     ("heaps", |r| r.heaps.to_string()),
     ("rested", |r| r.rested.to_string()),
     ("overlap median mm", |r| four(r.overlap_mm[0])),
@@ -31,18 +30,11 @@ pub fn table(rows: &[SettleRow]) -> Table {
 /// The sweep as charts against run time: worst overlap, energy rise, and error of the stack; a ring
 /// where the default is.
 pub fn charts(rows: &[SettleRow]) -> Vec<Chart> {
-    let swept = with_default_ccd(rows);
     vec![
-        error_chart(&swept, "worst overlap, mm", |r| r.overlap_mm[1]),
-        error_chart(&swept, "worst energy rise, %", |r| r.energy_percent[1]),
-        error_chart(&swept, "error of a stack, mm", |r| r.stack_mm),
+        error_chart(rows, "worst overlap, mm", |r| r.overlap_mm[1]),
+        error_chart(rows, "worst energy rise, %", |r| r.energy_percent[1]),
+        error_chart(rows, "error of a stack, mm", |r| r.stack_mm),
     ]
-}
-
-fn with_default_ccd(rows: &[SettleRow]) -> Vec<SettleRow> {
-    let mut rows = rows.to_vec();
-    rows.retain(SettleRow::has_default_ccd);
-    rows
 }
 
 fn error_chart(rows: &[SettleRow], title: &str, error: fn(&SettleRow) -> f64) -> Chart {

@@ -1,0 +1,35 @@
+//! The shape of an object in the physics world: a box, or a convex prism.
+
+use super::prism::Prism;
+use crate::geom::Vector3;
+use crate::scene::{Object, doubled_area};
+use rapier3d::prelude::{ColliderBuilder, SharedShape};
+
+/// The collider of an object, `half` and `length` in the world's units: a prism where it has an
+/// outline, else a box; of this `mass`.
+pub(super) fn collider(
+    object: &Object,
+    half: &Vector3<f64>,
+    length: f64,
+    mass: f64,
+) -> ColliderBuilder {
+    let ring = scaled(&object.outline, length);
+    prism(&ring, half.z)
+        .unwrap_or_else(|| cuboid(half))
+        .mass(mass as f32)
+}
+
+fn cuboid(half: &Vector3<f64>) -> ColliderBuilder {
+    ColliderBuilder::cuboid(half.x as f32, half.y as f32, half.z as f32)
+}
+
+/// None where the ring has no area or the engine finds the prism too thin a shape.
+fn prism(ring: &[[f64; 2]], half_height: f64) -> Option<ColliderBuilder> {
+    let has_area = ring.len() > 2 && doubled_area(ring) > 0.0;
+    let prism = has_area.then(|| Prism::new(ring, half_height))??;
+    Some(ColliderBuilder::new(SharedShape::new(prism)))
+}
+
+fn scaled(ring: &[[f64; 2]], by: f64) -> Vec<[f64; 2]> {
+    ring.iter().map(|corner| corner.map(|x| x * by)).collect()
+}
