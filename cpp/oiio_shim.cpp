@@ -70,6 +70,12 @@ bool row_by_row(const ImageInput &input, const ImageSpec &spec) {
     return std::string(input.format_name()) == "tiff" && spec.tile_width == 0 && !planes;
 }
 
+// Of most transfers of DPX the library makes no colour space: their own name says what the codes are.
+std::string color_space_of(const ImageSpec &spec) {
+    const std::string space(spec.get_string_attribute("oiio:ColorSpace"));
+    return space.empty() ? std::string(spec.get_string_attribute("dpx:Transfer")) : space;
+}
+
 class OiioReader : public Reader {
   public:
     OiioReader(std::unique_ptr<IOMemReader> bytes, std::unique_ptr<ImageInput> input)
@@ -134,7 +140,7 @@ Layout OiioReader::layout() const {
         out.channels.push_back(std::string(spec.channel_name(c)));
     out.bytes = int32_t(handed_over(spec).size());
     out.half = handed_over(spec) == TypeDesc::HALF;
-    out.color_space = std::string(spec.get_string_attribute("oiio:ColorSpace"));
+    out.color_space = color_space_of(spec);
     return out;
 }
 

@@ -216,24 +216,13 @@ fn cut_out_all<'a>(
 
 /// How many of these photos are worked on at once: all, if there is memory for one on each thread.
 fn photos_at_once(photos: &[PhotoEntry]) -> usize {
-    let headers = photos
-        .iter()
-        .filter_map(|photo| io::read_header(&photo.file).ok());
-    let pixels = headers.map(|header| (header.width * header.height) as u64);
-    let fitting = fitting_photos(io::machine_bytes(), pixels.max().unwrap_or(0));
+    let files = photos.iter().map(|photo| &photo.file);
+    let fitting = io::pictures_at_once(files, BYTES_PER_PIXEL);
     if fitting < rayon::current_num_threads() {
         fitting
     } else {
         photos.len().max(1)
     }
-}
-
-/// How many photos of so many pixels half of the machine's memory holds while they are cut out, one
-/// at least; any number where the memory is not known.
-fn fitting_photos(machine_bytes: Option<u64>, pixels: u64) -> usize {
-    let need = pixels.saturating_mul(BYTES_PER_PIXEL).max(1);
-    let fitting = machine_bytes.map_or(u64::MAX, |bytes| bytes / 2 / need);
-    usize::try_from(fitting.max(1)).unwrap_or(usize::MAX)
 }
 
 /// Takes the cut-outs of a list into the manifest as it is by now: another process may have changed
@@ -754,16 +743,6 @@ mod tests {
         let expected = "no cut-out: px_per_metre: 2, makes what is in two.png 30";
         assert!(told.starts_with(expected), "{told}");
         assert!(told.ends_with("; is it pixels for a centimetre?"), "{told}");
-    }
-
-    #[test]
-    fn large_photos_are_cut_out_as_many_at_once_as_memory_holds() {
-        let (laptop, phone) = (16_u64 << 30, 12_000_000);
-        assert_eq!(fitting_photos(Some(laptop), phone), 5);
-        assert_eq!(fitting_photos(Some(laptop), 1_000_000_000), 1);
-        assert!(fitting_photos(Some(laptop), 100_000) > 500);
-        assert_eq!(fitting_photos(Some(laptop), 0), 8_usize << 30);
-        assert_eq!(fitting_photos(None, phone), usize::MAX);
     }
 
     #[test]

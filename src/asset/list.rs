@@ -101,7 +101,8 @@ impl List {
     ///
     /// # Errors
     /// [`Error::Value`] for the first value that cannot be right, naming the entry.
-    pub(super) fn check(&self, manifest: &mut Manifest) -> Result<()> {
+    #[doc(hidden)]
+    pub fn check(&self, manifest: &mut Manifest) -> Result<()> {
         self.cut_out.check().map_err(|e| e.within("cut_out"))?;
         self.add_classes_to(manifest)?;
         if self.photos.is_empty() {

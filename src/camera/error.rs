@@ -60,8 +60,8 @@ pub enum SolveError {
         /// What it was.
         value: f64,
     },
-    /// The albedo or the walls of a surface, or the camera's height over it, are none that it can
-    /// have: which value, and what was expected.
+    /// The albedo or the walls of a surface, the camera's height over it or its focal length are
+    /// none that it can have: which value, and what was expected.
     #[error("{0}")]
     OutOfBounds(String),
     /// There are points instead of corners, and not both sides: in words, which are missing.
@@ -139,6 +139,19 @@ pub enum SolveError {
     /// No pose has the camera above the surface with the whole rectangle in front of it.
     #[error("surface.corners_px: no camera above the surface sees these corners")]
     NoPose,
+}
+
+impl SolveError {
+    /// The camera fits with width and height exchanged.
+    pub(super) fn is_exchange(&self) -> bool {
+        matches!(
+            self,
+            Self::NoFit {
+                exchanged: Some(_),
+                ..
+            }
+        )
+    }
 }
 
 /// What a person calls a corner of a label, which counts from 0.

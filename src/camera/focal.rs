@@ -4,6 +4,7 @@ use super::label::{Framing, Label, LabelCamera};
 use super::options::Priors;
 use super::prior::Prior;
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 
 /// Diagonal of the 36 mm x 24 mm frame that 35 mm equivalents refer to, millimetres.
 const FULL_FRAME_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
@@ -18,7 +19,10 @@ const EQUIVALENT_SIGMA: f64 = 0.05;
 /// longer diagonal: people keep between half and all of a picture.
 const CROP_SIGMA: f64 = 0.15;
 /// Equivalents that imply a focal length outside this range, in longer sides, are wrong.
-const PLAUSIBLE_FOCAL_SIDES: std::ops::RangeInclusive<f64> = 0.2..=20.0;
+const EQUIVALENT_SIDES: [f64; 2] = [0.2, 20.0];
+/// So are focal lengths in pixels outside this one; those of pictures of which little was kept are
+/// long.
+const PIXEL_SIDES: [f64; 2] = [0.05, 100.0];
 
 /// Where a solution's focal length comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -62,7 +66,24 @@ pub(crate) enum PriorSource {
 
 /// The focal length in pixels that a 35 mm equivalent stands for, by the diagonal.
 pub fn focal_from_equivalent(focal_35mm: f64, image: [u32; 2]) -> f64 {
-    focal_35mm * libm::hypot(f64::from(image[0]), f64::from(image[1])) / FULL_FRAME_DIAGONAL_MM
+    focal_35mm * diagonal(image) / FULL_FRAME_DIAGONAL_MM
+}
+
+/// The 35 mm equivalents that a picture of some size can have.
+pub(crate) fn plausible_equivalents(image: [u32; 2]) -> RangeInclusive<f64> {
+    let mm_per_side = longer_side(image) * FULL_FRAME_DIAGONAL_MM / diagonal(image);
+    rounded_range(EQUIVALENT_SIDES, mm_per_side)
+}
+
+/// The focal lengths in pixels that a picture of some size can have.
+pub(crate) fn plausible_pixels(image: [u32; 2]) -> RangeInclusive<f64> {
+    rounded_range(PIXEL_SIDES, longer_side(image))
+}
+
+/// To tenths, so that messages tell the very bounds.
+fn rounded_range(sides: [f64; 2], per_side: f64) -> RangeInclusive<f64> {
+    let [least, most] = sides.map(|sides| (10.0 * sides * per_side).round() / 10.0);
+    least..=most
 }
 
 /// The focal length in pixels of a common lens.
@@ -78,7 +99,7 @@ pub(crate) fn length_prior(
     priors: &Priors,
 ) -> (Prior, PriorSource) {
     let camera = &label.camera;
-    match (camera.focal_px, plausible_equivalent(label, framing)) {
+    match (camera.focal_px, equivalent_px(label, framing)) {
         (Some(px), _) => (stated_prior(camera, px, STATED_SIGMA), PriorSource::Label),
         (None, Some(px)) => (equivalent_prior(camera, framing, px), PriorSource::Exif),
         (None, None) => (
@@ -88,12 +109,11 @@ pub(crate) fn length_prior(
     }
 }
 
-/// The focal length in pixels by the 35 mm equivalent, where that can be right.
-fn plausible_equivalent(label: &Label, framing: Framing) -> Option<f64> {
-    let image = label.taken_size();
-    let px = focal_from_equivalent(label.camera.focal_35mm?, image);
-    let plausible = PLAUSIBLE_FOCAL_SIDES.contains(&(px / longer_side(image)));
-    (framing != Framing::Cropped && plausible).then_some(px)
+/// The focal length in pixels by the 35 mm equivalent, which is not that of a cropped picture.
+fn equivalent_px(label: &Label, framing: Framing) -> Option<f64> {
+    let stated = label.camera.focal_35mm;
+    let focal_35mm = stated.filter(|_| framing != Framing::Cropped)?;
+    Some(focal_from_equivalent(focal_35mm, label.taken_size()))
 }
 
 /// A focal length that a label or a file states, with its own standard deviation or else this one.
@@ -129,6 +149,10 @@ fn longer_side(image: [u32; 2]) -> f64 {
     f64::from(image[0].max(image[1]))
 }
 
+fn diagonal(image: [u32; 2]) -> f64 {
+    libm::hypot(f64::from(image[0]), f64::from(image[1]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,15 +176,9 @@ mod tests {
     }
 
     #[test]
-    fn an_impossible_or_cropped_equivalent_is_dropped() {
-        for (label, framing) in [
-            (label(2.0), Framing::Whole),
-            (label(1e4), Framing::Whole),
-            (label(26.0), Framing::Cropped),
-        ] {
-            let (prior, source) = default_prior(&label, framing);
-            assert_eq!((source, prior.sigma), (PriorSource::Nominal, 0.35));
-        }
+    fn the_equivalent_of_a_cropped_picture_is_dropped() {
+        let (prior, source) = default_prior(&label(26.0), Framing::Cropped);
+        assert_eq!((source, prior.sigma), (PriorSource::Nominal, 0.35));
     }
 
     #[test]

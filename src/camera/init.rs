@@ -25,10 +25,12 @@ pub fn init_label(photo: &Path, path: &Path, like: Option<&Label>) -> Result<Lab
     if let Some(like) = like {
         copy_shared(&mut label, like);
     }
-    if equivalent_mm(&header).is_some() {
+    if equivalent_mm(&label, &header).is_some() {
         forget_equivalent(&mut label.camera);
     }
     apply_exif(&mut label, &header);
+    let camera = &mut label.camera;
+    camera.focal_fixed &= camera.focal_px.is_some() || camera.focal_35mm.is_some();
     Ok(label)
 }
 

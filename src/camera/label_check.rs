@@ -1,9 +1,11 @@
 //! Checks for impossible numbers in a label.
 
 use super::error::SolveError;
+use super::focal::{plausible_equivalents, plausible_pixels};
 use super::label::{Crop, Label, LabelCamera, LabelPoint, LabelSurface, LabelWall};
-use crate::bounds::{ALBEDO, Bounds, CAMERA, SLOPE, WALL_HEIGHT};
+use crate::bounds::{ALBEDO, Bounds, CAMERA, SLOPE, WALL_HEIGHT, number};
 use crate::color::Albedo;
+use std::ops::RangeInclusive;
 
 /// No meaningful label holds larger numbers, or positive ones smaller than one over this.
 pub(crate) const MAX_MAGNITUDE: f64 = 1e9;
@@ -13,7 +15,8 @@ pub(crate) fn check_label(label: &Label) -> Result<(), SolveError> {
     check_image(label)?;
     check_surface(&label.surface)?;
     label.points.iter().try_for_each(check_point)?;
-    check_camera(&label.camera)
+    check_camera(&label.camera)?;
+    check_focal(&label.camera, label.taken_size())
 }
 
 fn check_image(label: &Label) -> Result<(), SolveError> {
@@ -68,8 +71,6 @@ fn check_camera(camera: &LabelCamera) -> Result<(), SolveError> {
         check_finite("camera.principal_point_px", principal)?;
     }
     check_finite("camera.k1", camera.k1.as_slice())?;
-    check_positive("camera.focal_px", camera.focal_px)?;
-    check_positive("camera.focal_35mm", camera.focal_35mm)?;
     check_not_negative("camera.focal_sigma", camera.focal_sigma)?;
     check_not_negative(
         "camera.principal_point_sigma_px",
@@ -78,6 +79,49 @@ fn check_camera(camera: &LabelCamera) -> Result<(), SolveError> {
     check_positive("camera.height_m", camera.height_m)?;
     check_within("camera.height_m", camera.height_m, &CAMERA)?;
     check_positive("camera.height_sigma_m", camera.height_sigma_m)
+}
+
+/// The focal length is one that a camera with a picture of this size can have.
+fn check_focal(camera: &LabelCamera, image: [u32; 2]) -> Result<(), SolveError> {
+    let (px, equivalent) = (camera.focal_px, camera.focal_35mm);
+    check_positive("camera.focal_px", px)?;
+    check_positive("camera.focal_35mm", equivalent)?;
+    let (pixels, equivalents) = (plausible_pixels(image), plausible_equivalents(image));
+    check_length("camera.focal_px", px, &pixels, "is it in millimetres?")?;
+    let question = "is it the real focal length of a phone?";
+    check_length("camera.focal_35mm", equivalent, &equivalents, question)?;
+    check_fixed(camera)
+}
+
+/// Too short a focal length is asked about.
+fn check_length(
+    at: &str,
+    length: Option<f64>,
+    expected: &RangeInclusive<f64>,
+    question: &str,
+) -> Result<(), SolveError> {
+    let Some(length) = length.filter(|length| !expected.contains(length)) else {
+        return Ok(());
+    };
+    let [least, most] = [*expected.start(), *expected.end()];
+    let asked = if length < least {
+        format!("; {question}")
+    } else {
+        String::new()
+    };
+    let [length, least, most] = [length, least, most].map(number);
+    Err(SolveError::OutOfBounds(format!(
+        "{at}: {length}, expected {least} to {most} for a picture of this size{asked}"
+    )))
+}
+
+/// What is exact is there.
+fn check_fixed(camera: &LabelCamera) -> Result<(), SolveError> {
+    if camera.focal_fixed && camera.focal_px.is_none() && camera.focal_35mm.is_none() {
+        let what = "camera.focal_fixed: true, expected camera.focal_px or focal_35mm beside it";
+        return Err(SolveError::OutOfBounds(what.into()));
+    }
+    Ok(())
 }
 
 /// Zero is allowed: the value is then exact.
@@ -175,6 +219,56 @@ mod tests {
         let expected = "camera.height_m: 1120, expected 0.001 to 50 m";
         assert!(refusal.starts_with(expected), "{refusal}");
         assert!(refusal.ends_with("; is it in millimetres?"), "{refusal}");
+    }
+
+    fn refusal_of_camera(camera: LabelCamera) -> String {
+        let mut label = Scenario::default().view(1, 0).label;
+        label.camera = camera;
+        check_label(&label).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn the_real_focal_length_of_a_phone_is_asked_about() {
+        let camera = |focal_35mm| LabelCamera {
+            focal_35mm: Some(focal_35mm),
+            focal_fixed: true,
+            ..LabelCamera::default()
+        };
+        let expected = "expected 6.9 to 692.3 for a picture of this size";
+        let question = "is it the real focal length of a phone?";
+        assert_eq!(
+            refusal_of_camera(camera(4.2)),
+            format!("camera.focal_35mm: 4.2, {expected}; {question}")
+        );
+        assert_eq!(
+            refusal_of_camera(camera(5000.0)),
+            format!("camera.focal_35mm: 5000, {expected}")
+        );
+    }
+
+    #[test]
+    fn pixels_that_are_millimetres_are_asked_about() {
+        let camera = LabelCamera {
+            focal_px: Some(26.0),
+            ..LabelCamera::default()
+        };
+        let expected = "expected 200 to 400000 for a picture of this size";
+        assert_eq!(
+            refusal_of_camera(camera),
+            format!("camera.focal_px: 26, {expected}; is it in millimetres?")
+        );
+    }
+
+    #[test]
+    fn a_focal_length_that_is_exact_is_stated() {
+        let camera = LabelCamera {
+            focal_fixed: true,
+            ..LabelCamera::default()
+        };
+        assert_eq!(
+            refusal_of_camera(camera),
+            "camera.focal_fixed: true, expected camera.focal_px or focal_35mm beside it"
+        );
     }
 
     #[test]

@@ -87,7 +87,7 @@ pub use pinhole::distorted;
 pub use read::read_label;
 #[doc(hidden)]
 pub use read::{LabelledPhoto, check_distance, check_size, read_labels, with_photo};
-pub(crate) use read::{apply_exif, labels_in};
+pub(crate) use read::{apply_exif, check_camera_distance, labels_in};
 pub(crate) use rectangle::square_from_corners;
 pub use rectify::warp;
 #[doc(hidden)]

@@ -1,8 +1,11 @@
 //! Labels from files, ours and other programs', completed with their photos' EXIF data.
 
+use super::error::SolveError;
+use super::focal::plausible_equivalents;
 use super::import::{self, Annotation};
 use super::label::{Label, LabelImage};
 use super::pinhole::Camera;
+use super::solution::Solution;
 use crate::bounds::{CAMERA, SURFACE, number};
 use crate::error::{Error, Result};
 use crate::io;
@@ -421,7 +424,7 @@ pub(crate) fn apply_exif(label: &mut Label, header: &io::Header) {
         label.image.cropped.get_or_insert(header.cropped);
     }
     if label.camera.focal_px.is_none() && label.camera.focal_35mm.is_none() {
-        label.camera.focal_35mm = equivalent_mm(header);
+        label.camera.focal_35mm = equivalent_mm(label, header);
         let is_rough = header.digital_zoom || header.focal_by_sensor;
         if is_rough && label.camera.focal_35mm.is_some() {
             label.camera.focal_sigma.get_or_insert(ROUGH_FOCAL_SIGMA);
@@ -429,9 +432,11 @@ pub(crate) fn apply_exif(label: &mut Label, header: &io::Header) {
     }
 }
 
-/// The focal length that the photo's file states, as a 35 mm camera's; some state 0 for none.
-pub(crate) fn equivalent_mm(header: &io::Header) -> Option<f64> {
-    header.focal_35mm.filter(|mm| *mm > 0.0)
+/// The focal length that the photo's file states, as a 35 mm camera's, where that can be right;
+/// some state 0 for none.
+pub(crate) fn equivalent_mm(label: &Label, header: &io::Header) -> Option<f64> {
+    let plausible = plausible_equivalents(label.taken_size());
+    header.focal_35mm.filter(|mm| plausible.contains(mm))
 }
 
 /// Checks that a surface with objects on it can have the label's sides, which may be in centimetres
@@ -448,12 +453,20 @@ fn check_side(at: &str, metres: Option<f64>) -> Result<()> {
     metres.map_or(Ok(()), |metres| SURFACE.check(at, metres))
 }
 
-/// Checks that a camera is near enough to see objects on the surface: how far it is follows from
-/// the label's lengths.
+/// Checks that a solution's camera is near enough to see objects on the surface: how far it is
+/// follows from the label's lengths.
 ///
 /// # Errors
+/// That width and height are exchanged ([`Solution::misfit`]), where that is why it is so far; else
 /// [`Error::Value`] with the distance.
-pub fn check_distance(camera: &Camera) -> Result<()> {
+pub fn check_distance(solution: &Solution) -> Result<()> {
+    let exchanged = || solution.misfit().filter(SolveError::is_exchange);
+    check_camera_distance(&solution.camera)
+        .map_err(|too_far| exchanged().map_or(too_far, Error::from))
+}
+
+/// The same of a camera alone, as a file stores it.
+pub(crate) fn check_camera_distance(camera: &Camera) -> Result<()> {
     let distance = camera.center().coords.norm();
     if CAMERA.contains(distance) {
         return Ok(());
@@ -484,6 +497,7 @@ pub(crate) fn photo_of(label: &Label, path: impl AsRef<Path>) -> Option<PathBuf>
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::camera::{SolveOptions, solve};
     use crate::image::Image;
     use crate::pixel::Srgb8;
     use exif::experimental::Writer;
@@ -626,6 +640,32 @@ pub(super) mod tests {
                 label.image.cropped
             ),
             (Some(28.0), None, Some(false))
+        );
+    }
+
+    #[test]
+    fn an_impossible_focal_length_of_a_photo_is_passed_over() {
+        for mm in [0, 4, 5000] {
+            let label = label_by_notes([equivalent(mm)]);
+            assert_eq!(label.camera.focal_35mm, None, "{mm}");
+        }
+    }
+
+    #[test]
+    fn exchanged_sides_come_before_the_distance_that_they_give() {
+        let corners = [
+            [500.0, 500.0],
+            [3500.0, 502.0],
+            [3501.0, 2500.0],
+            [500.0, 2501.0],
+        ];
+        let mut label = Label::new([4000, 3000], corners, [0.4, 0.6]);
+        label.camera.focal_35mm = Some(26.0);
+        let solution = solve(&label, &SolveOptions::default()).unwrap();
+        let refusal = check_distance(&solution).unwrap_err().to_string();
+        assert!(
+            refusal.contains("exchange width_m and height_m"),
+            "{refusal}"
         );
     }
 

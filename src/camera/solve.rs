@@ -15,6 +15,10 @@ use crate::diagnostic::{Code, Diagnostic};
 
 /// Picture and prior contradict each other beyond this many standard deviations.
 const CONFLICT_SIGMAS: f64 = 3.0;
+/// EXIF values of focal lengths are wrong by 0.6 to 1.6 times. Exchanged sides of r:1 look as if one
+/// were wrong by r^2 or more: those of 1.35:1 always by more than this, those of 1.2:1 in views that
+/// are tilted by less than 45 degrees.
+const GROSS_FOCAL_RATIO: f64 = 1.8;
 
 /// Solves the camera that sees a rectangle of known size at four labelled corners.
 ///
@@ -171,12 +175,15 @@ fn solve_without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Sol
         return Ok(solution);
     }
     let second = solve_as_labelled(&without_exif_focal(label), options)?.solution;
-    let warning = conflict.solved_without(&second).warning();
-    if second.misfit().is_none() && fits_exchanged_with_exif(label, options, solution.fit.chi2) {
-        solution.warnings.push(warning);
+    let conflict = conflict.solved_without(&second);
+    if conflict.is_gross()
+        && second.misfit().is_none()
+        && fits_exchanged_with_exif(label, options, solution.fit.chi2)
+    {
+        solution.warnings.push(conflict.warning());
         return Ok(solution);
     }
-    Ok(second.preferred_to(solution, warning))
+    Ok(second.preferred_to(solution, conflict.warning()))
 }
 
 /// With width and height exchanged the picture agrees with its EXIF value, and fits clearly better
@@ -194,6 +201,7 @@ pub(super) fn without_exif_focal(label: &Label) -> Label {
     let mut without = label.clone();
     if label.camera.focal_px.is_none() {
         (without.camera.focal_35mm, without.camera.focal_sigma) = (None, None);
+        without.camera.focal_fixed = false;
     }
     without
 }
@@ -245,6 +253,11 @@ impl FocalConflict {
             measured_px: solution.camera.focal_px.x,
             ..self
         }
+    }
+
+    /// Picture and prior are farther apart than a wrong EXIF value alone explains.
+    fn is_gross(&self) -> bool {
+        libm::log(self.measured_px / self.prior_px).abs() > libm::log(GROSS_FOCAL_RATIO)
     }
 
     pub(super) fn warning(&self) -> Diagnostic {
@@ -379,6 +392,24 @@ mod tests {
             label.camera.focal_35mm = Some(factor * equivalent);
             assert_eq!(misfit(&label), None, "{factor}");
         }
+    }
+
+    #[test]
+    fn a_wrong_exif_value_is_not_blamed_on_sides_that_are_nearly_the_same() {
+        let corners = [
+            [1322.70582, 854.41696],
+            [3722.70582, 854.41696],
+            [3222.03940, 2370.23246],
+            [1519.54643, 2370.23246],
+        ];
+        let mut label = Label::new([4000, 3000], corners, [0.42, 0.4]);
+        (label.image.cropped, label.camera.focal_35mm) = (Some(false), Some(35.4));
+        let solution = solve(&label, &SolveOptions::default()).unwrap();
+        assert_eq!(solution.misfit(), None);
+        let focal_px = solution.camera.focal_px.x;
+        assert!((focal_px / 3200.0 - 1.0).abs() < 0.05, "{focal_px}");
+        let mut warnings = solution.warnings.iter();
+        assert!(warnings.any(|w| w.code == Code::FocalPriorConflict));
     }
 
     #[test]

@@ -108,7 +108,7 @@ impl BackgroundPhoto {
     ) -> Result<Self> {
         let photo = photo_path(labelled)?;
         let shown = cropped(seen.camera, middle_part(labelled.label.image_size(), image));
-        camera::check_distance(&seen.camera)
+        camera::check_camera_distance(&seen.camera)
             .and_then(|()| camera::check_lens(&shown, seen.k1))
             .map_err(|e| e.in_file(&labelled.source))?;
         let mut background = Self::cropped_to(image, labelled, seen, photo, memory);

@@ -1,6 +1,8 @@
 //! Reads truth and detections from COCO JSON.
 
-use super::{Detection, EvalImage, FARTHEST_PX, GroundTruth, Picture};
+use super::{
+    Detection, EvalImage, FARTHEST_PX, GroundTruth, Picture, is_confidence, no_confidence,
+};
 use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::io;
@@ -80,7 +82,7 @@ pub fn read_coco_truth(path: &Path) -> Result<CocoTruth> {
 /// Adds detections: a list of `image_id`, `category_id`, `bbox` (x, y, width, height), `score`.
 ///
 /// # Errors
-/// As [`read_coco_truth`].
+/// As [`read_coco_truth`], and [`Error::Field`] for a score outside 0 to 1.
 pub fn read_coco_results(path: &Path, truth: &mut CocoTruth) -> Result<()> {
     truth
         .add(&io::read_json_data::<Vec<CocoDetection>>(path)?)
@@ -333,6 +335,14 @@ fn corners([x, y, w, h]: [f64; 4]) -> Result<BBox> {
     Err(impossible_box([x, y, w, h]))
 }
 
+/// Fails for percents and logits, too.
+fn checked_score(score: f64) -> Result<f64> {
+    if is_confidence(score) {
+        return Ok(score);
+    }
+    Err(Error::value("score", no_confidence(score)))
+}
+
 fn area_of([_, _, w, h]: [f64; 4]) -> f64 {
     w * h
 }
@@ -368,7 +378,7 @@ impl CocoDetection {
             class,
             bbox: corners(self.bbox)?,
             box_area: area_of(self.bbox),
-            confidence: self.score,
+            confidence: checked_score(self.score)?,
         })
     }
 }
@@ -533,5 +543,25 @@ mod tests {
             said.contains("[0].image_id: 8, expected one that the truth lists"),
             "{said}"
         );
+    }
+
+    #[test]
+    fn a_score_that_is_no_confidence_is_named() {
+        let read = |score: f64| {
+            let mut truth = CocoTruth::new(&io::parse_json(TRUTH).unwrap()).unwrap();
+            let found = |score| CocoDetection {
+                image_id: 3,
+                category_id: 10,
+                bbox: [0.0, 0.0, 2.0, 2.0],
+                score,
+            };
+            truth.add(&[found(0.5), found(score)])
+        };
+        for (score, named) in [(87.5, "87.5"), (-2.0, "-2"), (f64::NAN, "NaN")] {
+            let said = read(score).unwrap_err().to_string();
+            let expected = format!("[1].score: {named}, expected a confidence, 0 to 1");
+            assert_eq!(said, expected);
+        }
+        assert!([0.0, 1.0].into_iter().all(|score| read(score).is_ok()));
     }
 }

@@ -101,7 +101,7 @@ pub struct Detection {
     pub bbox: BBox,
     /// As [`GroundTruth::box_area`]; it decides the size range, too.
     pub box_area: f64,
-    /// How sure the detector is; only the order matters.
+    /// How sure the detector is, 0 to 1; average precision looks at the order alone.
     pub confidence: f64,
 }
 
@@ -259,6 +259,16 @@ fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
         count += 1;
     }
     overlap::share(sum, f64::from(count))
+}
+
+/// Curves and the best F1 are looked for between 0 and 1.
+fn is_confidence(number: f64) -> bool {
+    (0.0..=1.0).contains(&number)
+}
+
+/// What is wrong with a confidence that is none.
+fn no_confidence(number: f64) -> String {
+    format!("{number}, expected a confidence, 0 to 1")
 }
 
 /// The lines of a text that are not blank, with their places in it.

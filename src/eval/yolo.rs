@@ -1,6 +1,8 @@
 //! Reads truth and detections from folders of YOLO text files.
 
-use super::{Detection, EvalImage, GroundTruth, Picture, filled_lines, in_line};
+use super::{
+    Detection, EvalImage, GroundTruth, Picture, filled_lines, in_line, is_confidence, no_confidence,
+};
 use crate::error::{Error, Result};
 use crate::geom::{BBox, Point2};
 use crate::io::{self, Format};
@@ -391,9 +393,10 @@ struct LabelRow {
 /// Boxes may reach beyond the image, but not so many times its side.
 const MAX_SHARE: f64 = 10.0;
 
-/// Lines with `extra` numbers (a confidence or nothing) at their ends.
+/// Lines with `extra` numbers (a confidence or nothing) at their ends, behind a byte order mark or
+/// none.
 fn parse_rows(text: &str, extra: usize) -> std::result::Result<Vec<LabelRow>, String> {
-    filled_lines(text)
+    filled_lines(text.trim_start_matches('\u{feff}'))
         .map(|(i, line)| parse_row(line, extra).map_err(|what| in_line(i, &what)))
         .collect()
 }
@@ -427,23 +430,18 @@ fn split_extra(numbers: &[f64], extra: usize) -> std::result::Result<(&[f64], &[
 fn has_track_id(numbers: &[f64]) -> bool {
     match *numbers {
         [_, _, _, _, .., confidence, id] if numbers.len().is_multiple_of(2) => {
-            is_share(confidence) && id >= 1.0 && id.fract() == 0.0
+            is_confidence(confidence) && id >= 1.0 && id.fract() == 0.0
         }
         _ => false,
     }
 }
 
-fn is_share(number: f64) -> bool {
-    (0.0..=1.0).contains(&number)
-}
-
 fn check_confidence(number: f64) -> std::result::Result<(), String> {
-    if is_share(number) {
+    if is_confidence(number) {
         return Ok(());
     }
-    Err(format!(
-        "{number}, expected a confidence, 0 to 1; is it the id of a track? (save_conf=True)"
-    ))
+    let what = no_confidence(number);
+    Err(format!("{what}; is it the id of a track? (save_conf=True)"))
 }
 
 fn parse_class(text: &str) -> std::result::Result<u32, String> {
@@ -653,6 +651,15 @@ mod tests {
             ),
             (0, 0.25)
         );
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_the_class() {
+        let marked = |line: &str| format!("\u{feff}{line}");
+        let (label, found) = ("3 0.5 0.5 0.2 0.4\n", "3 0.5 0.5 0.2 0.4 0.9\n");
+        let sheet = sheet_of(&marked(label), &marked(found), [100, 200]).unwrap();
+        assert_eq!(sheet, sheet_of(label, found, [100, 200]).unwrap());
+        assert_eq!((sheet.truth[0].class, sheet.found[0].class), (3, 3));
     }
 
     #[test]

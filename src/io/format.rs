@@ -54,7 +54,7 @@ impl Format {
     }
 
     /// The kind that an extension promises, in any case; what a new file is written as.
-    pub(crate) fn from_extension(path: &Path) -> Option<Self> {
+    pub fn from_extension(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "exr" => Some(Self::Exr),
             "png" => Some(Self::Png),

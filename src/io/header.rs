@@ -46,7 +46,7 @@ pub struct Header {
     /// Where it lies, and of what pixels.
     pub canvas: Canvas,
     /// Column and row of the first stored pixel, seen from the picture's first one. Other than (0,
-    /// 0) only in EXR.
+    /// 0) only in EXR; of several parts that of the one that colours are read from.
     pub data_at: [i64; 2],
     /// Columns and rows that are stored: those of the picture, but for EXR, whose data window may
     /// be any other.

@@ -219,8 +219,13 @@ impl Demand {
 }
 
 impl Limits {
-    /// Refuses what cannot be right or is too much; the text names the limit.
+    /// Refuses what cannot be right, is too much or has no memory; the text names the limit.
     pub(super) fn check(&self, demand: Demand) -> std::result::Result<(), String> {
+        affordable(self.check_bounds(demand)?)
+    }
+
+    /// As [`check`](Self::check), without a look at the memory. Returns the decoded bytes.
+    pub(super) fn check_bounds(&self, demand: Demand) -> std::result::Result<u64, String> {
         let (width, height, channels) = (demand.width, demand.height, demand.channels);
         if demand.is_empty() {
             return Err(format!(
@@ -232,14 +237,10 @@ impl Limits {
         at_most(pixels, self.pixels, "pixels", "pixels")?;
         at_most(channels, self.channels, "channels", "channels")?;
         let bytes = pixels.checked_mul(demand.bytes_per_pixel);
-        self.check_bytes(bytes.ok_or("size overflows")?, demand.file_bytes)
-    }
-
-    /// The decoded bytes of a file.
-    fn check_bytes(&self, bytes: u64, file_bytes: u64) -> std::result::Result<(), String> {
+        let bytes = bytes.ok_or("size overflows")?;
         at_most(bytes, self.decoded_bytes, "decoded bytes", "decoded_bytes")?;
-        self.check_ratio(bytes, file_bytes)?;
-        affordable(bytes)
+        self.check_ratio(bytes, demand.file_bytes)?;
+        Ok(bytes)
     }
 
     fn check_ratio(&self, bytes: u64, file_bytes: u64) -> std::result::Result<(), String> {
@@ -297,6 +298,14 @@ pub(super) fn saturating_product<const N: usize>(sizes: [u64; N]) -> u64 {
 pub(crate) fn machine_bytes() -> Option<u64> {
     static BYTES: OnceLock<Option<u64>> = OnceLock::new();
     *BYTES.get_or_init(usable_bytes)
+}
+
+/// How many pictures of so many bytes each half of a machine's memory holds, one at least; any
+/// number where the memory is not known.
+pub(super) fn fitting_pictures(machine_bytes: Option<u64>, picture_bytes: u64) -> usize {
+    let need = picture_bytes.max(1);
+    let fitting = machine_bytes.map_or(u64::MAX, |bytes| bytes / 2 / need);
+    usize::try_from(fitting.max(1)).unwrap_or(usize::MAX)
 }
 
 fn usable_bytes() -> Option<u64> {
@@ -369,6 +378,16 @@ fn can_reserve(bytes: u64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn half_of_the_memory_holds_so_many_pictures_and_one_at_least() {
+        let (laptop, phone) = (16_u64 << 30, 12_000_000 * 140);
+        assert_eq!(fitting_pictures(Some(laptop), phone), 5);
+        assert_eq!(fitting_pictures(Some(laptop), 140_000_000_000), 1);
+        assert!(fitting_pictures(Some(laptop), 14_000_000) > 500);
+        assert_eq!(fitting_pictures(Some(laptop), 0), 8_usize << 30);
+        assert_eq!(fitting_pictures(None, phone), usize::MAX);
+    }
 
     fn demand(width: u64, height: u64) -> Demand {
         Demand {
@@ -482,6 +501,23 @@ mod tests {
                 .unwrap_err()
                 .contains("more than the system gives")
         );
+    }
+
+    #[test]
+    fn bounds_are_checked_without_a_look_at_the_memory() {
+        let wide = Limits {
+            side: MAX_LIMIT,
+            pixels: MAX_LIMIT,
+            decoded_bytes: 1 << 54,
+            ..Default::default()
+        };
+        let demand = Demand {
+            file_bytes: 1 << 50,
+            ..demand(1 << 25, 1 << 25)
+        };
+        assert_eq!(wide.check_bounds(demand), Ok(1 << 54));
+        let e = wide.check(demand).unwrap_err();
+        assert!(e.contains("more than the system gives"), "{e}");
     }
 
     #[test]

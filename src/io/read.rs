@@ -6,7 +6,9 @@ use super::codec::refusal::Refusal;
 #[cfg(feature = "oiio")]
 use super::decode::decode_elsewhere;
 use super::decode::{catch_panic, header_elsewhere, read_file_header, warn_unreadable};
+use super::format::Format;
 use super::header::Header;
+use super::limits::{fitting_pictures, machine_bytes};
 #[cfg(feature = "oiio")]
 use super::options::Fallback;
 use super::options::ReadOptions;
@@ -19,9 +21,9 @@ use std::path::Path;
 /// Reads a picture as pixels of the requested type, with the default [`ReadOptions`].
 ///
 /// `LinearRgb` wants an opaque picture: one with alpha below 1 is refused, an alpha of 1 is
-/// dropped. `PremulRgba` and `StraightRgba` get alpha 1 from a file without alpha. `Coverage` is
-/// the only channel of a file, or `R`, `G` and `B` where they are equal and no alpha below 1 is
-/// beside them, or `A`; `Depth` the only one, or `Z`, in float.
+/// dropped. `PremulRgba` and `StraightRgba` get alpha 1 from a file without alpha, and 0 where an
+/// EXR stores no pixel. `Coverage` is the only channel of a file, or `R`, `G` and `B` where they
+/// are equal and no alpha below 1 is beside them, or `A`; `Depth` the only one, or `Z`, in float.
 ///
 /// # Errors
 /// [`Error::File`] for a file that is missing, not regular, not a picture, damaged, beyond the
@@ -71,6 +73,29 @@ pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
     warn_unreadable(&notes, path);
     apply_notes(&mut header, &notes);
     Ok(header)
+}
+
+/// The kind of a picture file, by its first bytes.
+///
+/// # Errors
+/// [`Error::File`] for a file that is missing, not regular, or not a picture.
+#[doc(hidden)]
+pub fn read_format(path: impl AsRef<Path>) -> Result<Format> {
+    let limits = ReadOptions::default().limits;
+    Ok(OpenedSource::open(path.as_ref(), &limits)?.format)
+}
+
+/// How many of these pictures may be worked on at once: as many as half of the machine's memory
+/// holds of the largest, one at least; any number where the memory or every size is unknown.
+#[doc(hidden)]
+pub fn pictures_at_once(
+    paths: impl IntoIterator<Item = impl AsRef<Path>>,
+    bytes_per_pixel: u64,
+) -> usize {
+    let headers = paths.into_iter().filter_map(|path| read_header(path).ok());
+    let pixels = headers.map(|header| (header.width * header.height) as u64);
+    let largest = pixels.max().unwrap_or(0);
+    fitting_pictures(machine_bytes(), largest.saturating_mul(bytes_per_pixel))
 }
 
 /// By our decoders.

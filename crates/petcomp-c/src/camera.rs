@@ -115,7 +115,7 @@ fn label_of(
 fn solved(label: &Label) -> Result<(CameraModel, String), Failure> {
     camera::check_size(label)?;
     let solution = camera::solve(label, &Default::default()).map_err(Error::from)?;
-    camera::check_distance(&solution.camera)?;
+    camera::check_distance(&solution)?;
     let solution = solution.fitting().map_err(Error::from)?;
     let text = serde_json::to_string(&CameraFile::new(label, &solution));
     let text = text.map_err(|e| Error::value("report", e))?;

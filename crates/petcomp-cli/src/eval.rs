@@ -71,7 +71,7 @@ pub(crate) fn run(args: &EvalArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 }
 
 fn print_scores(metrics: &[Metrics], options: &EvalReportOptions, global: &GlobalArgs) {
-    print::text(page::scores_table(metrics, options).markdown());
+    print::text(page::scores_table(metrics).markdown());
     let (classes, others) = page::classes_in_brief(metrics, options);
     print::text(classes.markdown());
     if others > 0 {

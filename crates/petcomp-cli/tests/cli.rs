@@ -1118,6 +1118,38 @@ fn what_is_keyed_lies_where_its_exr_does_and_lost_pixels_are_told() {
     assert!(told.contains(warned), "{told}");
     let header = petcomp::io::read_header(desk.path("cut.exr")).expect("an EXR");
     assert_eq!((header.width, header.height), (20, 4));
+    // So it is under any name.
+    std::fs::rename(&photo, desk.path("a.sxr")).expect("a file");
+    let key = words("matte key a.sxr -o other.exr --screen 0.02,0.6,0.05");
+    let told = text(&desk.run(&key).stderr);
+    assert!(told.contains(warned), "{told}");
+    let header = petcomp::io::read_header(desk.path("other.exr")).expect("an EXR");
+    assert_eq!(header.canvas, canvas);
+}
+
+#[test]
+fn a_frame_s_number_is_no_ending() {
+    let desk = Desk::new();
+    for number in ["1001", "1002"] {
+        write_green_ramp(&desk.path("plate.png"), 0.5);
+        let frame = desk.path(format!("plate.{number}"));
+        std::fs::rename(desk.path("plate.png"), frame).expect("a file");
+        let key = format!("matte key plate.{number} -o keyed/ --screen 0.02,0.6,0.05");
+        desk.ok(&words(&key));
+    }
+    for name in ["plate.1001.exr", "plate.1002.exr"] {
+        assert!(desk.path("keyed").join(name).is_file(), "{name}");
+    }
+}
+
+#[test]
+fn no_folder_is_made_for_frames_that_are_not_there() {
+    let desk = Desk::new();
+    for frames in ["0.png", "0.png 1.png"] {
+        let key = format!("matte key {frames} -o keyed/ --screen 0.02,0.6,0.05");
+        assert!(!desk.run(&words(&key)).status.success(), "{key}");
+        assert!(!desk.path("keyed").exists(), "{key}");
+    }
 }
 
 #[test]

@@ -296,6 +296,45 @@ fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
     }
 }
 
+/// The names of what is in a folder; none where it is not there.
+fn names_in(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect()
+}
+
+#[test]
+fn a_signal_stops_a_sequence_between_frames_and_leaves_whole_pictures_alone() {
+    let desk = Desk::new();
+    let green = petcomp::LinearRgb::new(0.02, 0.6, 0.05);
+    let screen = petcomp::Image::filled(512, 512, green);
+    petcomp::io::write(desk.path("0.png"), &screen).unwrap();
+    let mut args = ["matte", "key", "0.png"].map(String::from).to_vec();
+    for k in 1..300 {
+        let frame = format!("{k}.png");
+        std::fs::copy(desk.path("0.png"), desk.path(&frame)).unwrap();
+        args.push(frame);
+    }
+    let more = "-o keyed -q -j 2 --screen 0.02,0.6,0.05";
+    args.extend(more.split(' ').map(String::from));
+    let child = hearing(&desk.command(&args))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let (folder, start) = (desk.path("keyed"), Instant::now());
+    while !names_in(&folder).iter().any(|name| name.ends_with(".exr")) {
+        assert!(start.elapsed() < HANGS, "no picture in {HANGS:?}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    send("TERM", &child);
+    assert_eq!(ends(child).code(), Some(130));
+    let names = names_in(&folder);
+    assert!(names.len() < 300, "all were keyed");
+    assert!(names.iter().all(|name| !name.starts_with('.')), "{names:?}");
+}
+
 #[test]
 fn signals_that_a_run_was_started_to_ignore_do_not_stop_it() {
     let desk = Desk::new();

@@ -173,7 +173,7 @@ fn solved(label: &Label, force: bool) -> Result<(petcomp::Camera, String)> {
 
 /// A solution that fits its label, whose camera can see objects on the surface.
 fn accepted(solution: Solution) -> Result<Solution> {
-    camera::check_distance(&solution.camera)?;
+    camera::check_distance(&solution)?;
     solution.fitting().map_err(Error::from)
 }
 

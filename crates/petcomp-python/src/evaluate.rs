@@ -128,8 +128,9 @@ fn check_boxes(sheets: &[Sheet]) -> Result<()> {
         for bbox in truth.chain(found.iter().map(|(_, bbox, _)| bbox)) {
             check_box(i, bbox)?;
         }
-        if let Some((_, _, score)) = found.iter().find(|(_, _, score)| !score.is_finite()) {
-            let what = format!("{score}, expected a finite number");
+        let is_confidence = |score: &f64| (0.0..=1.0).contains(score);
+        if let Some((_, _, score)) = found.iter().find(|(_, _, score)| !is_confidence(score)) {
+            let what = format!("{score}, expected a confidence, 0 to 1");
             return Err(Error::value(format!("predictions[{i}].scores"), what));
         }
     }

@@ -270,6 +270,7 @@ def test_evaluation_of_what_cannot_be_is_refused():
         ("folder", [truth], "expected a path or a list"),
         ([{**found, "boxes": [[5, 0, 0, 5]]}], [truth], "expected x0 <= x1"),
         ([{**found, "scores": [math.nan]}], [truth], "scores: NaN"),
+        ([{**found, "scores": [87.5]}], [truth], "scores: 87.5, expected a confidence, 0 to 1"),
         ([{**found, "boxes": [[0, 0, math.inf, 5]]}], [truth], "expected x0 <= x1"),
         ([{**found, "classes": [-1]}], [truth], "classes: -1, expected whole numbers"),
         ([{**found, "classes": [0.9]}], [truth], "classes: 0.9, expected whole numbers"),

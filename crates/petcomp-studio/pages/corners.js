@@ -1,6 +1,6 @@
 // Corners: four clicks on a photo become a label, and its camera is seen at once.
 
-import { api, at, choice, element, frame, lengths, query, say, shortcuts, trying } from "./studio.js";
+import { api, at, choice, element, frame, lengths, query, saveOrAsk, say, shortcuts, trying } from "./studio.js";
 import { photoList } from "./photo_list.js";
 import { INK, PhotoView, loaded, viewKeys } from "./photo_view.js";
 
@@ -49,7 +49,7 @@ async function show(photo) {
   asked += 1;
   const number = asked;
   const state = drafts.get(photo) ?? await load(photo);
-  const image = state && await trying(() => loaded(photo));
+  const image = state && await trying(() => photoOf(state));
   if (number !== asked) return;
   history.replaceState(null, "", query("corners", { photo }));
   document.title = `${photo.split("/").pop()} · Corners`;
@@ -57,6 +57,15 @@ async function show(photo) {
   list.choose(photo);
   if (image) showOpened(state, image);
   else showNothing();
+}
+
+/** The photo of a label; null where this browser shows it in another size: clicks on that would lie elsewhere. */
+async function photoOf({ photo, label }) {
+  const image = await loaded(photo);
+  const [shown, expected] = [[image.naturalWidth, image.naturalHeight], [label.image.width, label.image.height]];
+  if (String(shown) === String(expected)) return image;
+  say(`${photo}: ${shown.join(" x ")} pixels in this browser, expected ${expected.join(" x ")} as its label says`, "bad");
+  return null;
 }
 
 function showOpened(state, image) {
@@ -449,9 +458,12 @@ function isReadable() {
   return false;
 }
 
+/** Whether a photo still wants a label: the one beside it may be of a photo with another ending. */
+const isOpen = (entry) => !entry.label && !entry.taken;
+
 async function saveOpened(here, next) {
   const before = here.changes;
-  const saved = await saveOrAsk(here);
+  const saved = await saveLabel(here);
   if (!saved) return;
   const isWhole = here.changes === before;
   here.version = saved.version;
@@ -462,28 +474,20 @@ async function saveOpened(here, next) {
   const rest = isWhole ? "" : "; not what was changed meanwhile";
   say(saved.camera ? `saved ${saved.name} and ${saved.camera}${rest}` : `saved ${saved.name}${rest}; no camera: ${saved.why}`,
     saved.camera && isWhole ? "good" : "bad");
-  if (next && saved.camera && isWhole) list.next((entry) => !entry.label);
+  if (next && saved.camera && isWhole) list.next(isOpen);
 }
 
-/** Saves; where somebody else has saved since, asks whose label it shall be. */
-async function saveOrAsk(here) {
+/** Saves the label of a photo; null where theirs is loaded in its place. */
+function saveLabel(here) {
   const { photo } = here;
-  try {
-    return await api("api/corners/save", { photo, label: labelOf(here), version: here.version });
-  } catch (error) {
-    if (!error.stale) throw error;
-  }
-  const mine = await choice("This label has changed since you opened it",
-    "Another tab or program has saved it. Whose shall it be?", ["Load theirs", "Save mine"]);
-  if (mine === "Save mine") {
-    const { version } = await api(query("api/corners/label", { photo }));
-    return api("api/corners/save", { photo, label: labelOf(here), version });
-  }
-  if (mine === "Load theirs") {
-    drafts.delete(photo);
-    await show(photo);
-  }
-  return null;
+  return saveOrAsk(here.version, {
+    save: (version) => api("api/corners/save", { photo, label: labelOf(here), version }),
+    now: async () => (await api(query("api/corners/label", { photo }))).version,
+    load: () => {
+      drafts.delete(photo);
+      return show(photo);
+    },
+  });
 }
 
 async function solveTogether() {
@@ -539,6 +543,6 @@ shortcuts([
 ]);
 
 await trying(async () => {
-  await list.fill(await api("api/corners/photos"), (entry) => !entry.label);
+  await list.fill(await api("api/corners/photos"), isOpen);
   showMarks();
 });

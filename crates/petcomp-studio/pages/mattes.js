@@ -1,7 +1,7 @@
 // Mattes: each photo of a list with its cut-out, strokes that correct it, and a verdict.
 import { INKS, Stage } from "./mattes_stage.js";
 import { photoList } from "./photo_list.js";
-import { api, at, element, frame, picture, query, say, shortcuts, trying } from "./studio.js";
+import { api, at, element, frame, picture, query, saveOrAsk, say, shortcuts, trying } from "./studio.js";
 
 const LAYERS = [
   ["checker", "Checker", "1"],
@@ -217,10 +217,18 @@ function setVerdict(verdict) {
 /** Saves the review of the photo, after what is being saved already. */
 function keep() {
   const { entry, review } = state;
+  const { photo } = entry;
   const { size, strokes, verdict } = review;
+  const steps = {
+    save: (version) => api("api/mattes/review", { photo, size, strokes, verdict, version }),
+    now: async () => (await api(query("api/mattes/review", { photo }))).version,
+    // Not awaited: it waits itself for what is being saved.
+    load: () => { open(photo); },
+  };
   state.saving = state.saving.then(() => trying(async () => {
     try {
-      const saved = await api("api/mattes/review", { photo: entry.photo, size, strokes, verdict, version: review.version });
+      const saved = await saveOrAsk(review.version, steps);
+      if (!saved) return;
       Object.assign(review, { version: saved.version });
       markSaved(entry, { verdict, strokes });
       state.unsaved = null;

@@ -1,5 +1,5 @@
 import { withEdit } from "./recipe_edits.js";
-import { api, at, element, frame, picture, query, say, shortcuts, trying } from "./studio.js";
+import { api, at, element, frame, picture, query, saveOrAsk, say, shortcuts, trying } from "./studio.js";
 
 frame("recipe");
 
@@ -93,7 +93,12 @@ async function save() {
   meanwhile = newer;
   const { file, version, edits: sent } = recipe;
   try {
-    const next = await api("api/recipe/save", { file, version, edits: sent });
+    const next = await saveOrAsk(version, {
+      save: (over) => api("api/recipe/save", { file, version: over, edits: sent }),
+      now: async () => (await api(query("api/recipe/open", { file }))).version,
+      load: () => open(file),
+    });
+    if (!next) return;
     const saved = await api(query("api/recipe/open", { file }));
     // Another recipe was opened.
     if (meanwhile !== newer) return;

@@ -1,6 +1,6 @@
 // Scale: the two ends of a ruler, or the corners of the screen, and a photo has its pixels per metre.
 
-import { api, at, element, frame, lengths, query, say, shortcuts, trying } from "./studio.js";
+import { api, at, element, frame, lengths, query, saveOrAsk, say, shortcuts, trying } from "./studio.js";
 import { INK, PhotoView, loaded, viewKeys } from "./photo_view.js";
 import { photoList } from "./photo_list.js";
 
@@ -160,8 +160,14 @@ async function save() {
   const here = open;
   here.isSaving = true;
   await trying(async () => {
-    const { photo, version } = here;
-    const saved = await api("api/scale/save", { photo, version, scale, asset: at("asset").value, class: at("class").value });
+    const { photo } = here;
+    const asked = { photo, scale, asset: at("asset").value, class: at("class").value };
+    const saved = await saveOrAsk(here.version, {
+      save: (version) => api("api/scale/save", { ...asked, version }),
+      now: async () => (await api(query("api/scale/photo", { photo }))).version,
+      load: () => show(photo),
+    });
+    if (!saved) return;
     Object.assign(here, saved);
     list.entryOf(photo).scaled = true;
     list.showMarks();

@@ -109,7 +109,7 @@ const keys = [];
 
 /**
  * Keys of the page: `shortcuts([["s", "save", save], ["Shift+ArrowUp", "a pixel up", up]])`. Names are those of KeyboardEvent.key,
- * behind Ctrl+, Alt+ and Shift+. They rest while one types; Ctrl ones do not. A description of "" is not shown.
+ * behind Ctrl+, Alt+ and Shift+. While one types all but Ctrl+S rest: the others are the field's. A description of "" is not shown.
  */
 export function shortcuts(list) {
   keys.push(...list);
@@ -135,7 +135,7 @@ function isPressed(target, key) {
 function pressed(event) {
   const name = keyName(event);
   if (isPressed(event.target, event.key)) return;
-  if (document.querySelector("dialog[open]") || (isTyping(event.target) && !name.startsWith("Ctrl+"))) return;
+  if (document.querySelector("dialog[open]") || (isTyping(event.target) && name !== "Ctrl+s")) return;
   const found = keys.find(([key]) => key.toLowerCase() === name.toLowerCase());
   if (!found) return;
   event.preventDefault();
@@ -207,6 +207,23 @@ export function choice(title, what, options) {
     document.body.append(dialog);
     dialog.showModal();
   });
+}
+
+/**
+ * Saves a file of which the page has read a version, and returns what `save(version)` does. Where the file has changed since, a person says
+ * whose it shall be: `load()` takes theirs, and null is returned; mine is saved over the version that `now()` finds.
+ */
+export async function saveOrAsk(version, { save, now, load }) {
+  try {
+    return await save(version);
+  } catch (error) {
+    if (!error.stale) throw error;
+    const whose = await choice("Whose shall it be?", error.message, ["Load theirs", "Save mine"]);
+    if (whose === "Save mine") return save(await now());
+    if (whose !== "Load theirs") throw error;
+    await load();
+    return null;
+  }
 }
 
 /** Fills the frame: navigation, and the keys that every page has. */

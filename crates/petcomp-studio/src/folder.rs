@@ -5,7 +5,7 @@ use axum::http::StatusCode;
 use petcomp::{Error, Result, io};
 use std::collections::VecDeque;
 use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// How deep below the folder files are looked for.
@@ -116,6 +116,15 @@ impl Folder {
         parts.collect::<Vec<_>>().join("/")
     }
 
+    /// The name of a path that a list says (`./a.jpg`, `b/../a.jpg`, an absolute one), as browsers say
+    /// it.
+    pub(crate) fn name_of_listed(&self, path: &Path) -> String {
+        match straightened(path).strip_prefix(straightened(self.here())) {
+            Ok(inside) => self.name_of(&self.root.join(inside)),
+            Err(_) => self.name_of(path),
+        }
+    }
+
     /// A path is a folder below this one, whatever links lead there.
     fn check_stays(&self, path: &Path, name: &str) -> Answer<()> {
         let (root, target) = (self.here().canonicalize(), path.canonicalize());
@@ -198,6 +207,20 @@ impl Folder {
         }
         files
     }
+}
+
+/// `/a/c.jpg` of `/a/b/../c.jpg`.
+fn straightened(path: &Path) -> PathBuf {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
+    let mut straight = PathBuf::new();
+    for part in path.components() {
+        match (part, straight.file_name().is_some()) {
+            (Component::ParentDir, true) => drop(straight.pop()),
+            (Component::CurDir, _) => {}
+            _ => straight.push(part),
+        }
+    }
+    straight
 }
 
 /// `a.jpg` of `./a.jpg`.
@@ -288,6 +311,21 @@ mod tests {
         assert!(folder.file("far.txt").is_err() && folder.file("up/secret.txt").is_err());
         assert!(folder.folder("up").is_err() && folder.place("up/new.txt").is_err());
         assert!(folder.find(|_| true) == ["sub/a.txt"]);
+    }
+
+    #[test]
+    fn a_listed_file_has_one_name_whichever_path_leads_to_it() {
+        for root in ["src", "./src", "src/corners/.."] {
+            let folder = Folder::open(Path::new(root)).unwrap();
+            let absolute = std::path::absolute("src/lib.rs").unwrap();
+            let relative = ["./lib.rs", "corners/../lib.rs", "../src/lib.rs"];
+            let relative = relative.map(|name| Path::new(root).join(name));
+            for path in relative.iter().chain([&absolute]) {
+                assert_eq!(folder.name_of_listed(path), "lib.rs", "{root}: {path:?}");
+            }
+            let outside = Path::new(root).join("../lib.rs");
+            assert_eq!(folder.name_of_listed(&outside), "../lib.rs");
+        }
     }
 
     #[test]

@@ -22,6 +22,8 @@ const EXTENSIONS: [&str; 11] = [
     "jpg", "jpeg", "png", "tif", "tiff", "exr", "hdr", "webp", "heic", "heif", "hif",
 ];
 const JPEG_QUALITY: u8 = 88;
+/// Of a photo at its size, in which corners are looked for at eight times that.
+const WHOLE_QUALITY: u8 = 95;
 /// The largest file that a browser gets as it is.
 const MAX_PLAIN_BYTES: u64 = 64 << 20;
 /// Longer sides of pictures that are made smaller, pixels.
@@ -36,7 +38,11 @@ pub(crate) fn may_be_photo(path: &Path) -> bool {
 
 /// A JPEG as an answer.
 pub(crate) fn jpeg<P: ToFile>(image: &Image<P>) -> Answer<Response> {
-    Ok(of_type("image/jpeg", io::jpeg_bytes(image, JPEG_QUALITY)?))
+    jpeg_of(image, JPEG_QUALITY)
+}
+
+fn jpeg_of<P: ToFile>(image: &Image<P>, quality: u8) -> Answer<Response> {
+    Ok(of_type("image/jpeg", io::jpeg_bytes(image, quality)?))
 }
 
 fn of_type(kind: &'static str, bytes: Vec<u8>) -> Response {
@@ -86,11 +92,7 @@ async fn photo(
     if is_known {
         return Ok((StatusCode::NOT_MODIFIED, keeping).into_response());
     }
-    // The file itself need not wait for small pictures of others.
-    let _permit = match query.side {
-        Some(_) => Some(studio.decoding.acquire().await),
-        None => None,
-    };
+    let _permit = studio.decoding.acquire().await;
     let response = blocking(move || shown(&path, query.side)).await?;
     Ok((keeping, response).into_response())
 }
@@ -109,21 +111,38 @@ pub(crate) fn tag_of(path: &Path) -> Answer<String> {
 /// A picture as the browser can show it, small where a longer side is given. Otherwise it keeps its
 /// size, for pages take positions from it.
 pub(crate) fn shown(path: &Path, side: Option<usize>) -> Answer<Response> {
-    let plain = plain_type(path)?;
-    match (side, plain) {
-        (None, Some(kind)) => Ok(of_type(kind, std::fs::read(path).map_err(unreadable)?)),
-        (None, None) => over_black(path, usize::MAX),
-        (Some(side), _) => over_black(path, side.clamp(MIN_SIDE_PX, MAX_SIDE_PX)),
+    if let Some(side) = side {
+        return over_black(path, side.clamp(MIN_SIDE_PX, MAX_SIDE_PX), JPEG_QUALITY);
+    }
+    match plain_file(path)? {
+        Some((kind, bytes)) => Ok(of_type(kind, bytes)),
+        None => over_black(path, usize::MAX, WHOLE_QUALITY),
     }
 }
 
 /// A JPEG of a picture, which may have alpha.
-fn over_black(path: &Path, side_px: usize) -> Answer<Response> {
+fn over_black(path: &Path, side_px: usize, quality: u8) -> Answer<Response> {
     let picture = at_most(io::read::<PremulRgba>(path)?, side_px);
-    jpeg(&picture.map(PremulRgba::color))
+    jpeg_of(&picture.map(PremulRgba::color), quality)
 }
 
-/// The type of a file that every browser shows as petcomp reads it.
+/// The type and the bytes of a file that every browser shows as petcomp reads it.
+fn plain_file(path: &Path) -> Answer<Option<(&'static str, Vec<u8>)>> {
+    let Some(kind) = plain_type(path)? else {
+        return Ok(None);
+    };
+    let bytes = std::fs::read(path).map_err(unreadable)?;
+    Ok((!may_have_exif(&bytes)).then_some((kind, bytes)))
+}
+
+/// Whether browsers may turn or scale a picture by EXIF data otherwise than petcomp: by an
+/// orientation of an unusual type, a resolution beside a size, a second block of such data.
+fn may_have_exif(bytes: &[u8]) -> bool {
+    let mut places = bytes.windows(4);
+    places.any(|place| place == b"Exif" || place == b"eXIf")
+}
+
+/// The type of a file whose pixels every browser shows as petcomp reads them.
 fn plain_type(path: &Path) -> Answer<Option<&'static str>> {
     let header = io::read_header(path)?;
     let bytes = std::fs::metadata(path).map_err(unreadable)?.len();
@@ -145,6 +164,13 @@ mod tests {
     use petcomp::LinearRgb;
     use petcomp::io::{Bits, WriteOptions};
 
+    fn body_of(photo: &Path, side: Option<usize>) -> Vec<u8> {
+        let body = shown(photo, side).unwrap().into_body();
+        let bytes = axum::body::to_bytes(body, usize::MAX);
+        let runtime = tokio::runtime::Builder::new_current_thread().build();
+        runtime.unwrap().block_on(bytes).unwrap().to_vec()
+    }
+
     #[test]
     fn a_photo_that_no_browser_shows_keeps_its_size_unless_a_side_is_given() {
         let folder = tempfile::tempdir().unwrap();
@@ -156,12 +182,28 @@ mod tests {
         let long = Image::filled(MAX_SIDE_PX + 4, 2, LinearRgb::WHITE);
         io::write_with(&photo, &long, &deep).unwrap();
         for (side, width) in [(None, MAX_SIDE_PX + 4), (Some(usize::MAX), MAX_SIDE_PX)] {
-            let body = shown(&photo, side).unwrap().into_body();
-            let bytes = axum::body::to_bytes(body, usize::MAX);
-            let runtime = tokio::runtime::Builder::new_current_thread().build();
-            std::fs::write(&answered, runtime.unwrap().block_on(bytes).unwrap()).unwrap();
+            std::fs::write(&answered, body_of(&photo, side)).unwrap();
             assert_eq!(io::read_header(&answered).unwrap().width, width, "{side:?}");
         }
+    }
+
+    /// An orientation as a LONG: petcomp turns the photo, Chromium does not.
+    #[test]
+    fn a_photo_with_exif_data_is_sent_upright_without_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let (photo, answered) = (folder.path().join("a.jpg"), folder.path().join("b.jpg"));
+        io::write(&photo, &Image::filled(40, 20, LinearRgb::WHITE)).unwrap();
+        let mut jpeg = std::fs::read(&photo).unwrap();
+        assert_eq!(body_of(&photo, None), jpeg);
+        let exif = b"\xff\xe1\0\x22Exif\0\0MM\0*\0\0\0\x08\
+            \0\x01\x01\x12\0\x04\0\0\0\x01\0\0\0\x06\0\0\0\0";
+        jpeg.splice(2..2, exif.iter().copied());
+        std::fs::write(&photo, jpeg).unwrap();
+        let sent = body_of(&photo, None);
+        assert!(!may_have_exif(&sent));
+        std::fs::write(&answered, sent).unwrap();
+        let header = io::read_header(&answered).unwrap();
+        assert_eq!((header.width, header.height), (20, 40));
     }
 
     #[test]

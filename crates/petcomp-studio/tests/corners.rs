@@ -241,6 +241,48 @@ fn a_stale_save_is_asked_about() {
 }
 
 #[test]
+fn keys_of_corners_rest_while_one_types() {
+    let Some(mut browser) = Browser::open(1360, 860) else {
+        return;
+    };
+    let dir = photos(&["bg0000"]);
+    let studio = Studio::over(dir.path());
+    open_photo(&mut browser, &studio, "bg0000.jpg");
+    browser.wait("document.querySelectorAll('#facts dt').length > 5");
+    browser.press("1", 0);
+    browser.press("ArrowRight", SHIFT);
+    browser.eval("document.querySelector('#width').focus()");
+    for key in ["z", "ArrowRight", "s"] {
+        browser.press(key, CTRL);
+    }
+    browser.wait("document.querySelector('footer').innerText.startsWith('saved')");
+    let label: Label = io::read_json(dir.path().join("bg0000.label.json")).unwrap();
+    let mut moved = truth("bg0000");
+    moved[0][0] += 1.0;
+    assert!(farthest_px(&label, moved) < 0.02, "{:?}", label.surface);
+}
+
+#[test]
+fn a_photo_of_another_size_than_its_label_says_is_not_shown() {
+    let Some(mut browser) = Browser::open(1360, 860) else {
+        return;
+    };
+    let dir = photos(&["bg0000"]);
+    let path = dir.path().join("bg0000.label.json");
+    let mut label: Value = io::read_json(&path).unwrap();
+    label["image"]["width"] = json!(640);
+    label["image"]["height"] = json!(480);
+    io::write_json(&path, &label).unwrap();
+    let studio = Studio::over(dir.path());
+    open_photo(&mut browser, &studio, "bg0000.jpg");
+    let expected =
+        "bg0000.jpg: 1280 x 960 pixels in this browser, expected 640 x 480 as its label says";
+    assert_eq!(browser.text("footer"), expected);
+    let is_disabled = browser.eval("document.querySelector('#save').disabled");
+    assert_eq!(is_disabled, true);
+}
+
+#[test]
 fn photos_of_one_camera_are_solved_together() {
     let Some(mut browser) = Browser::open(1360, 860) else {
         return;
@@ -348,6 +390,34 @@ fn a_label_that_has_no_camera_keeps_no_other_from_its_own() {
     io::write_json(&path, &label).unwrap();
     let studio = Studio::over(dir.path());
     assert_only_the_first_is_solved(&studio);
+}
+
+#[test]
+fn a_label_is_of_the_photo_that_it_names_and_counts_once() {
+    let dir = photos(&["bg0000"]);
+    let (named, other) = ("bg0000.jpg", "bg0000.jpeg");
+    std::fs::copy(dir.path().join(named), dir.path().join(other)).unwrap();
+    let studio = Studio::over(dir.path());
+    let asked = json!({ "photos": [named, other, named] }).to_string();
+    let solved = body(&studio.post("api/corners/joint", &asked));
+    assert_eq!(solved.as_array().unwrap().len(), 2);
+    let why = "bg0000.label.json: image.file: bg0000.jpg, expected bg0000.jpeg";
+    assert_eq!(
+        (&solved[0]["photo"], &solved[0]["why"]),
+        (&json!(other), &json!(why))
+    );
+    assert_eq!(
+        (&solved[1]["photo"], &solved[1]["together"]),
+        (&json!(named), &json!(1))
+    );
+    assert!(solved[1]["focal_px"].is_number(), "{solved}");
+    let listed = body(&studio.get("api/corners/photos"));
+    let marks = |photo: &str| {
+        let mut listed = listed.as_array().unwrap().iter();
+        let entry = listed.find(|entry| entry["photo"] == photo).unwrap();
+        [entry["label"] == true, entry["camera"] == true]
+    };
+    assert_eq!((marks(named), marks(other)), ([true; 2], [false; 2]));
 }
 
 #[test]

@@ -152,14 +152,17 @@ fn what_another_tab_has_saved_is_not_overwritten() {
     browser.press("o", 0);
     let dot = on_page(&mut browser, &[[60.0, 30.0], [62.0, 30.0]]);
     browser.drag(&dot);
-    browser.wait("document.querySelector('footer').innerText.includes('has changed since')");
+    browser.wait_for("dialog");
+    assert!(browser.text("dialog").contains("has changed since"));
     assert_eq!(review(folder.path()), Some(other));
     // The list tells what is in the file.
     let marks =
         "[...document.querySelectorAll('#photos .mark')].map((mark) => mark.textContent).join()";
     assert_eq!(browser.eval(marks), ",");
-    browser.click_on("#photos button");
+    browser.click_on("dialog button[value='Load theirs']");
     browser.wait(&format!("{marks} === 'rejected,'"));
+    let kept = review(folder.path()).unwrap();
+    assert_eq!(kept.verdict, Some(Verdict::Rejected));
 }
 
 #[test]

@@ -278,6 +278,24 @@ fn a_new_recipe_takes_no_name_of_another_file() {
 }
 
 #[test]
+fn edits_are_saved_over_what_another_program_has_written() {
+    let Some(mut browser) = Browser::open(1440, 900) else {
+        return;
+    };
+    let (dir, _studio) = recipe_alone(&mut browser);
+    set_number(&mut browser, "scene.scale", "0.25");
+    browser.wait(&format!("{EDITED} === 1"));
+    let path = dir.path().join("recipe.toml");
+    io::write_text(&path, &format!("{}gain_ev = 0.5\n", tray::RECIPE)).unwrap();
+    browser.press("s", CTRL);
+    browser.click_on("dialog button[value='Save mine']");
+    browser.wait("document.querySelector('#save').disabled");
+    let text = io::read_text(&path).unwrap();
+    assert!(text.contains("gain_ev = 0.5"), "{text}");
+    assert!(text.contains("scale = [0.25"), "{text}");
+}
+
+#[test]
 fn a_stale_save_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     io::write_text(dir.path().join("recipe.toml"), DatasetConfig::template()).unwrap();

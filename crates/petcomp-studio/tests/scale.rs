@@ -64,6 +64,34 @@ fn two_ends_of_a_length_give_pixels_per_metre() {
 }
 
 #[test]
+fn a_scale_is_saved_over_a_list_that_has_changed() {
+    let Some(mut browser) = Browser::open(1360, 860) else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    copy_files(&samples("bottles"), dir.path(), |name| {
+        name.ends_with("_0.png") || name == "photos.toml"
+    });
+    let list = dir.path().join("photos.toml");
+    let studio = Studio::over(dir.path());
+    browser.go(&studio.page("scale?photo=b0000_0.png"));
+    browser.wait("document.querySelector('#title').innerText === 'b0000_0.png'");
+    let [left, top, width, height] = browser.place("#stage canvas");
+    for x in [0.4, 0.6] {
+        browser.click([left + x * width, top + 0.5 * height]);
+    }
+    browser.fill("#width", "0.1");
+    let theirs = format!("# theirs\n{}", io::read_text(&list).unwrap());
+    io::write_text(&list, &theirs).unwrap();
+    browser.click_on("#save");
+    browser.click_on("dialog button[value='Save mine']");
+    browser.wait("document.querySelector('footer').innerText.includes('saved in photos.toml')");
+    let after = io::read_text(&list).unwrap();
+    assert!(after.starts_with("# theirs\n"), "{after}");
+    assert_ne!(after, theirs);
+}
+
+#[test]
 fn beside_a_list_that_cannot_be_read_nothing_is_saved() {
     let Some(mut browser) = Browser::open(1360, 860) else {
         return;

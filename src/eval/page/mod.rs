@@ -1,17 +1,19 @@
 //! A detector against the truth: tables, curves and one page; several runs with their spread.
 
 mod earlier;
+mod map_estimate;
 mod mistakes;
 mod run_names;
 mod spread;
 
+pub use map_estimate::{MapEstimate, MapRange};
 pub use run_names::{run_name, run_names};
 pub use spread::Spread;
 
 use crate::error::Result;
 use crate::eval::{
-    self, ClassScores, CocoScores, Confusion, ConfusionOptions, Definition, EvalImage, Interval,
-    Matches, Picture, Scores, THRESHOLDS, Tags, thresholds,
+    self, ClassScores, CocoScores, Confusion, ConfusionOptions, Definition, EvalImage, Matches,
+    Picture, Scores, THRESHOLDS, Tags, thresholds,
 };
 use crate::io;
 use crate::plot::{Page, Table};
@@ -35,8 +37,8 @@ pub struct EvalReportOptions {
     pub classes: Vec<String>,
     /// Light, camera position, ..: scores are given for each.
     pub tags: Tags,
-    /// Rounds of the bootstrap over images, or their sequences; tables show no interval of fewer
-    /// than 40. Default: 200.
+    /// Rounds of the bootstrap over images, or their sequences; there is no interval of fewer than
+    /// 40. Default: 200.
     pub rounds: usize,
     /// Where its draws come from. Default: 0.
     pub seed: u64,
@@ -81,7 +83,7 @@ pub struct Metrics {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sequences: Option<usize>,
     /// mAP@0.5:0.95 as YOLOv5 has it, with its interval over images, or over their sequences.
-    pub map: Interval,
+    pub map: MapEstimate,
     /// By the definition of YOLOv5.
     pub yolov5: Scores,
     /// By the definition of COCO.
@@ -97,7 +99,7 @@ impl Metrics {
             run: run.name.clone(),
             images: run.sheets.len(),
             sequences: is_grouped.then(|| matches.group_count()),
-            map: matches.bootstrap(options.rounds, options.seed),
+            map: MapEstimate::new(&matches, &run.sheets, options),
             yolov5: matches.scores(&[]),
             coco: eval::coco(&run.sheets, &[]),
         }
@@ -157,7 +159,7 @@ fn write_parts(
     let confusion = first_confusion(runs, options);
     let shown = shown_classes(all, &confusion);
     let mut page = Page::new("Detections against the truth");
-    let [scores, factors] = [scores_table(all, options), factors_table(runs, options)];
+    let [scores, factors] = [scores_table(all), factors_table(runs, options)];
     add_table(&mut page, folder, "Scores", "scores.csv", [&scores; 2])?;
     add_classes(&mut page, folder, all, &shown, options)?;
     add_table(&mut page, folder, "Factors", "factors.csv", [&factors; 2])?;
@@ -359,7 +361,7 @@ fn class_title(class: Option<u32>, options: &EvalReportOptions) -> String {
 }
 
 /// A row per run, and one over all where there are several.
-pub fn scores_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
+pub fn scores_table(all: &[Metrics]) -> Table {
     let mut table = Table::new([
         "run",
         "images",
@@ -370,7 +372,7 @@ pub fn scores_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
         "95 % interval",
     ]);
     for metrics in all {
-        let interval = interval_text(metrics, options);
+        let interval = interval_text(metrics);
         table.push(metrics.scores_row("yolov5", &metrics.yolov5, interval));
         table.push(metrics.scores_row("coco", &metrics.coco.scores, String::new()));
     }
@@ -388,14 +390,9 @@ fn spread_of(all: &[Metrics]) -> Spread {
 
 fn spread_row(spread: &Spread) -> [String; 7] {
     // The normal distribution knows no ends, a mAP does.
-    let possible = |interval: Interval| Interval {
-        low: interval.low.max(0.0),
-        high: interval.high.min(1.0),
-        ..interval
-    };
     let interval = spread
         .interval
-        .map(|interval| range_text(&possible(interval)));
+        .map(|interval| range_text(interval.low.max(0.0), interval.high.min(1.0)));
     [
         "mean +- std".into(),
         format!("{} runs", spread.runs),
@@ -407,23 +404,20 @@ fn spread_row(spread: &Spread) -> [String; 7] {
     ]
 }
 
-/// Empty where the rounds are too few for one, or a single sequence tells of no other.
-fn interval_text(metrics: &Metrics, options: &EvalReportOptions) -> String {
-    if options.rounds < MIN_ROUNDS || metrics.sequences == Some(1) {
+/// Empty where there is none.
+fn interval_text(metrics: &Metrics) -> String {
+    let Some(MapRange { low, high }) = metrics.map.range else {
         return String::new();
-    }
+    };
     let over = match metrics.sequences {
         Some(_) => "sequences",
         None => "images",
     };
-    format!("{} over {over}", range_text(&metrics.map))
+    format!("{} over {over}", range_text(low, high))
 }
 
-/// Of fewer rounds less than one is to be expected beyond either end of an interval.
-const MIN_ROUNDS: usize = 40;
-
-fn range_text(interval: &Interval) -> String {
-    format!("{} to {}", share(interval.low), share(interval.high))
+fn range_text(low: f64, high: f64) -> String {
+    format!("{} to {}", share(low), share(high))
 }
 
 /// Average precision per class and threshold by the definition of YOLOv5.
@@ -694,7 +688,7 @@ mod tests {
                 ..Default::default()
             };
             let all: Vec<Metrics> = runs.iter().map(|run| Metrics::of(run, &options)).collect();
-            let rows = scores_table(&all, &options).rows.into_iter();
+            let rows = scores_table(&all).rows.into_iter();
             rows.map(|row| row[6].clone()).collect::<Vec<String>>()
         };
         let runs = [run("p", 0.9), run("q", 0.8)];
@@ -706,6 +700,42 @@ mod tests {
         assert!(cells(&[belt.clone()], 200)[0].ends_with(" over sequences"));
         belt.sheets[1].group = "7".into();
         assert_eq!(cells(&[belt], 200)[0], "");
+    }
+
+    #[test]
+    fn metrics_have_no_interval_where_nothing_tells_of_other_images() {
+        let measured = |run: &Run, rounds| {
+            let options = EvalReportOptions {
+                rounds,
+                ..Default::default()
+            };
+            Metrics::of(run, &options)
+        };
+        let two = run("p", 0.9);
+        assert!(measured(&two, 40).map.range.is_some());
+        let [mut one, mut lone, mut bare] = [(); 3].map(|()| two.clone());
+        one.sheets.truncate(1);
+        lone.sheets[1].truth.clear();
+        for sheet in &mut bare.sheets {
+            sheet.truth.clear();
+        }
+        for (run, rounds) in [
+            (&two, 0),
+            (&two, 39),
+            (&one, 200),
+            (&lone, 200),
+            (&bare, 200),
+        ] {
+            let metrics = measured(run, rounds);
+            let document = serde_json::to_value(&metrics).unwrap();
+            let value = metrics.map.value;
+            assert_eq!(document["map"], serde_json::json!({"value": value}));
+            assert_eq!(interval_text(&metrics), "");
+            assert_eq!(
+                serde_json::from_value::<Metrics>(document).unwrap(),
+                metrics
+            );
+        }
     }
 
     #[test]

@@ -27,7 +27,8 @@ mod bridge {
         half: bool,
         /// Colours are multiplied by alpha; for writing.
         premultiplied: bool,
-        /// What OpenImageIO makes of the file's colours.
+        /// What OpenImageIO makes of the file's colours; of a DPX of which it makes nothing, the
+        /// name of its transfer.
         color_space: String,
     }
 

@@ -9,7 +9,7 @@ use crate::io::codec::refusal::Refusal;
 use crate::io::codec::{Wanted, heif};
 use crate::io::format::Format;
 use crate::io::header::Window;
-use crate::io::limits::{Demand, Limits};
+use crate::io::limits::{Demand, Limits, affordable};
 use crate::io::source::SourceFile;
 use cxx::UniquePtr;
 use std::ops::Range;
@@ -73,8 +73,10 @@ pub(crate) fn decode(
     picked.dedup();
     let (width, height) = (layout.width as usize, layout.height as usize);
     limits.check_memory(width, height, picked.len())?;
-    let bytes = layout.data_bytes() * working_copies(source.format);
+    let bytes = layout.larger_window_bytes() * working_copies(source.format);
     prepare(layout.shape(&picked), bytes)?;
+    // Not before: a worker has the memory for a picture only once it is prepared.
+    affordable(bytes)?;
     let samples = read_samples(source.format, &reader, &layout, &picked)?;
     let (samples, display_encoded) = interpret(samples, source.format, &layout.color_space)?;
     Ok(Raster {
@@ -87,10 +89,12 @@ pub(crate) fn decode(
     })
 }
 
-/// How many times the memory of a picture its decoder takes: libheif keeps what it converts from.
+/// How many times the memory of a picture its decoder takes: libheif keeps what it converts from,
+/// and the curves of film scans make floats of bytes.
 fn working_copies(format: Format) -> u64 {
     match format {
         Format::Heif => 3,
+        Format::Dpx => 2,
         _ => 1,
     }
 }
@@ -138,9 +142,10 @@ impl Layout {
     }
 
     fn check(&self, file_bytes: u64, limits: &Limits) -> Result<(), Refusal> {
-        limits.check(self.demand([self.width, self.height], file_bytes))?;
+        limits.check_bounds(self.demand([self.width, self.height], file_bytes))?;
         let data_size = [self.data_width, self.data_height];
-        Ok(limits.check(self.demand(data_size, file_bytes))?)
+        limits.check_bounds(self.demand(data_size, file_bytes))?;
+        Ok(())
     }
 
     fn demand(&self, size: [i64; 2], file_bytes: u64) -> Demand {
@@ -177,8 +182,11 @@ impl Layout {
         (self.data_width * self.data_height) as usize * self.channels.len()
     }
 
-    fn data_bytes(&self) -> u64 {
-        self.data_samples() as u64 * u64::from(self.bytes.unsigned_abs())
+    /// Bytes of all channels in the larger of both windows: one is cut or padded to the other.
+    fn larger_window_bytes(&self) -> u64 {
+        let pixels = (self.data_width * self.data_height).max(self.width * self.height);
+        let channels = self.channels.len() as u64;
+        pixels as u64 * channels * u64::from(self.bytes.unsigned_abs())
     }
 
     /// The data window is the display window.
@@ -244,15 +252,17 @@ fn copy_picked<T: Copy>(to: &mut [T], pixel: &[T], picked: &[usize]) {
 }
 
 /// Samples with their meaning, and whether they are display-encoded: the rule of [`io`](crate::io)
-/// for integers and floats, while film scans name the meaning of their codes themselves.
+/// for integers and floats, while film scans name the meaning of their codes themselves, in
+/// OpenImageIO's words.
 fn interpret(samples: Samples, format: Format, space: &str) -> Result<(Samples, bool), Refusal> {
     let is_scan = matches!(format, Format::Dpx | Format::Cineon);
     let is_integer = !samples.are_float();
     match space {
-        "" | "sRGB" => Ok((samples, is_integer)),
+        "" | "sRGB" | "Undefined" | "User defined" => Ok((samples, is_integer)),
         _ if !is_scan => Ok((samples, is_integer)),
         "Linear" | "linear" => Ok((samples, false)),
-        "Rec709" => {
+        // All four have the curve of Rec. 709.
+        "Rec709" | "SMPTE 274M" | "ITU-R 601-5 system B or G" | "ITU-R 601-5 system M" => {
             let light = decode_curve(samples, Curve::Rec709);
             Ok((Samples::F32(light), false))
         }

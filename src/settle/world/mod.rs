@@ -185,8 +185,8 @@ impl Drop<'_> {
         }
     }
 
-    /// Work of a step for each object and pair: iterations, as often as a step may be cut at what
-    /// is in the way.
+    /// Work of a step for each object and pair: iterations, as often as the options let a step be cut
+    /// at what is in the way.
     fn work_per_pair(&self) -> u64 {
         u64::from(self.options.iterations.div_ceil(ITERATIONS_PER_WORK))
             * u64::from(self.options.ccd.clamp(1, MAX_SUBSTEPS))

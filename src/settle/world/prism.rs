@@ -180,7 +180,19 @@ fn largest_at(ring: &[Vector], side: usize) -> Vec<usize> {
             best = (c, d);
         }
     }
-    corners(best.0, best.1)
+    with_widest_first(ring, corners(best.0, best.1))
+}
+
+/// The same corners from where the first three make the largest triangle: the engine takes the normal
+/// of a face from these.
+fn with_widest_first(ring: &[Vector], mut corners: Vec<usize>) -> Vec<usize> {
+    let area = |first: usize| {
+        let triangle = [0, 1, 2].map(|k| corners[(first + k) % FACE_CORNERS]);
+        doubled_area_of(ring, &triangle)
+    };
+    let widest = (0..FACE_CORNERS).max_by(|a, b| area(*a).total_cmp(&area(*b)));
+    corners.rotate_left(widest.unwrap_or(0));
+    corners
 }
 
 fn doubled_area_of(ring: &[Vector], corners: &[usize]) -> Real {

@@ -190,7 +190,7 @@ pub(super) fn solved(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
 
 /// A solution whose camera can see objects on the surface.
 fn possible(solution: Solution, labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
-    camera::check_distance(&solution.camera).map_err(|e| e.in_file(&labelled.source))?;
+    camera::check_distance(&solution).map_err(|e| e.in_file(&labelled.source))?;
     Ok(solution)
 }
 

@@ -4,16 +4,21 @@ use super::picture_files::{canvas_of, check_same_size, write_optional, write_pic
 use crate::batch::FileBatch;
 use crate::diagnostics::report_diagnostics;
 use crate::global::GlobalArgs;
+use crate::interruption::interruption;
 use crate::values::parse_color;
 use anyhow::{Context, Result};
 use clap::ArgGroup;
-use petcomp::io::{self, FromFile, Override, Picture};
+use petcomp::io::{self, Format, FromFile, Override, Picture};
 use petcomp::matte::key::{Deviations, KeyOptions, Keyed, Keying, Profile, Screen};
 use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, segment};
-use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
+use petcomp::{Coverage, Error, Image, LinearRgb, PremulRgba};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
+use std::sync::atomic::Ordering;
+
+/// Memory that a frame takes for each of its pixels while it is keyed: 78 to 88 bytes, measured.
+const BYTES_PER_PIXEL: u64 = 100;
 
 /// Keys pictures against a screen colour or plate, as Blender's Keying node does.
 #[derive(clap::Args, Debug)]
@@ -109,7 +114,12 @@ impl KeyArgs {
         self.frames.len() > 1 || is_named_folder(path)
     }
 
+    /// None where no frame is a picture, from which something could come to lie there.
     fn create_folders(&self) -> petcomp::Result<()> {
+        let mut frames = self.frames.iter();
+        if !frames.any(|frame| io::read_format(frame).is_ok()) {
+            return Ok(());
+        }
         let mut folders = self.targets().filter(|path| self.is_folder(path));
         folders.try_for_each(io::create_folder)
     }
@@ -132,9 +142,19 @@ impl KeyArgs {
         let name = frame
             .file_name()
             .context(format!("{}: no file", frame.display()))?;
-        // No other format keeps all that a cut-out has: alpha, colours of any gamut, floats.
-        Ok(path.join(name).with_extension("exr"))
+        Ok(path.join(exr_name(Path::new(name))))
     }
+}
+
+/// A picture's name with the ending `.exr` in place of its own: no other format keeps all that a
+/// cut-out has, alpha, colours of any gamut, floats. What follows the last dot may be a number.
+fn exr_name(name: &Path) -> PathBuf {
+    if Format::from_extension(name).is_some() {
+        return name.with_extension("exr");
+    }
+    let mut whole = name.as_os_str().to_owned();
+    whole.push(".exr");
+    whole.into()
 }
 
 /// A folder that is there, or that is meant by its last character.
@@ -243,25 +263,33 @@ struct KeyerWork<'a> {
 }
 
 impl KeyerWork<'_> {
-    /// Frames side by side: while some are read or written, others are keyed. A frame that cannot
-    /// be keyed does not stop the others.
+    /// Frames side by side, as many as memory holds: while some are read or written, others are
+    /// keyed. A frame that cannot be keyed does not stop the others; after an interruption no more
+    /// are begun.
     fn key_sequence(&self, frames: &[FrameFiles], global: &GlobalArgs) -> Result<()> {
         let progress = global.start_progress("frames");
+        let (stop, count) = (interruption(), frames.len() as u64);
         let batch = Mutex::new((FileBatch::default(), 0));
-        frames
-            .par_iter()
-            .for_each_init(Keyed::default, |keyed, frame| {
-                let outcome = self.key(frame, keyed);
-                if let Ok((batch, done)) = batch.lock().as_deref_mut() {
-                    batch.count(outcome);
-                    *done += 1;
-                    progress.update(*done, frames.len() as u64);
-                }
-            });
+        let key = |keyed: &mut Keyed, frame: &FrameFiles| {
+            if stop.load(Ordering::Relaxed) {
+                return;
+            }
+            let outcome = self.key(frame, keyed);
+            if let Ok((batch, done)) = batch.lock().as_deref_mut() {
+                batch.count(outcome);
+                *done += 1;
+                progress.update(*done, count);
+            }
+        };
+        for some in frames.chunks(frames_at_once(frames)) {
+            some.par_iter().for_each_init(Keyed::default, key);
+        }
         drop(progress);
-        batch
-            .into_inner()
-            .map_or(Ok(()), |(batch, _)| batch.finish())
+        let counted = batch.into_inner();
+        counted.map_or(Ok(()), |(batch, done)| match done < count {
+            true => Err(interrupted(done, count).into()),
+            false => batch.finish(),
+        })
     }
 
     /// One frame, into pictures that are already there.
@@ -282,6 +310,22 @@ impl KeyerWork<'_> {
             None => Ok(()),
         }
     }
+}
+
+/// All, if there is memory for one on each thread. Frames are alike: the first is asked for its size.
+fn frames_at_once(frames: &[FrameFiles]) -> usize {
+    let first = frames.first().map(|files| &files.frame);
+    let fitting = io::pictures_at_once(first, BYTES_PER_PIXEL);
+    if fitting < rayon::current_num_threads() {
+        fitting
+    } else {
+        frames.len().max(1)
+    }
+}
+
+fn interrupted(done: u64, count: u64) -> Error {
+    let what = format!("{done} of {count} frames are done; the same command begins with the first");
+    Error::Interrupted { what }
 }
 
 fn read_optional<P: FromFile>(path: &Option<PathBuf>) -> petcomp::Result<Option<Image<P>>> {

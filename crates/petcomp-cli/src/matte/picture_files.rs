@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use petcomp::Image;
-use petcomp::io::{self, Bits, Canvas, Header, ToFile, WriteOptions};
+use petcomp::io::{self, Bits, Canvas, Format, Header, ToFile, WriteOptions};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
@@ -27,7 +27,7 @@ pub(super) fn is_exr(path: &Path) -> bool {
 
 /// Where a photo's picture lies, for what is made of it; warns of what that does not keep.
 pub(super) fn canvas_of(photo: &Path) -> petcomp::Result<Canvas> {
-    if !is_exr(photo) {
+    if io::read_format(photo)? != Format::Exr {
         return Ok(Canvas::default());
     }
     let header = io::read_header(photo)?;

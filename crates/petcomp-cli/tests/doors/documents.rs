@@ -347,7 +347,7 @@ fn label_file(world: &World) {
         return;
     };
     camera::doctor(&label, &solution, &options);
-    ends(camera::check_distance(&solution.camera));
+    ends(camera::check_distance(&solution));
     let _ = camera::solve_joint(&[label.clone(), label.clone()], &options);
     serde_json::to_string(&CameraFile::new(&label, &solution)).unwrap();
     let photo: Image<LinearRgb> = io::read(world.path("backgrounds/a.png")).unwrap();

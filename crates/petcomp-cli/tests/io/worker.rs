@@ -4,8 +4,8 @@
 use crate::make::{Folder, palette_tiff};
 use petcomp::io::{self, WriteOptions};
 use petcomp::{Image, LinearRgb, Srgb8, color};
-use std::io::Write;
-use std::process::{Command, Stdio};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, Command, Stdio};
 
 #[test]
 fn a_palette_tiff_is_read_by_the_worker() {
@@ -47,21 +47,110 @@ fn film_scans_are_read_by_the_worker() {
     );
 }
 
+/// A film scan with this code of its transfer (SMPTE 268M) in the header.
+fn scan_of_transfer(folder: &Folder, code: u8) -> Result<Image<LinearRgb>, String> {
+    let path = folder.file("transfer.dpx");
+    let ramp = Image::from_fn(32, 4, |x, _| LinearRgb::grey(x as f32 / 31.0));
+    io::oiio::write_with(&path, &ramp, &WriteOptions::default()).unwrap();
+    let mut bytes = std::fs::read(&path).unwrap();
+    bytes[801] = code;
+    std::fs::write(&path, bytes).unwrap();
+    io::read(&path).map_err(|e| e.to_string())
+}
+
+#[test]
+fn a_film_scan_has_the_curve_that_it_names_or_is_refused() {
+    let folder = Folder::new();
+    let read = |code| scan_of_transfer(&folder, code).unwrap();
+    let (undefined, rec709) = (read(255), read(6));
+    assert_ne!(undefined.pixels(), rec709.pixels());
+    assert_eq!(read(0).pixels(), undefined.pixels());
+    for code in [5, 7, 8] {
+        assert_eq!(read(code).pixels(), rec709.pixels(), "transfer {code}");
+    }
+    for (code, name) in [
+        (1, "Printing density"),
+        (3, "KodakLog"),
+        (4, "Unspecified video"),
+        (9, "NTSC composite video"),
+        (10, "PAL composite video"),
+        (11, "Z depth linear"),
+        (12, "Z depth homogeneous"),
+        (13, "ADX"),
+    ] {
+        let e = scan_of_transfer(&folder, code).unwrap_err();
+        let expected = format!("colour space {name}, expected linear, sRGB or Rec709");
+        assert!(e.contains(&expected), "transfer {code}: {e}");
+    }
+}
+
+/// The header of a film scan: linear RGB of 10 bits, a pixel in four bytes.
+fn scan_header([width, height]: [u32; 2]) -> Vec<u8> {
+    const DATA: u32 = 2048;
+    let mut header = vec![0_u8; DATA as usize];
+    let mut put = |at: usize, bytes: &[u8]| header[at..at + bytes.len()].copy_from_slice(bytes);
+    put(0, b"SDPX");
+    put(4, &DATA.to_be_bytes());
+    put(8, b"V1.0");
+    put(16, &(DATA + 4 * width * height).to_be_bytes());
+    // One element.
+    put(770, &[0, 1]);
+    put(772, &width.to_be_bytes());
+    put(776, &height.to_be_bytes());
+    // RGB, linear, of any colorimetry, 10 bits, filled to words by method A.
+    put(800, &[50, 2, 0, 10, 0, 1]);
+    put(808, &DATA.to_be_bytes());
+    header
+}
+
+/// More than the 256 MiB that a worker has beside the pictures it has prepared for.
+#[test]
+fn a_worker_decodes_a_picture_larger_than_its_own_needs() {
+    let [width, height] = [8192, 5600];
+    let header = scan_header([width, height]);
+    let pixels = u64::from(width * height);
+    let mut worker = start_worker();
+    let mut stdin = worker.stdin.take().unwrap();
+    let request = pixel_request("dpx", header.len() as u64 + 4 * pixels);
+    stdin.write_all(request.as_bytes()).unwrap();
+    stdin.write_all(&header).unwrap();
+    std::io::copy(&mut std::io::repeat(0).take(4 * pixels), &mut stdin).unwrap();
+    drop(stdin);
+    let mut stdout = BufReader::new(worker.stdout.take().unwrap());
+    let mut told = String::new();
+    for _ in 0..3 {
+        stdout.read_line(&mut told).unwrap();
+    }
+    let last = told.lines().last().unwrap();
+    assert!(last.starts_with("{\"picture\":"), "{told}");
+    let samples = std::io::copy(&mut stdout, &mut std::io::sink()).unwrap();
+    assert_eq!(samples, pixels * 3 * 2);
+    assert!(worker.wait().unwrap().success());
+}
+
+fn start_worker() -> Child {
+    Command::new(env!("CARGO_BIN_EXE_petcomp-oiio-worker"))
+        // What it really takes is a small part of what it might.
+        .arg(r#"{"memory_percent":10000}"#)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+fn pixel_request(format: &str, bytes: u64) -> String {
+    format!(
+        "{{\"format\":\"{format}\",\"ask\":{{\"pixels\":{{\"wanted\":\"color\",\"window\":\"display\"}}}},\"bytes\":{bytes}}}\n"
+    )
+}
+
 /// Large pictures have more time, which begins with the shape.
 #[test]
 fn a_worker_tells_the_shape_before_it_decodes() {
     let whole = palette_tiff();
     let cut = &whole[..whole.len() - 2];
-    let request = format!(
-        "{{\"format\":\"tiff\",\"ask\":{{\"pixels\":{{\"wanted\":\"color\",\"window\":\"display\"}}}},\"bytes\":{}}}\n",
-        cut.len()
-    );
-    let mut worker = Command::new(env!("CARGO_BIN_EXE_petcomp-oiio-worker"))
-        .arg("{}")
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let request = pixel_request("tiff", cut.len() as u64);
+    let mut worker = start_worker();
     let mut stdin = worker.stdin.take().unwrap();
     stdin.write_all(request.as_bytes()).unwrap();
     stdin.write_all(cut).unwrap();

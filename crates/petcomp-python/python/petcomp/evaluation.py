@@ -17,16 +17,12 @@ from .pipeline import _number
 
 __all__ = ["Metrics", "evaluate"]
 
-#: Of fewer rounds less than one is to be expected beyond either end of an interval.
-_LEAST_ROUNDS = 40
-
 
 class Metrics:
     """Scores of a detector: what ``petcomp eval`` writes as ``metrics.json``."""
 
-    def __init__(self, document: dict[str, Any], classes: list[str], rounds: int = 200) -> None:
+    def __init__(self, document: dict[str, Any], classes: list[str]) -> None:
         self._document = document
-        self._rounds = rounds
         #: Names of the classes, in order; empty where they are not known.
         self.classes = classes
 
@@ -39,11 +35,11 @@ class Metrics:
     def interval(self) -> tuple[float, float] | None:
         """Range of ``map`` by bootstrap over images, or over the sequences that they are of.
 
-        None of fewer than 40 rounds, and of a single sequence.
+        None of fewer than 40 rounds, and of fewer than two images, or sequences, that show something to be found.
         """
-        if self._rounds < _LEAST_ROUNDS or self._document.get("sequences") == 1:
-            return None
         record = self._document["map"]
+        if "low" not in record:
+            return None
         return float(record["low"]), float(record["high"])
 
     @property
@@ -84,7 +80,7 @@ def evaluate(
     with a ``data.yaml`` and no labels, for its images of validation. ``size`` (width and height, pixels) is for YOLO
     labels alone, which need it without images beside them, ``output`` is a folder for the whole report. Or both are
     lists, one mapping for each image: ``boxes`` (n x 4: left, top, right, bottom, pixels) and ``classes``
-    (n), of predictions ``scores`` (n), and of the truth, where some are neither to be found nor missed,
+    (n), of predictions ``scores`` (n, 0 to 1), and of the truth, where some are neither to be found nor missed,
     ``ignored`` (n, as of a ``Sample``). ``rounds`` of the bootstrap: 0 to 100000; fewer than
     40 give no interval.
     """
@@ -100,7 +96,7 @@ def evaluate(
             raise InvalidValueError("size, output: are for files, expected none for boxes in memory")
         text = _petcomp.evaluate_boxes(sheets, question)
     record = loaded(text)
-    return Metrics(record["metrics"], record["classes"], question[1])
+    return Metrics(record["metrics"], record["classes"])
 
 
 def _sheets(predictions: Any, truth: Any) -> list[Any]:

@@ -7,6 +7,7 @@ use crate::refusal::Answer;
 use petcomp::camera::{self, CameraFile, Label, LabelledPhoto, Solution, SolveError, SolveOptions};
 use petcomp::{Error, io};
 use serde::Serialize;
+use std::collections::BTreeSet;
 
 /// What became of one of the photos.
 #[derive(Serialize)]
@@ -34,11 +35,11 @@ impl JointPhoto {
     }
 }
 
-/// Solves the labels of photos, those of each camera together, and writes the cameras, as
-/// `petcomp camera joint` does. A label that cannot be read keeps no other from its camera.
+/// Solves the labels of photos, those of each camera together and each once, and writes the cameras,
+/// as `petcomp camera joint` does. A label that cannot be read keeps no other from its camera.
 pub(super) fn solve(folder: &Folder, photos: &[String]) -> Answer<Vec<JointPhoto>> {
     let (mut names, mut all, mut solved) = (Vec::new(), Vec::new(), Vec::new());
-    for photo in photos {
+    for photo in photos.iter().collect::<BTreeSet<_>>() {
         match labelled(folder, photo) {
             Ok(label) => {
                 names.push(photo.clone());
@@ -91,7 +92,7 @@ fn unsolved(names: &[String], error: &Error) -> Vec<JointPhoto> {
 /// A camera that fits and can see objects on the surface.
 fn usable(outcome: Result<Solution, SolveError>) -> petcomp::Result<Solution> {
     let solution = outcome.and_then(Solution::fitting)?;
-    camera::check_distance(&solution.camera)?;
+    camera::check_distance(&solution)?;
     camera::check_lens(&solution.camera, solution.k1())?;
     Ok(solution)
 }

@@ -1,13 +1,13 @@
 //! Label files: read or begun for a photo, and saved with their cameras.
 
-use super::photos::beside;
+use super::photos::{beside, file_name};
 use crate::folder::Folder;
 use crate::refusal::{Answer, Refusal};
 use axum::http::StatusCode;
 use petcomp::camera::{self, CameraFile, Label, LabelledPhoto, Solution, SolveOptions};
 use petcomp::{Error, io};
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Map, Value};
 use std::path::PathBuf;
 
 /// The label of a photo, as its file says it or as it begins.
@@ -90,11 +90,12 @@ pub(super) fn save(
 
 /// A label names the photo that it lies beside.
 fn check_photo(label: &Label, photo: &str) -> Answer<()> {
-    let file = photo.rsplit('/').next().unwrap_or(photo);
-    if label.image.file == file {
+    let (named, file) = (&label.image.file, file_name(photo));
+    if named == file {
         return Ok(());
     }
-    let what = format!("image.file: {}, expected {file}", label.image.file);
+    let place = beside(photo, "label.json");
+    let what = format!("{place}: image.file: {named}, expected {file}");
     Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
 }
 
@@ -122,32 +123,50 @@ fn with_remarks(text: &str, remarks: Value) -> serde_json::Result<String> {
     Ok(camera::with_folded_lists(&text) + "\n")
 }
 
-/// What a person has written for persons: keys that begin with `_`, and the tables that they are
-/// in. `_todo` is petcomp's own.
+/// What a person has written for persons: keys that begin with `_`, and the tables and lists that
+/// they are in. `_todo` is petcomp's own.
 fn remarks_of(value: Value) -> Value {
-    let Value::Object(table) = value else {
-        return Value::Null;
-    };
-    let kept = table.into_iter().filter_map(|(key, value)| {
-        let kept = if key.starts_with('_') && key != "_todo" {
-            value
-        } else {
-            remarks_of(value)
-        };
-        let is_empty = kept.is_null() || kept.as_object().is_some_and(serde_json::Map::is_empty);
-        (!is_empty).then_some((key, kept))
-    });
-    Value::Object(kept.collect())
+    match value {
+        Value::Object(table) => Value::Object(table.into_iter().filter_map(remark_at).collect()),
+        Value::Array(items) => Value::Array(items.into_iter().map(remarks_of).collect()),
+        _ => Value::Null,
+    }
 }
 
-/// Puts remarks where they were.
+/// A key that is a remark, or has remarks in it.
+fn remark_at((key, value): (String, Value)) -> Option<(String, Value)> {
+    if key.starts_with('_') && key != "_todo" {
+        return Some((key, value));
+    }
+    let remarks = remarks_of(value);
+    (!is_without_remarks(&remarks)).then_some((key, remarks))
+}
+
+fn is_without_remarks(remarks: &Value) -> bool {
+    match remarks {
+        Value::Object(table) => table.is_empty(),
+        Value::Array(items) => items.iter().all(is_without_remarks),
+        _ => true,
+    }
+}
+
+/// Puts remarks where they were; not into a list of another length, whose items are others.
 fn merge(label: &mut Value, remarks: Value) {
-    let (Value::Object(label), Value::Object(remarks)) = (label, remarks) else {
-        return;
-    };
+    match (label, remarks) {
+        (Value::Object(label), Value::Object(remarks)) => merge_tables(label, remarks),
+        (Value::Array(label), Value::Array(remarks)) if label.len() == remarks.len() => {
+            for (item, remarks) in label.iter_mut().zip(remarks) {
+                merge(item, remarks);
+            }
+        }
+        _ => {}
+    }
+}
+
+fn merge_tables(label: &mut Map<String, Value>, remarks: Map<String, Value>) {
     for (key, value) in remarks {
         match label.get_mut(&key) {
-            Some(table) => merge(table, value),
+            Some(part) => merge(part, value),
             None if key.starts_with('_') => drop(label.insert(key, value)),
             None => {}
         }
@@ -179,7 +198,13 @@ fn write_camera(folder: &Folder, photo: &str) -> Answer<String> {
 pub(super) fn labelled(folder: &Folder, photo: &str) -> Answer<LabelledPhoto> {
     let mut labels = camera::read_labels(path(folder, photo)?, None)?;
     match labels.len() {
-        1 => Ok(labels.remove(0)),
+        1 => {
+            let label = labels.remove(0);
+            if !label.label.image.file.is_empty() {
+                check_photo(&label.label, photo)?;
+            }
+            Ok(label)
+        }
         n => {
             let what = format!("{}: {n} labels, expected one", beside(photo, "label.json"));
             Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
@@ -192,7 +217,7 @@ fn solved(labelled: &LabelledPhoto) -> Answer<Solution> {
     let solution = camera::solve(&labelled.label, &SolveOptions::default())
         .and_then(Solution::fitting)
         .map_err(Error::from)?;
-    camera::check_distance(&solution.camera)?;
+    camera::check_distance(&solution)?;
     camera::check_lens(&solution.camera, solution.k1())?;
     Ok(solution)
 }
@@ -211,5 +236,20 @@ mod tests {
         let expected =
             json!({ "_by": "Ada", "image": { "file": "a.jpg", "_lens": 2 }, "camera": {} });
         assert_eq!(after, expected);
+    }
+
+    #[test]
+    fn remarks_stay_in_lists_of_the_same_length() {
+        let before = json!({ "points": [{ "px": [1, 2] }, { "px": [3, 4], "_why": "a scratch" }] });
+        let merged = |mut after: Value| {
+            merge(&mut after, remarks_of(before.clone()));
+            after
+        };
+        let moved = merged(json!({ "points": [{ "px": [5, 6] }, { "px": [7, 8] }] }));
+        let expected =
+            json!({ "points": [{ "px": [5, 6] }, { "px": [7, 8], "_why": "a scratch" }] });
+        assert_eq!(moved, expected);
+        let other = json!({ "points": [{ "px": [7, 8] }] });
+        assert_eq!(merged(other.clone()), other);
     }
 }

@@ -2,7 +2,9 @@
 
 use crate::folder::Folder;
 use crate::photos::{is_list, parent_of, photos};
+use petcomp::io;
 use serde::Serialize;
+use serde_json::Value;
 use std::collections::BTreeSet;
 
 /// A photo, and how far it is.
@@ -12,16 +14,25 @@ pub(super) struct PhotoProgress {
     photo: String,
     label: bool,
     camera: bool,
+    /// The label beside it is another photo's.
+    taken: bool,
 }
 
 /// All photos below a folder, in order of name; those of objects, which a list names, come last.
 pub(super) fn list(folder: &Folder) -> Vec<PhotoProgress> {
     let json = folder.find(|path| path.extension().is_some_and(|ending| ending == "json"));
     let documents: BTreeSet<String> = json.into_iter().collect();
-    let entry = |photo: String| PhotoProgress {
-        label: documents.contains(&beside(&photo, "label.json")),
-        camera: documents.contains(&beside(&photo, "camera.json")),
-        photo,
+    let entry = |photo: String| {
+        let label = beside(&photo, "label.json");
+        let has_label = documents.contains(&label);
+        // Of photos that differ in their endings alone, the label and its camera are of one.
+        let is_anothers = has_label && names_another(folder, &label, &photo);
+        PhotoProgress {
+            label: has_label && !is_anothers,
+            camera: !is_anothers && documents.contains(&beside(&photo, "camera.json")),
+            taken: is_anothers,
+            photo,
+        }
     };
     photos_of_places_first(folder)
         .into_iter()
@@ -35,6 +46,22 @@ fn photos_of_places_first(folder: &Folder) -> Vec<String> {
     let of_objects: BTreeSet<&str> = lists.iter().map(|list| parent_of(list)).collect();
     photos.sort_by_key(|photo| of_objects.contains(parent_of(photo)));
     photos
+}
+
+/// Whether the label beside a photo is of another one. Of one that cannot be read nobody knows: it
+/// stays with the photo, whose page says what is wrong with it.
+fn names_another(folder: &Folder, label: &str, photo: &str) -> bool {
+    let path = folder.file(label).ok();
+    let label = path.and_then(|path| io::read_json::<Value>(path).ok());
+    let named = label
+        .as_ref()
+        .and_then(|label| label["image"]["file"].as_str());
+    named.is_some_and(|named| !named.is_empty() && named != file_name(photo))
+}
+
+/// `a.jpg` of `sub/a.jpg`: what the label beside it calls it.
+pub(super) fn file_name(photo: &str) -> &str {
+    photo.rsplit('/').next().unwrap_or(photo)
 }
 
 /// `sub/a.label.json` of `sub/a.jpg`.

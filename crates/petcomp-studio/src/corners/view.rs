@@ -38,7 +38,7 @@ impl CameraSummary {
     pub(super) fn of(label: &Label) -> Answer<Self> {
         let options = SolveOptions::default();
         let solution = camera::solve(label, &options).map_err(Error::from)?;
-        camera::check_distance(&solution.camera)?;
+        camera::check_distance(&solution)?;
         camera::check_lens(&solution.camera, solution.k1())?;
         Ok(Self {
             advice: camera::doctor(label, &solution, &options)

@@ -41,25 +41,25 @@ pub(super) enum Order {
 }
 
 impl Order {
-    /// It takes what all records say.
-    pub(super) fn needs_facts(self) -> bool {
-        matches!(self, Self::Unlike | Self::LeastVisible)
+    /// It takes what the records say and the list does not.
+    pub(super) fn needs_facts(self, index: &DatasetIndex) -> bool {
+        match self {
+            Self::Listed => false,
+            Self::MostObjects | Self::FewestObjects => !lists_objects(index),
+            Self::Unlike | Self::LeastVisible => true,
+        }
     }
 }
 
 impl Filter {
     /// It takes what the records say and the list does not.
     pub(super) fn needs_facts(&self, index: &DatasetIndex) -> bool {
-        let lists_objects = index
-            .pictures
-            .iter()
-            .all(|picture| picture.written.is_some());
         let by_count = self.objects.is_some() || self.flag.is_some() || self.class.is_some();
         self.visible.is_some()
             || self.background.is_some()
             || self.labelled.is_some()
             || matches!(self.flag, Some(Flag::Distractors | Flag::Unreadable))
-            || (by_count && !lists_objects)
+            || (by_count && !lists_objects(index))
     }
 
     /// Whether a picture is wanted; none where that is not known yet.
@@ -106,6 +106,12 @@ impl Filter {
     }
 }
 
+/// Whether the list says how many objects each picture has.
+fn lists_objects(index: &DatasetIndex) -> bool {
+    let mut pictures = index.pictures.iter();
+    pictures.all(|picture| picture.written.is_some())
+}
+
 /// Whether a picture has so many objects, both ends included; none where that is not known yet.
 fn has_count(catalog: &Catalog, row: usize, [least, most]: [usize; 2]) -> Option<bool> {
     let [objects, _] = catalog.counts(row)?;
@@ -145,4 +151,33 @@ fn least_visible(catalog: &Catalog, row: usize) -> f32 {
     objects
         .filter_map(|object| object.visible)
         .fold(1.0, f32::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::catalog::Catalogs;
+    use super::*;
+    use crate::folder::Folder;
+
+    #[test]
+    fn pictures_of_another_program_are_read_to_be_sorted_by_their_objects() {
+        let dir = tempfile::tempdir().unwrap();
+        let one = "0 0.5 0.5 0.2 0.1\n";
+        for (name, label) in [("a", one.to_owned()), ("b", one.repeat(2))] {
+            std::fs::write(dir.path().join(name).with_extension("png"), "").unwrap();
+            std::fs::write(dir.path().join(name).with_extension("txt"), label).unwrap();
+        }
+        let folder = Folder::open(dir.path()).unwrap();
+        let catalog = Catalogs::default().open(&folder, "").unwrap();
+        let orders = [
+            (Order::MostObjects, [1_usize, 0]),
+            (Order::FewestObjects, [0, 1]),
+        ];
+        for (order, sorted) in orders {
+            assert!(order.needs_facts(&catalog.index));
+            assert!((0..2).all(|row| catalog.facts(row).is_some()));
+            assert_eq!(found(&catalog, &Filter::default(), order).0, sorted);
+        }
+        assert!(!Order::Listed.needs_facts(&catalog.index));
+    }
 }

@@ -144,7 +144,8 @@ async fn find(
     blocking(move || {
         let catalogs = &studio.dataset.catalogs;
         let catalog = catalogs.get(&studio.folder, &wanted.folder, wanted.listing)?;
-        let must_read = wanted.filter.needs_facts(&catalog.index) || wanted.order.needs_facts();
+        let index = &catalog.index;
+        let must_read = wanted.filter.needs_facts(index) || wanted.order.needs_facts(index);
         if must_read {
             catalog.read_in_background();
         }

@@ -12,7 +12,7 @@ use petcomp::asset::{List, PhotoEntry, ScreenSource, Verdict};
 use petcomp::matte::CutOutOptions;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::path::{Component, Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// An entry of a list: where that is and which photo it names, with slashes from the folder.
@@ -47,30 +47,17 @@ fn read_list(folder: &Folder, name: &str) -> Answer<List> {
 
 /// The photo of an entry, as browsers say it.
 fn photo_name(folder: &Folder, entry: &PhotoEntry) -> String {
-    folder.name_of(&straightened(&entry.file))
+    folder.name_of_listed(&entry.file)
 }
 
 /// An entry whose pictures lie in the folder.
 fn inside(folder: &Folder, mut entry: PhotoEntry) -> Answer<PhotoEntry> {
     entry.file = folder.file(&photo_name(folder, &entry))?;
     if let ScreenSource::Photo(empty) = &entry.screen {
-        let name = folder.name_of(&straightened(empty));
+        let name = folder.name_of_listed(empty);
         entry.screen = ScreenSource::Photo(folder.file(&name)?);
     }
     Ok(entry)
-}
-
-/// `a/c.jpg` of `a/b/../c.jpg`.
-fn straightened(path: &Path) -> PathBuf {
-    let mut straight = PathBuf::new();
-    for part in path.components() {
-        match (part, straight.file_name().is_some()) {
-            (Component::ParentDir, true) => drop(straight.pop()),
-            (Component::CurDir, _) => {}
-            _ => straight.push(part),
-        }
-    }
-    straight
 }
 
 /// What can be looked at.

@@ -4,11 +4,11 @@
 use crate::folder::Folder;
 use crate::refusal::{Answer, Refusal};
 use axum::http::StatusCode;
-use petcomp::asset::{Manifest, PhotoEntry, with_actual_spelling};
-use petcomp::{Error, io};
+use petcomp::Error;
+use petcomp::asset::{List, Manifest, PhotoEntry, with_actual_spelling};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use toml::{Table, Value};
 
 const LIST_NAME: &str = "photos.toml";
@@ -74,7 +74,7 @@ pub(super) fn read(folder: &Folder, photo: &str) -> Answer<VersionedEntry> {
         });
     };
     let entries = entries_of(&versioned.text, &list)?;
-    let file = listed_name(&entries, &folder.file(photo)?).unwrap_or(file.into());
+    let file = listed_name(folder, &entries, photo)?.unwrap_or(file.into());
     Ok(VersionedEntry {
         list,
         version: Some(versioned.version),
@@ -82,17 +82,19 @@ pub(super) fn read(folder: &Folder, photo: &str) -> Answer<VersionedEntry> {
     })
 }
 
-/// What a list calls a photo beside it.
-fn listed_name(entries: &[Table], photo: &Path) -> Option<String> {
+/// What the list beside a photo calls it.
+fn listed_name(folder: &Folder, entries: &[Table], photo: &str) -> Answer<Option<String>> {
+    let path = folder.file(photo)?;
     let mut files = entries.iter().filter_map(file_of);
-    let name = files.find(|file| photo_beside(photo, file).is_some_and(|path| path == photo));
-    name.map(str::to_owned)
+    let name = files.find(|file| listed_photo(folder, &path, file) == photo);
+    Ok(name.map(str::to_owned))
 }
 
-/// The photo of a name in the list beside a file, as `asset build` finds it: in capitals, too.
-fn photo_beside(path: &Path, name: &str) -> Option<PathBuf> {
-    let photo = io::below(path.parent()?, name).ok()?;
-    Some(with_actual_spelling(photo))
+/// The photo of the studio that the list beside a file means by a path, as `asset build` finds it:
+/// in capitals, too.
+fn listed_photo(folder: &Folder, beside: &Path, path: &str) -> String {
+    let place = beside.parent().unwrap_or(Path::new(""));
+    folder.name_of_listed(&with_actual_spelling(place.join(path)))
 }
 
 /// The photos that have a scale, of some.
@@ -111,8 +113,7 @@ pub(super) fn scaled_photos(folder: &Folder, photos: &[String]) -> BTreeSet<Stri
             .iter()
             .filter(|entry| has_scale(entry))
             .filter_map(file_of);
-        let photos = files.filter_map(|file| photo_beside(&path, file));
-        scaled.extend(photos.map(|photo| folder.name_of(&photo)));
+        scaled.extend(files.map(|file| listed_photo(folder, &path, file)));
     }
     scaled
 }
@@ -157,12 +158,13 @@ pub(super) fn save(folder: &Folder, new: &ScaledPhoto<'_>, version: Option<&str>
         None => no_list(folder, &list)?,
     };
     let before = entries_of(&text, &list)?;
-    let file = listed_name(&before, &folder.file(new.photo)?).unwrap_or(file.into());
+    let file = listed_name(folder, &before, new.photo)?.unwrap_or(file.into());
     let changed = with_scale(&text, &file, new);
     let after = entries_of(&changed, &list)?;
     let classes = classes_of(&text, &list)?;
     let entry = changed_entry(&before, &after, &file, &list)?;
     check_entry(entry, classes, &list)?;
+    check_beside_others(&text, &changed, &list)?;
     folder.save(&list, &changed, version)?;
     Ok(())
 }
@@ -213,6 +215,21 @@ fn check_entry(entry: &Table, mut classes: Vec<String>, list: &str) -> Answer<()
         ..Manifest::default()
     };
     Ok(entry.check(&known).map_err(|e| e.in_file(list))?)
+}
+
+/// Fails where `asset build` would refuse a list that it took before. One that is not complete yet
+/// is completed photo by photo.
+fn check_beside_others(before: &str, after: &str, list: &str) -> Answer<()> {
+    match check_list(before, list) {
+        Ok(()) => Ok(check_list(after, list)?),
+        Err(_) => Ok(()),
+    }
+}
+
+fn check_list(text: &str, list: &str) -> petcomp::Result<()> {
+    let read: List = toml::from_str(text).map_err(|e| Error::file(list, e.message()))?;
+    let checked = read.check(&mut Manifest::default());
+    checked.map_err(|e| e.in_file(list))
 }
 
 /// The text of a list with the scale of a photo; remarks and everything else stay.
@@ -384,5 +401,43 @@ mod tests {
         let class = saved(LIST_NAME, declared, &cup("a.png", 2e3)).unwrap_err();
         let expected = "photos.toml: class: \"cup \"1\"\", expected one of cup, lid";
         assert_eq!(class, expected);
+    }
+
+    #[test]
+    fn a_photo_is_found_in_its_list_by_any_path() {
+        let dir = tempfile::tempdir().unwrap();
+        let absolute = dir.path().join("a.png");
+        std::fs::write(&absolute, "").unwrap();
+        let folder = Folder::open(dir.path()).unwrap();
+        for file in ["./a.png", "b/../a.png", absolute.to_str().unwrap()] {
+            let entry = |scale: &str| {
+                format!("[[photos]]\nfile = '{file}'\nasset = \"a\"\nclass = \"c\"\n{scale}\n")
+            };
+            std::fs::write(dir.path().join(LIST_NAME), entry("length = 0.2")).unwrap();
+            let version = read(&folder, "a.png").unwrap().version;
+            save(&folder, &cup("a.png", 2e3), version.as_deref()).unwrap();
+            let after = folder.read_text(LIST_NAME).unwrap().text;
+            assert_eq!(after, entry("px_per_metre = 2000.0"));
+            let scaled = scaled_photos(&folder, &["a.png".to_owned()]);
+            assert_eq!(scaled.into_iter().collect::<Vec<_>>(), ["a.png"]);
+        }
+    }
+
+    #[test]
+    fn a_list_that_a_build_takes_stays_one() {
+        let entry = |file: &str, scale: &str| {
+            format!("[[photos]]\nfile = \"{file}\"\nasset = \"a\"\nclass = \"c\"\n{scale}")
+        };
+        let lid = ScaledPhoto {
+            asset: "a",
+            class: "lid",
+            ..cup("b.png", 2e3)
+        };
+        let refused = saved(LIST_NAME, &entry("a.png", "length = 0.2\n"), &lid);
+        let expected =
+            "photos.toml: photos[1].class: \"lid\", but another photo of the asset has \"c\"";
+        assert_eq!(refused, Err(expected.to_owned()));
+        let incomplete = [entry("a.png", ""), entry("b.png", "")].concat();
+        assert!(saved(LIST_NAME, &incomplete, &lid).is_ok());
     }
 }

@@ -6,7 +6,7 @@ use super::chroma::{LUMINANCE_CHROMA, Sampling, to_rgb};
 use crate::color::RgbSpace;
 use crate::io::codec::channels::{ChannelMatch, Choice, Wanted, is_finished};
 use crate::io::codec::profile::{convert_primaries, to_rec709};
-use crate::io::codec::raster::{Raster, Samples};
+use crate::io::codec::raster::{Raster, Samples, overlap};
 use crate::io::codec::refusal::Refusal;
 use crate::io::format::Format;
 use crate::io::header::{Canvas, Header, Notes, Window};
@@ -15,6 +15,7 @@ use exr::meta::attribute::{AttributeValue, ChannelList, Chromaticities};
 use exr::prelude::{IntegerBounds, MetaData, Vec2};
 use std::borrow::Cow;
 use std::io::{BufReader, Read};
+use std::ops::Range;
 
 impl From<exr::error::Error> for Refusal {
     fn from(e: exr::error::Error) -> Self {
@@ -45,8 +46,8 @@ pub(crate) fn channels(
     limits: &Limits,
 ) -> Result<((usize, usize), Vec<Channel>), Refusal> {
     let file = CheckedFile::new(bytes, limits)?;
-    let part = file.flat_parts().next().ok_or("no part with pixels")?;
-    let names = file.channel_names(part);
+    let part = flat_parts(&file.meta).next().ok_or("no part with pixels")?;
+    let names = listed_names(&file.meta.headers[part].channels);
     let (width, height) = window_size(file.window());
     limits.check_memory(width, height, names.len())?;
     let picked: Vec<usize> = (0..names.len()).collect();
@@ -88,43 +89,6 @@ impl<'a> CheckedFile<'a> {
         })
     }
 
-    /// The parts whose pixels have one sample for each channel.
-    fn flat_parts(&self) -> impl Iterator<Item = usize> {
-        self.meta
-            .headers
-            .iter()
-            .enumerate()
-            .filter(|(_, header)| !header.deep)
-            .map(|(part, _)| part)
-    }
-
-    /// The part that has the wanted channels under the best names, of colours the finished picture
-    /// first, and their indices, each once.
-    fn best_part(&self, wanted: Wanted) -> Result<(usize, Vec<usize>), Refusal> {
-        let choices = self
-            .flat_parts()
-            .map(|part| (part, choose_channels(wanted, &self.channel_names(part))));
-        let best = choices.min_by_key(|(part, choice)| {
-            let is_first = wanted.is_color() && self.is_finished(*part);
-            (rank_of(choice), !is_first)
-        });
-        let (part, choice) = best.ok_or("no part with pixels")?;
-        let (_, mut picked) = choice?;
-        picked.dedup();
-        Ok((part, picked))
-    }
-
-    /// The part's own name says that it is the finished picture.
-    fn is_finished(&self, part: usize) -> bool {
-        let name = &self.meta.headers[part].own_attributes.layer_name;
-        name.as_ref()
-            .is_some_and(|name| is_finished(&string_of(name)))
-    }
-
-    fn channel_names(&self, part: usize) -> Vec<String> {
-        listed_names(&self.meta.headers[part].channels)
-    }
-
     fn picked_names(&self, part: usize, picked: &[usize]) -> Vec<String> {
         let list = &self.meta.headers[part].channels.list;
         picked.iter().map(|&i| string_of(&list[i].name)).collect()
@@ -141,6 +105,18 @@ impl<'a> CheckedFile<'a> {
             Window::Display => self.window(),
             Window::Data => data_window(&self.meta.headers[part]),
         }
+    }
+
+    /// Columns and rows of a window that a part stores.
+    fn stored_in(&self, part: usize, window: IntegerBounds) -> [Range<usize>; 2] {
+        let stored = data_window(&self.meta.headers[part]);
+        let (at, shown_at) = (stored.position, window.position);
+        let left = i64::from(at.x()) - i64::from(shown_at.x());
+        let top = i64::from(at.y()) - i64::from(shown_at.y());
+        [
+            overlap(left, stored.size.x(), window.size.x()),
+            overlap(top, stored.size.y(), window.size.y()),
+        ]
     }
 
     /// The primaries that are named, or ours.
@@ -170,6 +146,38 @@ impl<'a> CheckedFile<'a> {
             sampling: self.sampling.as_ref(),
         })
     }
+}
+
+/// The parts whose pixels have one sample for each channel.
+fn flat_parts(meta: &MetaData) -> impl Iterator<Item = usize> {
+    let parts = meta.headers.iter().enumerate();
+    parts
+        .filter(|(_, header)| !header.deep)
+        .map(|(part, _)| part)
+}
+
+/// The part that has the wanted channels under the best names, of colours the finished picture
+/// first, and their indices, each once.
+fn best_part(meta: &MetaData, wanted: Wanted) -> Result<(usize, Vec<usize>), Refusal> {
+    let choices = flat_parts(meta).map(|part| {
+        let names = listed_names(&meta.headers[part].channels);
+        (part, choose_channels(wanted, &names))
+    });
+    let best = choices.min_by_key(|(part, choice)| {
+        let is_first = wanted.is_color() && is_finished_part(&meta.headers[*part]);
+        (rank_of(choice), !is_first)
+    });
+    let (part, choice) = best.ok_or("no part with pixels")?;
+    let (_, mut picked) = choice?;
+    picked.dedup();
+    Ok((part, picked))
+}
+
+/// The part's own name says that it is the finished picture.
+fn is_finished_part(header: &exr::meta::header::Header) -> bool {
+    let name = &header.own_attributes.layer_name;
+    name.as_ref()
+        .is_some_and(|name| is_finished(&string_of(name)))
 }
 
 /// Parts without the channels come last: their error is given where no part has them.
@@ -275,6 +283,7 @@ pub(crate) fn header(
     let meta = read_meta(start.as_slice().chain(file), file_bytes, limits)?;
     let first = meta.headers.first().ok_or("no part with pixels")?;
     let (width, height) = window_size(first.shared_attributes.display_window);
+    let colored = best_part(&meta, Wanted::Color).map_or(first, |(part, _)| &meta.headers[part]);
     Ok(Header {
         format: Format::Exr,
         width,
@@ -282,8 +291,8 @@ pub(crate) fn header(
         canvas: canvas(first),
         channels: in_default_order(listed_names(&first.channels)),
         bits: 8 * widest_sample(&first.channels) as u32,
-        data_at: data_offset(first),
-        data_size: [first.layer_size.x(), first.layer_size.y()],
+        data_at: data_offset(colored),
+        data_size: [colored.layer_size.x(), colored.layer_size.y()],
         metadata: text_attributes(first),
         ..Header::default()
     })
@@ -381,7 +390,7 @@ pub(crate) fn decode(
     shown: Window,
 ) -> Result<Raster, Refusal> {
     let file = CheckedFile::new(bytes, limits)?;
-    let (part, picked) = file.best_part(wanted)?;
+    let (part, picked) = best_part(&file.meta, wanted)?;
     let window = file.window_of(part, shown);
     let (width, height) = window_size(window);
     limits.check_memory(width, height, picked.len())?;
@@ -391,6 +400,15 @@ pub(crate) fn decode(
     if are_colors(wanted, &picked) {
         convert_colors(&mut samples, &mut names, &file.space())?;
     }
+    let stored = file.stored_in(part, window);
+    if stored != [0..width, 0..height]
+        && let Some(extended) = names_with_alpha(wanted, &names)
+    {
+        limits.check_memory(width, height, extended.len())?;
+        affordable((width * height * extended.len()) as u64 * FLOAT_BYTES)?;
+        samples = add_alpha(&samples, names.len(), width, &stored);
+        names = extended;
+    }
     Ok(Raster {
         width,
         height,
@@ -399,6 +417,31 @@ pub(crate) fn decode(
         display_encoded: false,
         premultiplied: true,
     })
+}
+
+/// The channels of colours without alpha, and one for it behind them.
+fn names_with_alpha(wanted: Wanted, names: &[String]) -> Option<Vec<String>> {
+    let picks = |names: &[String]| wanted.pick(names).map_or(0, |picked| picked.len());
+    let layer = names[0].rfind('.').map_or("", |dot| &names[0][..=dot]);
+    let extended = [names, &[format!("{layer}A")]].concat();
+    let is_without = wanted.is_color() && picks(names) == 3 && picks(&extended) == 4;
+    is_without.then_some(extended)
+}
+
+/// Puts an alpha behind the samples of each pixel: 1 in the stored columns and rows, 0 elsewhere.
+fn add_alpha(
+    samples: &[f32],
+    channels: usize,
+    width: usize,
+    [columns, rows]: &[Range<usize>; 2],
+) -> Vec<f32> {
+    let mut out = Vec::with_capacity(samples.len() / channels * (channels + 1));
+    for (i, pixel) in samples.chunks_exact(channels).enumerate() {
+        let is_stored = columns.contains(&(i % width)) && rows.contains(&(i / width));
+        out.extend_from_slice(pixel);
+        out.push(f32::from(u8::from(is_stored)));
+    }
+    out
 }
 
 /// Luminance with its differences where there are those, and what is chosen of other channels
@@ -617,5 +660,66 @@ mod tests {
             ),
             (2, 3, [-1, 1], [2, 2])
         );
+    }
+
+    type FilePart = Layer<AnyChannels<exr::prelude::FlatSamples>>;
+
+    /// A part of one value, stored in so many pixels from the first of the display window on.
+    fn part(name: &str, channels: &[&str], (width, height): (usize, usize)) -> FilePart {
+        let plane = || float_samples(vec![0.5; width * height]);
+        let planes = channels.iter().map(|&name| AnyChannel::new(name, plane()));
+        Layer::new(
+            Vec2(width, height),
+            LayerAttributes::named(name),
+            Encoding::UNCOMPRESSED,
+            AnyChannels::sort(planes.collect()),
+        )
+    }
+
+    /// A file with a display window of 2 x 1 pixels.
+    fn file_of(parts: Vec<FilePart>) -> Vec<u8> {
+        let shown = IntegerBounds::from_dimensions(Vec2(2, 1));
+        let attributes = exr::prelude::ImageAttributes::new(shown);
+        let image = exr::prelude::Image::from_layers(attributes, parts);
+        let mut out = Cursor::new(Vec::new());
+        image.write().to_buffered(&mut out).unwrap();
+        out.into_inner()
+    }
+
+    #[test]
+    fn colours_without_alpha_are_transparent_where_nothing_is_stored() {
+        let read = |channels: &[&str], size, shown| {
+            let file = file_of(vec![part("a", channels, size)]);
+            let raster = decode(&file, &Limits::default(), Wanted::Color, shown).unwrap();
+            let Samples::F32(samples) = raster.samples else {
+                panic!("not floats")
+            };
+            (raster.names.join(" "), samples)
+        };
+        let [display, data] = [Window::Display, Window::Data];
+        let half = 0.5_f32;
+        let (names, samples) = read(&["R", "G", "B"], (1, 1), display);
+        assert_eq!(names.split(' ').count(), 4);
+        assert_eq!(samples, [half, half, half, 1.0, 0.0, 0.0, 0.0, 0.0]);
+        let grey = read(&["Y"], (1, 1), display);
+        assert_eq!(grey, ("Y A".into(), vec![half, 1.0, 0.0, 0.0]));
+        let layer = read(&["d.R", "d.G", "d.B"], (1, 1), display);
+        assert!(layer.0.ends_with("d.A"), "{}", layer.0);
+        // Nothing is missing, or alpha is there, or no other channel is.
+        assert_eq!(read(&["R", "G", "B"], (2, 1), display).1, [half; 6]);
+        assert_eq!(read(&["R", "G", "B"], (1, 1), data).1, [half; 3]);
+        assert_eq!(read(&["Y", "A"], (1, 1), display).1, [half, half, 0.0, 0.0]);
+        assert_eq!(read(&["A"], (1, 1), display), ("A".into(), vec![half, 0.0]));
+    }
+
+    #[test]
+    fn a_header_tells_what_is_stored_of_the_part_that_is_read() {
+        let file = file_of(vec![
+            part("depth", &["Z"], (2, 1)),
+            part("rgba", &["R", "G", "B"], (5, 3)),
+        ]);
+        let read = header(file.as_slice(), 10_000, &Limits::default()).unwrap();
+        assert_eq!((read.width, read.height), (2, 1));
+        assert_eq!((read.data_at, read.data_size), ([0, 0], [5, 3]));
     }
 }
