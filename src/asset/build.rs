@@ -208,21 +208,14 @@ fn cut_out_all<'a>(
         record
     };
     let mut outcomes = Vec::with_capacity(count);
-    for photos in list.photos.chunks(photos_at_once(&list.photos)) {
+    let files = list.photos.iter().map(|photo| &photo.file);
+    for photos in list
+        .photos
+        .chunks(io::pictures_at_once(files, BYTES_PER_PIXEL))
+    {
         outcomes.par_extend(photos.par_iter().map(write));
     }
     (outcomes, journal)
-}
-
-/// How many of these photos are worked on at once: all, if there is memory for one on each thread.
-fn photos_at_once(photos: &[PhotoEntry]) -> usize {
-    let files = photos.iter().map(|photo| &photo.file);
-    let fitting = io::pictures_at_once(files, BYTES_PER_PIXEL);
-    if fitting < rayon::current_num_threads() {
-        fitting
-    } else {
-        photos.len().max(1)
-    }
 }
 
 /// Takes the cut-outs of a list into the manifest as it is by now: another process may have changed

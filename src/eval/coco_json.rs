@@ -1,8 +1,6 @@
 //! Reads truth and detections from COCO JSON.
 
-use super::{
-    Detection, EvalImage, FARTHEST_PX, GroundTruth, Picture, is_confidence, no_confidence,
-};
+use super::{Detection, EvalImage, FARTHEST_PX, GroundTruth, Picture, check_confidence};
 use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::io;
@@ -335,14 +333,6 @@ fn corners([x, y, w, h]: [f64; 4]) -> Result<BBox> {
     Err(impossible_box([x, y, w, h]))
 }
 
-/// Fails for percents and logits, too.
-fn checked_score(score: f64) -> Result<f64> {
-    if is_confidence(score) {
-        return Ok(score);
-    }
-    Err(Error::value("score", no_confidence(score)))
-}
-
 fn area_of([_, _, w, h]: [f64; 4]) -> f64 {
     w * h
 }
@@ -374,11 +364,13 @@ impl CocoAnnotation {
 
 impl CocoDetection {
     fn to_detection(&self, class: u32) -> Result<Detection> {
+        let bbox = corners(self.bbox)?;
+        check_confidence(self.score).map_err(|what| Error::value("score", what))?;
         Ok(Detection {
             class,
-            bbox: corners(self.bbox)?,
+            bbox,
             box_area: area_of(self.bbox),
-            confidence: checked_score(self.score)?,
+            confidence: self.score,
         })
     }
 }

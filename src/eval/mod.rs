@@ -266,9 +266,16 @@ fn is_confidence(number: f64) -> bool {
     (0.0..=1.0).contains(&number)
 }
 
-/// What is wrong with a confidence that is none.
-fn no_confidence(number: f64) -> String {
-    format!("{number}, expected a confidence, 0 to 1")
+/// Fails for percents, logits and NaN, too.
+///
+/// # Errors
+/// The number, and what was expected.
+#[doc(hidden)]
+pub fn check_confidence(number: f64) -> std::result::Result<(), String> {
+    if is_confidence(number) {
+        return Ok(());
+    }
+    Err(format!("{number}, expected a confidence, 0 to 1"))
 }
 
 /// The lines of a text that are not blank, with their places in it.

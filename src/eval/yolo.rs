@@ -1,7 +1,8 @@
 //! Reads truth and detections from folders of YOLO text files.
 
 use super::{
-    Detection, EvalImage, GroundTruth, Picture, filled_lines, in_line, is_confidence, no_confidence,
+    Detection, EvalImage, GroundTruth, Picture, check_confidence, filled_lines, in_line,
+    is_confidence,
 };
 use crate::error::{Error, Result};
 use crate::geom::{BBox, Point2};
@@ -410,7 +411,8 @@ fn parse_row(line: &str, extra: usize) -> std::result::Result<LabelRow, String> 
     check_shares(place)?;
     let shares = box_around(place).ok_or_else(|| too_few(&numbers, extra))?;
     let confidence = rest.first().copied().unwrap_or(1.0);
-    check_confidence(confidence)?;
+    check_confidence(confidence)
+        .map_err(|what| format!("{what}; is it the id of a track? (save_conf=True)"))?;
     Ok(LabelRow {
         class,
         shares,
@@ -434,14 +436,6 @@ fn has_track_id(numbers: &[f64]) -> bool {
         }
         _ => false,
     }
-}
-
-fn check_confidence(number: f64) -> std::result::Result<(), String> {
-    if is_confidence(number) {
-        return Ok(());
-    }
-    let what = no_confidence(number);
-    Err(format!("{what}; is it the id of a track? (save_conf=True)"))
 }
 
 fn parse_class(text: &str) -> std::result::Result<u32, String> {

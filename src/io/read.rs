@@ -85,8 +85,9 @@ pub fn read_format(path: impl AsRef<Path>) -> Result<Format> {
     Ok(OpenedSource::open(path.as_ref(), &limits)?.format)
 }
 
-/// How many of these pictures may be worked on at once: as many as half of the machine's memory
-/// holds of the largest, one at least; any number where the memory or every size is unknown.
+/// How many pictures like these are worked on at once: as many as half of the machine's memory holds
+/// of the largest, one at least; any number where that is one on each thread, or memory or every
+/// size is unknown.
 #[doc(hidden)]
 pub fn pictures_at_once(
     paths: impl IntoIterator<Item = impl AsRef<Path>>,
@@ -95,7 +96,12 @@ pub fn pictures_at_once(
     let headers = paths.into_iter().filter_map(|path| read_header(path).ok());
     let pixels = headers.map(|header| (header.width * header.height) as u64);
     let largest = pixels.max().unwrap_or(0);
-    fitting_pictures(machine_bytes(), largest.saturating_mul(bytes_per_pixel))
+    let fitting = fitting_pictures(machine_bytes(), largest.saturating_mul(bytes_per_pixel));
+    if fitting < rayon::current_num_threads() {
+        fitting
+    } else {
+        usize::MAX
+    }
 }
 
 /// By our decoders.

@@ -5,7 +5,7 @@ use crate::errors::to_python;
 use crate::work;
 use petcomp::dataset::EvalTruth;
 use petcomp::eval::page::{self, EvalReportOptions, Metrics, Run};
-use petcomp::eval::{Detection, EvalImage, GroundTruth};
+use petcomp::eval::{Detection, EvalImage, GroundTruth, check_confidence};
 use petcomp::geom::BBox;
 use petcomp::{Error, Result};
 use pyo3::prelude::*;
@@ -128,11 +128,10 @@ fn check_boxes(sheets: &[Sheet]) -> Result<()> {
         for bbox in truth.chain(found.iter().map(|(_, bbox, _)| bbox)) {
             check_box(i, bbox)?;
         }
-        let is_confidence = |score: &f64| (0.0..=1.0).contains(score);
-        if let Some((_, _, score)) = found.iter().find(|(_, _, score)| !is_confidence(score)) {
-            let what = format!("{score}, expected a confidence, 0 to 1");
-            return Err(Error::value(format!("predictions[{i}].scores"), what));
-        }
+        found
+            .iter()
+            .try_for_each(|(_, _, score)| check_confidence(*score))
+            .map_err(|what| Error::value(format!("predictions[{i}].scores"), what))?;
     }
     Ok(())
 }

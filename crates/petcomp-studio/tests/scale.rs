@@ -5,21 +5,28 @@ mod browser;
 use browser::Browser;
 use browser::studio::{Studio, copy_files, samples};
 use petcomp::io;
+use tempfile::TempDir;
 
-#[test]
-fn two_ends_of_a_length_give_pixels_per_metre() {
-    let Some(mut browser) = Browser::open(1360, 860) else {
-        return;
-    };
+/// A browser that shows a photo of the sample bottles, their list in a folder of its own.
+fn opened_bottle() -> Option<(Browser, TempDir, Studio)> {
+    let mut browser = Browser::open(1360, 860)?;
     let dir = tempfile::tempdir().unwrap();
     copy_files(&samples("bottles"), dir.path(), |name| {
         name.ends_with("_0.png") || name == "photos.toml"
     });
-    let list = dir.path().join("photos.toml");
-    let before = io::read_text(&list).unwrap();
     let studio = Studio::over(dir.path());
     browser.go(&studio.page("scale?photo=b0000_0.png"));
     browser.wait("document.querySelector('#title').innerText === 'b0000_0.png'");
+    Some((browser, dir, studio))
+}
+
+#[test]
+fn two_ends_of_a_length_give_pixels_per_metre() {
+    let Some((mut browser, dir, _studio)) = opened_bottle() else {
+        return;
+    };
+    let list = dir.path().join("photos.toml");
+    let before = io::read_text(&list).unwrap();
     // What is mistyped beside one photo is in nobody's way beside another.
     let is_valid = "document.querySelector('#width').validity.valid";
     browser.fill("#width", "0,5,6");
@@ -65,17 +72,10 @@ fn two_ends_of_a_length_give_pixels_per_metre() {
 
 #[test]
 fn a_scale_is_saved_over_a_list_that_has_changed() {
-    let Some(mut browser) = Browser::open(1360, 860) else {
+    let Some((mut browser, dir, _studio)) = opened_bottle() else {
         return;
     };
-    let dir = tempfile::tempdir().unwrap();
-    copy_files(&samples("bottles"), dir.path(), |name| {
-        name.ends_with("_0.png") || name == "photos.toml"
-    });
     let list = dir.path().join("photos.toml");
-    let studio = Studio::over(dir.path());
-    browser.go(&studio.page("scale?photo=b0000_0.png"));
-    browser.wait("document.querySelector('#title').innerText === 'b0000_0.png'");
     let [left, top, width, height] = browser.place("#stage canvas");
     for x in [0.4, 0.6] {
         browser.click([left + x * width, top + 0.5 * height]);

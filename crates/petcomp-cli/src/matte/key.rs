@@ -281,7 +281,9 @@ impl KeyerWork<'_> {
                 progress.update(*done, count);
             }
         };
-        for some in frames.chunks(frames_at_once(frames)) {
+        // Frames are alike.
+        let first = frames.first().map(|files| &files.frame);
+        for some in frames.chunks(io::pictures_at_once(first, BYTES_PER_PIXEL)) {
             some.par_iter().for_each_init(Keyed::default, key);
         }
         drop(progress);
@@ -309,17 +311,6 @@ impl KeyerWork<'_> {
             Some(path) => write_picture(path, &keying.edges(&self.options)?, canvas),
             None => Ok(()),
         }
-    }
-}
-
-/// All, if there is memory for one on each thread. Frames are alike: the first is asked for its size.
-fn frames_at_once(frames: &[FrameFiles]) -> usize {
-    let first = frames.first().map(|files| &files.frame);
-    let fitting = io::pictures_at_once(first, BYTES_PER_PIXEL);
-    if fitting < rayon::current_num_threads() {
-        fitting
-    } else {
-        frames.len().max(1)
     }
 }
 
