@@ -37,18 +37,18 @@ pub(crate) trait Shared: Clone {
 pub(crate) struct LruCache<V: Shared> {
     most_bytes: usize,
     /// In the order in which they were used last.
-    entries: Mutex<Vec<Entry<V>>>,
+    entries: Mutex<Vec<Cached<V>>>,
 }
 
 #[derive(Debug)]
-struct Entry<V: Shared> {
+struct Cached<V: Shared> {
     name: String,
     /// None where somebody else has to hold it.
     kept: Option<V>,
     weak: V::Weak,
 }
 
-impl<V: Shared> Entry<V> {
+impl<V: Shared> Cached<V> {
     fn value(&self) -> Option<V> {
         self.kept.clone().or_else(|| V::upgrade(&self.weak))
     }
@@ -80,7 +80,7 @@ impl<V: Shared> LruCache<V> {
             return known;
         }
         entries.retain(|entry| entry.name != name && entry.value().is_some());
-        entries.push(Entry {
+        entries.push(Cached {
             name: name.to_owned(),
             kept: Some(value.clone()),
             weak: value.downgrade(),
@@ -91,20 +91,20 @@ impl<V: Shared> LruCache<V> {
 
     /// Keeps no more than its bytes. Large memory is given back without the lock: others wait for
     /// it, and a fork would for ever.
-    fn drop_oldest(&self, mut entries: MutexGuard<'_, Vec<Entry<V>>>) {
+    fn drop_oldest(&self, mut entries: MutexGuard<'_, Vec<Cached<V>>>) {
         let oldest = take_oldest(&mut entries, own_share(self.most_bytes));
         drop(entries);
         drop(oldest);
     }
 
-    fn entries(&self) -> MutexGuard<'_, Vec<Entry<V>>> {
+    fn entries(&self) -> MutexGuard<'_, Vec<Cached<V>>> {
         // Every change is whole, even where a thread panicked afterwards.
         self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// The value of a name, which is now the one used last.
-fn used<V: Shared>(entries: &mut [Entry<V>], name: &str) -> Option<V> {
+fn used<V: Shared>(entries: &mut [Cached<V>], name: &str) -> Option<V> {
     let place = entries.iter().position(|entry| entry.name == name)?;
     let value = entries[place].value()?;
     entries[place].kept = Some(value.clone());
@@ -113,9 +113,9 @@ fn used<V: Shared>(entries: &mut [Entry<V>], name: &str) -> Option<V> {
 }
 
 /// Takes out the values that were used longest ago, until the others take little enough memory.
-fn take_oldest<V: Shared>(entries: &mut [Entry<V>], most_bytes: usize) -> Vec<V> {
+fn take_oldest<V: Shared>(entries: &mut [Cached<V>], most_bytes: usize) -> Vec<V> {
     let mut taken = Vec::new();
-    let bytes = |entry: &Entry<V>| entry.kept.as_ref().map_or(0, V::bytes);
+    let bytes = |entry: &Cached<V>| entry.kept.as_ref().map_or(0, V::bytes);
     let mut total: usize = entries.iter().map(bytes).sum();
     let others = entries.len().saturating_sub(1);
     for entry in &mut entries[..others] {

@@ -6,7 +6,7 @@ use super::display::Display;
 use super::frame::Frame;
 use super::object::{Object, evidence};
 use super::recognise::{FramePhoto, refused};
-use super::solve::{BlackAndWhite, FilmInput, Noise};
+use super::solve::{BlackAndWhite, FilmInput, NoiseModel};
 use super::stack::{Alignment, Photos, Stack};
 use super::stripes::SeenStripes;
 use super::view::{View, grey};
@@ -171,12 +171,12 @@ impl<'a> CaptureScene<'a> {
     }
 
     /// That of the photos, and of those of the empty display.
-    fn noise(&self) -> Noise {
+    fn noise(&self) -> NoiseModel {
         let frames = self.frames();
         let noise = frames.noise(&self.free);
         let white = grey(mean_where(frames.empty_white, &self.free));
         let is_photographed = self.empty_stack.is_some();
-        Noise {
+        NoiseModel {
             empty: if is_photographed {
                 noise.of_white(white)
             } else {

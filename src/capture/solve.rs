@@ -52,12 +52,12 @@ impl BlackAndWhite<'_> {
     }
 
     /// How a photo's noise grows with light, by the free pixels of both frames.
-    pub(super) fn noise(&self, free: &Mask) -> Noise {
-        let black = Spread::of(self.black, self.empty_black, free);
-        let white = Spread::of(self.white, self.empty_white, free);
+    pub(super) fn noise(&self, free: &Mask) -> NoiseModel {
+        let black = FreeNoise::of(self.black, self.empty_black, free);
+        let white = FreeNoise::of(self.white, self.empty_white, free);
         let light = (white.light - black.light).max(self.least_light(free));
         let slope = ((white.variance - black.variance) / light).max(0.0);
-        Noise {
+        NoiseModel {
             dark: (black.variance - slope * black.light).max(0.0),
             slope,
             least: MIN_VARIANCE * self.brightest(free).powi(2),
@@ -71,7 +71,7 @@ pub(super) struct FilmInput<'a> {
     pub(super) frames: BlackAndWhite<'a>,
     /// Mean of all stripes with the object; empty where there are none.
     pub(super) stripes: &'a Image<LinearRgb>,
-    pub(super) noise: Noise,
+    pub(super) noise: NoiseModel,
     /// Least light of the display that a channel is divided by.
     pub(super) least_light: f32,
     /// Pixels that surely show the empty display.
@@ -96,14 +96,14 @@ struct Level {
 
 /// The line `seen = F + V empty` through all levels.
 #[derive(Clone, Copy, Default)]
-struct Line {
+struct LevelLine {
     middle: [f32; 2],
     slope: f32,
     /// Variance of the slope; infinite where one level is all there is.
     variance: f32,
 }
 
-impl Line {
+impl LevelLine {
     fn through(levels: [Level; 3]) -> Self {
         let sum = |f: &dyn Fn(&Level) -> f32| levels.iter().map(|l| l.weight * f(l)).sum::<f32>();
         let total = sum(&|_| 1.0).max(f32::MIN_POSITIVE);
@@ -133,7 +133,7 @@ impl FilmInput<'_> {
         let transmittance = lines.map(|lines| LinearRgb::from(lines.map(|line| line.slope)));
         let transmittance = filled(&transmittance, &clipped, inside);
         let film = lines.zip3_map(&transmittance, inside, |lines, v, inside| {
-            let reflected = lines.map(|Line { middle: [x, y], .. }| (x, y));
+            let reflected = lines.map(|LevelLine { middle: [x, y], .. }| (x, y));
             let v = v.channels();
             let reflected =
                 [0, 1, 2].map(|c: usize| (reflected[c].1 - v[c] * reflected[c].0).max(0.0));
@@ -147,7 +147,7 @@ impl FilmInput<'_> {
     }
 
     /// Of each channel.
-    fn lines(&self, at: (usize, usize), level: LinearRgb, clipped: bool) -> [Line; 3] {
+    fn lines(&self, at: (usize, usize), level: LinearRgb, clipped: bool) -> [LevelLine; 3] {
         let frames = &self.frames;
         let [black, white] =
             [frames.empty_black[at], frames.empty_white[at]].map(LinearRgb::channels);
@@ -168,7 +168,7 @@ impl FilmInput<'_> {
                 seen: stripes[c],
                 weight: STRIPE_PHOTOS * weight(stripes[c]),
             });
-            Line::through([
+            LevelLine::through([
                 Level {
                     empty: black[c],
                     seen: seen[0][c],
@@ -207,7 +207,7 @@ impl FilmInput<'_> {
         LinearRgb::from([0, 1, 2].map(of))
     }
 
-    fn sigma(&self, lines: &[Line; 3], film: Film, light: LinearRgb) -> f32 {
+    fn sigma(&self, lines: &[LevelLine; 3], film: Film, light: LinearRgb) -> f32 {
         if film == Film::default() {
             return 0.0;
         }
@@ -285,7 +285,7 @@ const MIN_VARIANCE: f32 = 5e-9;
 
 /// Variance of a pixel by its light.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Noise {
+pub(super) struct NoiseModel {
     pub(super) dark: f32,
     pub(super) slope: f32,
     /// What no photo is better than.
@@ -294,7 +294,7 @@ pub(super) struct Noise {
     pub(super) empty: f32,
 }
 
-impl Noise {
+impl NoiseModel {
     fn of(&self, light: f32) -> f32 {
         (self.dark + self.slope * light.max(0.0)).max(self.least)
     }
@@ -306,12 +306,12 @@ impl Noise {
 }
 
 /// Mean light and variance of free pixels.
-struct Spread {
+struct FreeNoise {
     light: f32,
     variance: f32,
 }
 
-impl Spread {
+impl FreeNoise {
     /// By the differences of neighbours, which a plate that is off does not change.
     fn of(seen: &Image<LinearRgb>, empty: &Image<LinearRgb>, free: &Mask) -> Self {
         let (w, h) = seen.size();

@@ -409,7 +409,7 @@ impl SoftPixel {
 }
 
 /// What an object sends and hides in a pixel.
-struct Effect {
+struct PixelEffect {
     light: LinearRgb,
     hidden: LinearRgb,
 }
@@ -426,11 +426,11 @@ impl SoftSample<'_> {
     ) -> (DeepSample, LinearRgb) {
         let SoftPixel { light, hidden, .. } = self.pixel;
         if apart == 0.0 {
-            return self.sample(Effect { light, hidden }, self.pixel.visible);
+            return self.sample(PixelEffect { light, hidden }, self.pixel.visible);
         }
         let behind = self.behind(through, at);
         let seen = self.pixel.visible * (1.0 - apart) + mean(behind.hidden) * apart;
-        let both = Effect {
+        let both = PixelEffect {
             light: mixed(light, behind.light, apart),
             hidden: mixed(hidden, behind.hidden, apart),
         };
@@ -438,16 +438,16 @@ impl SoftSample<'_> {
     }
 
     /// What it does behind what lets this much pass.
-    fn behind(&self, through: &mut LinearRgb, at: [usize; 2]) -> Effect {
+    fn behind(&self, through: &mut LinearRgb, at: [usize; 2]) -> PixelEffect {
         if through.r.max(through.g).max(through.b) < LEAST_ALPHA {
-            return Effect {
+            return PixelEffect {
                 light: LinearRgb::BLACK,
                 hidden: LinearRgb::BLACK,
             };
         }
         let alone = self.alone(at);
         let opacity = alone.hidden.map(|o| o.min(1.0));
-        let effect = Effect {
+        let effect = PixelEffect {
             light: alone.light * *through,
             hidden: opacity * *through,
         };
@@ -456,7 +456,7 @@ impl SoftSample<'_> {
     }
 
     /// What it would do if nothing hid it.
-    fn alone(&self, at: [usize; 2]) -> Effect {
+    fn alone(&self, at: [usize; 2]) -> PixelEffect {
         let known = self.pixel.visible > KNOWN_SHARE * self.pixel.alpha;
         let seen = if known {
             self.pixel
@@ -464,19 +464,19 @@ impl SoftSample<'_> {
             self.of.around(at)
         };
         if seen.visible <= 0.0 {
-            return Effect {
+            return PixelEffect {
                 light: LinearRgb::BLACK,
                 hidden: LinearRgb::grey(self.pixel.alpha),
             };
         }
         let whole = self.pixel.alpha / seen.visible;
-        Effect {
+        PixelEffect {
             light: seen.light.scale(whole),
             hidden: seen.hidden.scale(whole),
         }
     }
 
-    fn sample(&self, effect: Effect, visible: f32) -> (DeepSample, LinearRgb) {
+    fn sample(&self, effect: PixelEffect, visible: f32) -> (DeepSample, LinearRgb) {
         let alpha = self.pixel.alpha.min(1.0);
         let sample = DeepSample {
             object: self.of.object,

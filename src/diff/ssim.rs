@@ -56,7 +56,7 @@ pub(super) fn row_sums(
     rows: Range<usize>,
 ) -> Vec<[f64; 3]> {
     let channels =
-        [0, 1, 2].map(|c| Moments::new(&channel(a, c), &channel(b, c)).row_sums(rows.clone()));
+        [0, 1, 2].map(|c| WindowMeans::new(&channel(a, c), &channel(b, c)).row_sums(rows.clone()));
     (0..rows.len())
         .map(|y| [0, 1, 2].map(|c| channels[c][y]))
         .collect()
@@ -67,7 +67,7 @@ fn channel(image: &Image<[f32; 3]>, c: usize) -> Image<f32> {
 }
 
 /// Means over windows of one channel of two pictures, of its squares and of their product.
-struct Moments {
+struct WindowMeans {
     a: Image<f32>,
     b: Image<f32>,
     aa: Image<f32>,
@@ -75,7 +75,7 @@ struct Moments {
     ab: Image<f32>,
 }
 
-impl Moments {
+impl WindowMeans {
     fn new(a: &Image<f32>, b: &Image<f32>) -> Self {
         let window = WindowWeights::gaussian();
         Self {

@@ -88,7 +88,7 @@ fn rankings_by_area(sheets: &[EvalImage]) -> [Vec<Ranking>; 4] {
 
 impl CocoScores {
     /// From what was measured in all areas, and in each range of them.
-    fn from_measured([all, by_area @ ..]: &[Vec<Measured<'_>>; 4]) -> Self {
+    fn from_measured([all, by_area @ ..]: &[Vec<RangeScore<'_>>; 4]) -> Self {
         let by_area = by_area.each_ref();
         Self {
             ap_by_area: by_area.map(|m| over(m, |m| mean(m.ap))),
@@ -111,31 +111,31 @@ pub(super) fn scores(rankings: &[Ranking], weights: &[u32]) -> Scores {
     class_scores(&measured(rankings, weights))
 }
 
-fn class_scores(measured: &[Measured<'_>]) -> Scores {
+fn class_scores(measured: &[RangeScore<'_>]) -> Scores {
     Scores {
         definition: Definition::Coco,
-        classes: measured.iter().map(Measured::scores).collect(),
+        classes: measured.iter().map(RangeScore::scores).collect(),
     }
 }
 
 /// Average precision of a class at every threshold; none where there is nothing to find.
 pub(super) fn average_precision(ranking: &Ranking, weights: &[u32]) -> Option<[f64; THRESHOLDS]> {
-    Measured::new(ranking, weights).map(|measured| measured.ap)
+    RangeScore::new(ranking, weights).map(|measured| measured.ap)
 }
 
-fn measured<'a>(rankings: &'a [Ranking], weights: &'a [u32]) -> Vec<Measured<'a>> {
+fn measured<'a>(rankings: &'a [Ranking], weights: &'a [u32]) -> Vec<RangeScore<'a>> {
     rankings
         .par_iter()
-        .filter_map(|ranking| Measured::new(ranking, weights))
+        .filter_map(|ranking| RangeScore::new(ranking, weights))
         .collect()
 }
 
-fn over(measured: &[Measured<'_>], value: impl Fn(&Measured<'_>) -> f64) -> Option<f64> {
+fn over(measured: &[RangeScore<'_>], value: impl Fn(&RangeScore<'_>) -> f64) -> Option<f64> {
     (!measured.is_empty()).then(|| mean(measured.iter().map(value)))
 }
 
 /// A class in one range of sizes.
-struct Measured<'a> {
+struct RangeScore<'a> {
     ranking: &'a Ranking,
     weights: &'a [u32],
     truths: f64,
@@ -144,7 +144,7 @@ struct Measured<'a> {
     precision: f64,
 }
 
-impl<'a> Measured<'a> {
+impl<'a> RangeScore<'a> {
     /// None for a class without an object in the range.
     fn new(ranking: &'a Ranking, weights: &'a [u32]) -> Option<Self> {
         let truths = ranking.truths_to_find(weights)?;

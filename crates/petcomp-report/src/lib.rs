@@ -10,7 +10,6 @@ mod columns;
 mod diagram;
 pub mod display;
 pub mod encode;
-pub mod experiments;
 mod files;
 pub mod flags;
 pub mod keying;

@@ -116,10 +116,10 @@ impl<'a> Outline<'a> {
 
     /// Its edges are wider than it is looked for them, and looking farther is possible.
     fn has_cut_off_edges(&self) -> bool {
-        let sides = [0, 1, 2, 3].map(|first| Side::new(&self.search, &self.px, first));
+        let sides = [0, 1, 2, 3].map(|first| QuadSide::new(&self.search, &self.px, first));
         let spread = sides.iter().map(|side| side.spread(&self.search));
         let wide = WIDE_EDGE_SHARE * WIDE_EDGE_SHARE;
-        sides.iter().any(Side::is_capped) && spread.sum::<f64>() / 4.0 > wide
+        sides.iter().any(QuadSide::is_capped) && spread.sum::<f64>() / 4.0 > wide
     }
 
     /// Standard deviation of corners that have not settled, pixels.
@@ -313,7 +313,7 @@ fn edges_of_line<const CELLS: usize>(
 }
 
 /// A side of a dark quadrangle as it is looked for.
-struct Side {
+struct QuadSide {
     ends: [Point2<f64>; 2],
     outward: Vector2<f64>,
     /// How far it is looked for to either side, pixels.
@@ -322,7 +322,7 @@ struct Side {
     marker_reach: f64,
 }
 
-impl Side {
+impl QuadSide {
     /// The side from a corner to the next, dark on its right-hand side (clockwise corners, y down).
     fn new(search: &EdgeSearch, corners: &[Point2<f64>; 4], first: usize) -> Self {
         let [a, b, c, d] = [0, 1, 2, 3].map(|i| corners[(first + i) % 4]);
@@ -373,7 +373,7 @@ impl Side {
 
 /// The edge near a side.
 fn fitted_side(search: &EdgeSearch, corners: &[Point2<f64>; 4], first: usize) -> Option<Line> {
-    let side = Side::new(search, corners, first);
+    let side = QuadSide::new(search, corners, first);
     let points = side.feet().filter_map(|foot| {
         Some(foot + side.outward * crossing(search, foot, side.outward, side.reach)?)
     });

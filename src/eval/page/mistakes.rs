@@ -126,13 +126,13 @@ fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<F
     let mut figure = Figure::cropped(path, *size, view)
         .inspect_err(|error| log::warn!("{error}"))
         .ok()?;
-    figure.drawing = shown.drawing(&view, &Canvas::new(&figure, options));
+    figure.drawing = shown.drawing(&view, &FigureCanvas::new(&figure, options));
     figure.caption = shown.caption(options);
     Some(figure)
 }
 
 /// What all marks of a figure have in common.
-struct Canvas<'a> {
+struct FigureCanvas<'a> {
     /// Height of its letters, in pixels of the picture.
     letter: f64,
     /// Upper edge of what is seen.
@@ -140,7 +140,7 @@ struct Canvas<'a> {
     options: &'a EvalReportOptions,
 }
 
-impl<'a> Canvas<'a> {
+impl<'a> FigureCanvas<'a> {
     fn new(figure: &Figure, options: &'a EvalReportOptions) -> Self {
         Self {
             letter: figure.letter_height(),
@@ -198,7 +198,7 @@ impl<'a> ShownMistake<'a> {
         square_around(&both.unwrap_or_default(), size)
     }
 
-    fn drawing(&self, view: &BBox, canvas: &Canvas<'_>) -> String {
+    fn drawing(&self, view: &BBox, canvas: &FigureCanvas<'_>) -> String {
         let mut svg = self.other_marks(view, canvas);
         if let Some(truth) = self.truth {
             svg += &self.truth_mark(truth, canvas);
@@ -210,7 +210,7 @@ impl<'a> ShownMistake<'a> {
     }
 
     /// Boxes and detections that have no part in the mistake.
-    fn other_marks(&self, view: &BBox, canvas: &Canvas<'_>) -> String {
+    fn other_marks(&self, view: &BBox, canvas: &FigureCanvas<'_>) -> String {
         let mut svg = String::new();
         for truth in self.other_boxes(view) {
             let color = if truth.crowd { CROWD } else { TRUTH };
@@ -222,13 +222,13 @@ impl<'a> ShownMistake<'a> {
         svg
     }
 
-    fn truth_mark(&self, truth: &GroundTruth, canvas: &Canvas<'_>) -> String {
+    fn truth_mark(&self, truth: &GroundTruth, canvas: &FigureCanvas<'_>) -> String {
         let color = if self.is_miss() { WRONG } else { TRUTH };
         let words = format!("true: {}", canvas.class_name(truth.class));
         canvas.marked(&truth.bbox, &words, color, THICK)
     }
 
-    fn found_mark(&self, found: &Detection, canvas: &Canvas<'_>) -> String {
+    fn found_mark(&self, found: &Detection, canvas: &FigureCanvas<'_>) -> String {
         let (color, style) = self.found_style();
         let words = format!("{} {:.2}", canvas.class_name(found.class), found.confidence);
         // Apart from the words of the truth, which stand at the upper corner.

@@ -17,7 +17,7 @@ const MIN_LOPSIDED_DISTANCE: usize = 3;
 /// A matte grown or shrunk by a disc.
 pub(super) struct Dilate<'a> {
     source: Source<'a>,
-    shape: Disc,
+    shape: DiscSamples,
     extreme: Extreme,
     height: usize,
     /// For every row its runs of 1, 2, 4, ... samples, one after the other.
@@ -28,13 +28,13 @@ pub(super) struct Dilate<'a> {
 
 /// Which samples of a disc are looked at.
 #[derive(Clone, Copy, Debug)]
-struct Disc {
+struct DiscSamples {
     distance: usize,
     /// The right and the top tip are missing.
     lopsided: bool,
 }
 
-impl Disc {
+impl DiscSamples {
     /// How far the disc reaches to the left and to the right, `dy` rows from its centre (upwards
     /// positive).
     fn row_reach(self, dy: isize) -> Option<(usize, usize)> {
@@ -79,7 +79,7 @@ impl<'a> Dilate<'a> {
     ) -> Self {
         let distance = options.dilate_distance.unsigned_abs() as usize;
         let unlimited = options.profile.behaviour() == Behaviour::V45;
-        let shape = Disc {
+        let shape = DiscSamples {
             distance,
             lopsided: !unlimited && options.profile != Profile::Robust,
         };

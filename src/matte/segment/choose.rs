@@ -81,17 +81,17 @@ pub(super) fn best_search<'a>(
 }
 
 /// The first search that failed, where more than half of them did.
-fn first_of_many_failures(searched: &[SearchResult]) -> Option<usize> {
+fn first_of_many_failures(searched: &[SearchRun]) -> Option<usize> {
     let are_many = 2 * failures(searched).count() > searched.len();
     failures(searched).next().filter(|_| are_many)
 }
 
-fn failures(searched: &[SearchResult]) -> impl Iterator<Item = usize> {
+fn failures(searched: &[SearchRun]) -> impl Iterator<Item = usize> {
     (0..searched.len()).filter(|&i| searched[i].pass.is_err())
 }
 
 /// Support and agreement of each search.
-fn confidences(searched: &[SearchResult], size: (usize, usize)) -> Vec<Confidence> {
+fn confidences(searched: &[SearchRun], size: (usize, usize)) -> Vec<Confidence> {
     let areas: Vec<Option<Mask>> = searched.iter().map(|s| s.small_area(size)).collect();
     let confidence = searched.iter().enumerate().map(|(i, s)| Confidence {
         support: s.edge_support(),
@@ -104,7 +104,7 @@ fn confidences(searched: &[SearchResult], size: (usize, usize)) -> Vec<Confidenc
 /// The first search, finer pictures before coarser ones, that scores almost as well as the best; of
 /// those at a depth that was asked for, if one was.
 fn best_candidate(
-    searched: &[SearchResult],
+    searched: &[SearchRun],
     confidences: &[Confidence],
     levels: Option<usize>,
 ) -> usize {
@@ -193,20 +193,20 @@ fn usable_depths(depths: &[usize], longer: usize, asked: Option<usize>) -> Vec<u
 }
 
 /// One search and its setting.
-struct SearchResult {
+struct SearchRun {
     /// Which of the scales it was done at.
     scale: usize,
     levels: usize,
     pass: Result<Pass>,
 }
 
-fn searches(scales: &[SearchScale<'_>], options: &SegmentOptions) -> Vec<SearchResult> {
+fn searches(scales: &[SearchScale<'_>], options: &SegmentOptions) -> Vec<SearchRun> {
     let settings: Vec<(usize, usize)> = (0..scales.len())
         .flat_map(|i| scales[i].depths.iter().map(move |&levels| (i, levels)))
         .collect();
     settings
         .par_iter()
-        .map(|&(scale, levels)| SearchResult {
+        .map(|&(scale, levels)| SearchRun {
             scale,
             levels,
             pass: scales[scale].search.at_depth(levels, options),
@@ -222,7 +222,7 @@ const LAXER_FACTOR: f32 = 1.0 / STRICTER_FACTOR;
 /// How far a side of the hull's box moves, pixels of the whole picture: when edges must be stronger
 /// or the same picture is searched at another depth, and when edges may be weaker.
 fn drift_px(
-    searched: &[SearchResult],
+    searched: &[SearchRun],
     pick: usize,
     scales: &[SearchScale<'_>],
     options: &SegmentOptions,
@@ -242,12 +242,12 @@ fn drift_px(
 }
 
 /// What the searches of one picture size found.
-fn passes_at(searched: &[SearchResult], scale: usize) -> impl Iterator<Item = &Pass> {
+fn passes_at(searched: &[SearchRun], scale: usize) -> impl Iterator<Item = &Pass> {
     let same = searched.iter().filter(move |other| other.scale == scale);
     same.filter_map(|other| other.pass.as_ref().ok())
 }
 
-impl SearchResult {
+impl SearchRun {
     /// It was done at the depth that was asked for, if one was.
     fn is_candidate(&self, levels: Option<usize>) -> bool {
         levels.is_none_or(|levels| self.scale == 0 && self.levels == levels)

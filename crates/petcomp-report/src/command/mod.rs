@@ -2,7 +2,6 @@
 
 mod all;
 mod camera;
-mod experiments;
 mod flags;
 mod matte;
 mod render;
@@ -39,8 +38,6 @@ pub(crate) enum Command {
     Settle(settle::Args),
     /// Every stage on stiff and extreme input: stability.csv and stability.md
     Stability(stability::Args),
-    /// Our trained models beside the values of the paper, with intervals and a test
-    Experiments(experiments::Args),
     /// Error of the matting methods against run time, on photos with known mattes: matte.csv,
     /// matte.md, matte.svg, matte.html; and of captures over new backgrounds: display.csv,
     /// display.md
@@ -65,7 +62,6 @@ pub(crate) fn run(command: &Command, common: &ReportFlags) -> anyhow::Result<()>
         Camera(args) => camera::run(args, common),
         Settle(args) => settle::run(args, common),
         Stability(args) => stability::run(args, common),
-        Experiments(args) => experiments::run(args, common),
         Matte(args) => matte::run(args, common),
         Flags(args) => flags::run(args, common),
         Render(args) => render::run(args, common),
