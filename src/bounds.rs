@@ -78,10 +78,12 @@ impl Bounds {
         if self.contains(value) {
             return Ok(());
         }
-        Err(Error::value(
-            at,
-            format!("{}, expected {self}{}", number(value), self.question(value)),
-        ))
+        Err(Error::value(at, self.refusal(value)))
+    }
+
+    /// What is said of a number that is none of them.
+    pub(crate) fn refusal(&self, value: f64) -> String {
+        format!("{}, expected {self}{}", number(value), self.question(value))
     }
 
     /// Asks about the unit where another one would make sense of a length.

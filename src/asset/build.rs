@@ -1,6 +1,6 @@
 //! Many photos into an asset folder, from a list.
 
-use super::MANIFEST;
+use super::contact_sheet::remove_contact_sheet;
 use super::entry::PhotoEntry;
 use super::files;
 use super::folder::{CutOutWriter, is_rejected, lock, read_or_new, refusal, take_out};
@@ -9,6 +9,7 @@ use super::library::Library;
 use super::list::{List, check_not_written_over, check_reviews, find_list};
 use super::manifest::{Manifest, PhotoRecord};
 use super::screen_source::EmptyScreens;
+use super::{CONTACT_SHEET, MANIFEST};
 use crate::error::{Error, Result};
 use crate::io;
 use rayon::prelude::*;
@@ -51,9 +52,9 @@ pub struct Built {
 ///
 /// `progress` is called with the photos done and their number, at the start and after each photo,
 /// from several threads. What the folder has of other photos stays ([`Built::unlisted`]); a photo
-/// that it already has is replaced. The manifest does not depend on threads; it takes in what is
-/// done every 10 s, so that [`resume`] need not begin anew. Once `stop` is true, photos in hand are
-/// finished and no more are begun.
+/// that it already has is replaced, and a contact sheet of other cut-outs goes. The manifest does
+/// not depend on threads; it takes in what is done every 10 s, so that [`resume`] need not begin
+/// anew. Once `stop` is true, photos in hand are finished and no more are begun.
 ///
 /// # Errors
 /// A list that cannot be read or be right, or a photo that is missing or lies where a file of the
@@ -96,6 +97,22 @@ fn build_beside(
     known: &Manifest,
     list: &Path,
     folder: &Path,
+    progress: &(dyn Fn(usize, usize) + Sync),
+    stop: &AtomicBool,
+) -> Result<Built> {
+    let before = read_or_new(folder).ok();
+    let built = build_in(folder, known, list, progress, stop);
+    if read_or_new(folder).ok() != before {
+        // It shows other cut-outs than there are now.
+        remove_contact_sheet(&folder.join(CONTACT_SHEET), 0)?;
+    }
+    built
+}
+
+fn build_in(
+    folder: &Path,
+    known: &Manifest,
+    list: &Path,
     progress: &(dyn Fn(usize, usize) + Sync),
     stop: &AtomicBool,
 ) -> Result<Built> {
@@ -375,6 +392,24 @@ mod tests {
             error.contains("expected photos.toml or photos.csv in it"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn a_contact_sheet_of_other_cut_outs_goes() {
+        let folder = folder_with(TWO);
+        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        build(&list, &out, &|_, _| ()).unwrap();
+        let pages = [CONTACT_SHEET, "contact_sheet_2.png"].map(|name| out.join(name));
+        let left = || {
+            build(&list, &out, &|_, _| ()).unwrap();
+            pages.each_ref().map(|page| page.exists())
+        };
+        for page in &pages {
+            std::fs::write(page, "").unwrap();
+        }
+        assert_eq!(left(), [true; 2]);
+        std::fs::write(&list, TWO.replace("length = 0.3", "length = 0.2")).unwrap();
+        assert_eq!(left(), [false; 2]);
     }
 
     #[test]
@@ -928,6 +963,24 @@ mod tests {
             })
         };
         assert!(!needs_review("0.15") && needs_review("0.25"));
+    }
+
+    #[test]
+    fn a_size_that_no_scale_gives_is_stated_with_how_far_it_is_off() {
+        let list = TWO.replace("length = 0.3", "length = 0.3\nwidth = 0.25");
+        let library = built(&list).unwrap();
+        let record = &library.assets[0].photos[0].record;
+        let [length, width] = record.object_m;
+        let off = (length - 0.3).abs().max((width - 0.25).abs());
+        assert!(off > 0.03 && record.error_m >= off, "{record:?}");
+        let taken = format!("; taken as {:.1} x {:.1} mm", 1e3 * length, 1e3 * width);
+        assert!(
+            record
+                .diagnostics
+                .iter()
+                .any(|d| d.message.ends_with(&taken)),
+            "{record:?}"
+        );
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::texture::Texture;
 use super::thumbnail::{checkerboard, fitted_size};
 use crate::color::to_srgb8;
 use crate::draw::{self, TextSize};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, Mix, Srgb8};
@@ -70,6 +70,16 @@ pub fn contact_sheet_page(first: &Path, page: usize) -> PathBuf {
         name.push(extension);
     }
     first.with_file_name(name)
+}
+
+/// Deletes the pages of a contact sheet from one on, counted from 0.
+///
+/// # Errors
+/// [`Error::File`] for a page that cannot be deleted.
+pub fn remove_contact_sheet(first: &Path, from: usize) -> Result<()> {
+    let pages = (from..).map(|page| contact_sheet_page(first, page));
+    let mut left = pages.take_while(|page| page.exists());
+    left.try_for_each(|page| std::fs::remove_file(&page).map_err(|e| Error::file(page, e)))
 }
 
 fn photos_of(library: &Library) -> Vec<&Photo> {

@@ -75,7 +75,8 @@ pub struct PhotoRecord {
     /// Length and width of the object's tight outline, however it is turned, metres.
     pub object_m: [f64; 2],
     /// Standard error of these, metres: of the outline, and of the scale where a screen or marker
-    /// gives it; as large as the length where a stated size gives it though a part is missing.
+    /// gives it; with how far a stated length and width are from them; as large as the length where
+    /// a stated size gives the scale though a part is missing.
     #[serde(default)]
     pub error_m: f64,
     /// Length and width of the convex hull, which older manifests hold; ignored.

@@ -13,8 +13,8 @@ pub(super) struct MeasuredSize {
     pub(super) px_per_metre: f64,
     /// Length and width of the tight outline.
     pub(super) object_m: [f64; 2],
-    /// Standard error of the length; as large as the length where the scale is that of an object of
-    /// which a part is missing.
+    /// Standard error of both, with how far a given size is from them; as large as the length where
+    /// the scale is that of an object of which a part is missing.
     pub(super) error_m: f64,
     /// The given size does not fit the outline.
     pub(super) size_mismatch: Option<Diagnostic>,
@@ -38,13 +38,14 @@ impl MeasuredSize {
         let px_per_metre = scale_of_outline(tight, scale, screen.px_per_metre, cut.scale);
         let error_px = outline_error_px(cut, tight);
         let object_m = tight.map(|px| px / px_per_metre);
-        let error_m = libm::hypot(error_px / px_per_metre, screen.sigma * object_m[0]);
+        let measured_m = libm::hypot(error_px / px_per_metre, screen.sigma * object_m[0]);
+        let error_m = libm::hypot(measured_m, distance_from_given(object_m, scale));
         let is_of_a_part = cut.segmentation.is_truncated() && scale.is_of_object();
         Self {
             px_per_metre,
             object_m,
             error_m: if is_of_a_part { object_m[0] } else { error_m },
-            size_mismatch: size_mismatch(tight, error_px, scale),
+            size_mismatch: size_mismatch(tight, error_px, scale, object_m),
         }
     }
 }
@@ -65,6 +66,18 @@ fn least_squares_scale(tight: [f64; 2], [l, w]: [f64; 2]) -> f64 {
     (tight[0] * l + tight[1] * w) / (l * l + w * w)
 }
 
+/// How far length or width is from what a tape measured, metres: one scale cannot give both where
+/// the outline has other proportions.
+fn distance_from_given(object_m: [f64; 2], scale: Scale) -> f64 {
+    match scale {
+        Scale::Size(given) => {
+            let [length, width] = [0, 1].map(|side| (object_m[side] - given[side]).abs());
+            length.max(width)
+        }
+        _ => 0.0,
+    }
+}
+
 /// Standard error of the length of an outline, and how far its tips may lie beyond it, pixels of
 /// the cut-out.
 fn outline_error_px(cut: &CutOut, tight: [f64; 2]) -> f64 {
@@ -82,19 +95,28 @@ fn middle_px(cut: &CutOut) -> Point2<f64> {
     Point2::from(middle / cut.scale + Vector2::new(cut.roi.x as f64, cut.roi.y as f64))
 }
 
-/// The warning about a given size of other proportions than the outline.
-fn size_mismatch(tight: [f64; 2], error_px: f64, scale: Scale) -> Option<Diagnostic> {
+/// The warning about a given size of other proportions than the outline, with the size that was
+/// taken.
+fn size_mismatch(
+    tight: [f64; 2],
+    error_px: f64,
+    scale: Scale,
+    taken_m: [f64; 2],
+) -> Option<Diagnostic> {
     let Scale::Size([length, width]) = scale else {
         return None;
     };
     let (given, seen) = (width / length, tight[1] / tight[0]);
     let slack = PROPORTION_SLACK + error_px / tight[1];
-    ((given / seen - 1.0).abs() > slack).then(|| mismatch_warning(1.0 / seen, 1.0 / given))
+    ((given / seen - 1.0).abs() > slack).then(|| mismatch_warning(1.0 / seen, 1.0 / given, taken_m))
 }
 
 /// About lengths over widths.
-fn mismatch_warning(seen: f64, given: f64) -> Diagnostic {
-    let message =
-        format!("the outline is {seen:.2} times as long as wide, the given size {given:.2} times");
+fn mismatch_warning(seen: f64, given: f64, taken_m: [f64; 2]) -> Diagnostic {
+    let [length, width] = taken_m.map(|m| 1e3 * m);
+    let message = format!(
+        "the outline is {seen:.2} times as long as wide, the given size {given:.2} times; taken as \
+         {length:.1} x {width:.1} mm"
+    );
     Diagnostic::warning(Code::SizeMismatch, message)
 }

@@ -52,7 +52,7 @@ pub use build::{build, resume};
 #[doc(hidden)]
 pub use capture_entry::CaptureEntry;
 #[doc(hidden)]
-pub use contact_sheet::{contact_sheet_page, contact_sheets};
+pub use contact_sheet::{contact_sheet_page, contact_sheets, remove_contact_sheet};
 pub use entry::PhotoEntry;
 #[cfg(test)]
 pub(crate) use equirectangular::direction_to_uv;

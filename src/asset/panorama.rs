@@ -41,7 +41,14 @@ impl Panorama {
     /// is not twice as wide as high, naming the file.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let image: Image<LinearRgb> = io::read(path)?;
+        Self::of_file(io::read(path)?, path)
+    }
+
+    /// A panorama from the picture of a file.
+    ///
+    /// # Errors
+    /// Those of [`read`](Self::read) for a picture that was read.
+    pub(crate) fn of_file(image: Image<LinearRgb>, path: &Path) -> Result<Self> {
         check_shape(image.size()).map_err(|e| e.in_file(path))?;
         Self::new(image).map_err(|e| e.in_file(path))
     }

@@ -8,7 +8,7 @@ use crate::error::Error;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SolveError {
     /// A number is NaN or infinite.
-    #[error("{0} is not finite")]
+    #[error("{0}: not finite, expected a number")]
     NonFinite(&'static str),
     /// A number is too large, or too near to zero, to mean something.
     #[error(
@@ -61,9 +61,14 @@ pub enum SolveError {
         value: f64,
     },
     /// The albedo or the walls of a surface, the camera's height over it or its focal length are
-    /// none that it can have: which value, and what was expected.
-    #[error("{0}")]
-    OutOfBounds(String),
+    /// none that it can have.
+    #[error("{at}: {what}")]
+    OutOfBounds {
+        /// Which value.
+        at: String,
+        /// What it was, and what was expected.
+        what: String,
+    },
     /// There are points instead of corners, and not both sides: in words, which are missing.
     #[error("points alone need surface.width_m and surface.height_m: {0}")]
     PointsNeedSides(&'static str),
@@ -142,6 +147,21 @@ pub enum SolveError {
 }
 
 impl SolveError {
+    /// The field of a label whose value is impossible whatever the corners are; the message begins
+    /// with it.
+    fn impossible_field(&self) -> Option<&str> {
+        match self {
+            Self::NonFinite(at) | Self::OutOfRange { at, .. } | Self::NotPositive { at, .. } => {
+                Some(at)
+            }
+            Self::OutOfBounds { at, .. } => Some(at),
+            Self::BadImage(_) => Some("image"),
+            Self::CropOutside { .. } => Some("image.crop"),
+            Self::BadDimensions(_) => Some("surface"),
+            _ => None,
+        }
+    }
+
     /// The camera fits with width and height exchanged.
     pub(super) fn is_exchange(&self) -> bool {
         matches!(
@@ -182,8 +202,52 @@ fn remedy(exchanged: Option<[f64; 2]>, heights_m: Option<[f64; 2]>) -> String {
 
 impl From<SolveError> for Error {
     fn from(error: SolveError) -> Self {
-        Self::Camera {
-            what: error.to_string(),
+        let what = error.to_string();
+        let Some(at) = error.impossible_field() else {
+            return Self::Camera { what };
+        };
+        let place = format!("{at}: ");
+        Self::value(at, what.strip_prefix(&place).unwrap_or(&what))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_impossible_value_is_one_of_its_field() {
+        let impossible = [
+            SolveError::NonFinite("camera.k1"),
+            SolveError::OutOfRange {
+                at: "camera.k1",
+                value: 1e10,
+                most: 1e9,
+            },
+            SolveError::BadImage([0, 3]),
+            SolveError::CropOutside {
+                size: [4, 3],
+                offset_px: [1.0, 0.0],
+                whole: [4, 3],
+            },
+            SolveError::BadDimensions([-1.0, 1.0]),
+            SolveError::NotPositive {
+                at: "camera.focal_px",
+                value: -1.0,
+            },
+            SolveError::OutOfBounds {
+                at: "camera.focal_px".into(),
+                what: "26, expected 200 to 400000".into(),
+            },
+        ];
+        for refusal in impossible {
+            let message = refusal.to_string();
+            let Error::Value { at, what } = Error::from(refusal) else {
+                panic!("{message}")
+            };
+            assert_eq!(format!("{at}: {what}"), message);
         }
+        let folded = Error::from(SolveError::NotConvex);
+        assert!(matches!(folded, Error::Camera { .. }), "{folded}");
     }
 }

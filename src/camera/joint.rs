@@ -13,6 +13,8 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::Vector2;
 use std::cmp::Ordering;
 
+/// So many photos tell the distortion that they share from everything else; fewer do not.
+const LEAST_PHOTOS_FOR_KAPPA: usize = 4;
 /// One photo in this many may be left out.
 const PHOTOS_PER_OUTLIER: usize = 4;
 /// Focal lengths that photos of one lens state differ by no more, relative: the next one of a zoom
@@ -51,7 +53,8 @@ impl OutlierPhoto {
 }
 
 /// Solves photos of one camera together: they share focal length, principal point and distortion,
-/// and photos of one surface share its sides.
+/// and photos of one surface share its sides. Distortion is an unknown of four photos or more
+/// ([`Priors::joint_kappa_sigma`](super::Priors::joint_kappa_sigma)).
 ///
 /// The labels have to agree in the shape of their pictures; one may be a reduced copy. See
 /// [`group_by_camera`]. The principal point or the k1 that one of them states holds for all. A
@@ -64,6 +67,7 @@ impl OutlierPhoto {
 pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, SolveError> {
     refuse_different_cameras(labels)?;
     let labels = with_shared_lens(labels);
+    let options = &with_shared_kappa(options, labels.len());
     let photos = solve_alone(&labels, options)?;
     let solver = JointSolver {
         labels: &labels,
@@ -72,6 +76,15 @@ pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, So
     };
     let estimate = solver.without_wrong_exif()?;
     Ok(Joint::new(photos, estimate))
+}
+
+/// The options for so many photos of one lens.
+fn with_shared_kappa(options: &SolveOptions, photos: usize) -> SolveOptions {
+    let mut shared = options.clone();
+    if photos >= LEAST_PHOTOS_FOR_KAPPA {
+        shared.priors.kappa_sigma = options.priors.joint_kappa_sigma;
+    }
+    shared
 }
 
 /// What each photo gives.
@@ -173,14 +186,14 @@ impl JointSolver<'_> {
         let Some(conflict) = estimate.conflict else {
             return Ok(Some(estimate));
         };
-        if !conflict.is_with_exif() {
-            return Ok(Some(estimate.warned(&conflict.warning())));
+        let warned = |estimate: JointEstimate| {
+            let warning = conflict.warning(&estimate.solutions[0]);
+            estimate.warned(&warning)
+        };
+        match conflict.is_with_exif() {
+            true => Ok(self.without_exif()?.map(warned)),
+            false => Ok(Some(warned(estimate))),
         }
-        let second = self.without_exif()?;
-        Ok(second.map(|second| {
-            let conflict = conflict.solved_without(&second.solutions[0]);
-            second.warned(&conflict.warning())
-        }))
     }
 
     fn without_exif(&self) -> Result<Option<JointEstimate>, SolveError> {
@@ -509,6 +522,31 @@ mod tests {
                 s.camera.focal_px
             );
         }
+    }
+
+    #[test]
+    fn the_stated_error_of_a_lens_that_distorts_covers_the_truth() {
+        const GROUPS: u64 = 20;
+        let squared_pull = |k: u64| {
+            let (labels, focal) = labels(k, 16, [25.0, 40.0]);
+            let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
+            let solution = joint.photos[0].as_ref().unwrap();
+            // The photos' lens has 0.01 or -0.01.
+            let kappa = solution.kappa.abs();
+            assert!((0.004..0.016).contains(&kappa), "{k}: {kappa}");
+            let off = libm::log(solution.camera.focal_px.x / focal);
+            (off / solution.sigma.ln_focal).powi(2)
+        };
+        let mean = (0..GROUPS).map(squared_pull).sum::<f64>() / GROUPS as f64;
+        assert!(mean < 2.0, "{mean}");
+    }
+
+    #[test]
+    fn fewer_than_four_photos_are_a_pinhole_s() {
+        let (labels, _) = labels(1, 3, [25.0, 40.0]);
+        let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
+        let mut photos = joint.photos.iter().flatten();
+        assert!(photos.all(|solution| solution.kappa == 0.0));
     }
 
     #[test]

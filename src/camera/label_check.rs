@@ -110,16 +110,19 @@ fn check_length(
         String::new()
     };
     let [length, least, most] = [length, least, most].map(number);
-    Err(SolveError::OutOfBounds(format!(
-        "{at}: {length}, expected {least} to {most} for a picture of this size{asked}"
-    )))
+    Err(SolveError::OutOfBounds {
+        at: at.into(),
+        what: format!("{length}, expected {least} to {most} for a picture of this size{asked}"),
+    })
 }
 
 /// What is exact is there.
 fn check_fixed(camera: &LabelCamera) -> Result<(), SolveError> {
     if camera.focal_fixed && camera.focal_px.is_none() && camera.focal_35mm.is_none() {
-        let what = "camera.focal_fixed: true, expected camera.focal_px or focal_35mm beside it";
-        return Err(SolveError::OutOfBounds(what.into()));
+        return Err(SolveError::OutOfBounds {
+            at: "camera.focal_fixed".into(),
+            what: "true, expected camera.focal_px or focal_35mm beside it".into(),
+        });
     }
     Ok(())
 }
@@ -144,8 +147,13 @@ fn check_albedo(albedo: Option<Albedo>) -> Result<(), SolveError> {
 }
 
 fn check_within(at: &str, value: Option<f64>, bounds: &Bounds) -> Result<(), SolveError> {
-    let checked = value.map_or(Ok(()), |value| bounds.check(at, value));
-    checked.map_err(|error| SolveError::OutOfBounds(error.to_string()))
+    let Some(value) = value.filter(|&value| !bounds.contains(value)) else {
+        return Ok(());
+    };
+    Err(SolveError::OutOfBounds {
+        at: at.into(),
+        what: bounds.refusal(value),
+    })
 }
 
 /// Finite, and small enough for squares and products of a few of them.

@@ -86,7 +86,9 @@ pub use pinhole::Camera;
 pub use pinhole::distorted;
 pub use read::read_label;
 #[doc(hidden)]
-pub use read::{LabelledPhoto, check_distance, check_size, read_labels, with_photo};
+pub use read::{
+    LabelledPhoto, check_distance, check_size, is_called_camera, read_labels, with_photo,
+};
 pub(crate) use read::{apply_exif, check_camera_distance, labels_in};
 pub(crate) use rectangle::square_from_corners;
 pub use rectify::warp;

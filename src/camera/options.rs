@@ -54,6 +54,9 @@ pub struct Priors {
     pub ratio_sigma: f64,
     /// Of the radial distortion. Default: 0, the picture is a pinhole's.
     pub kappa_sigma: f64,
+    /// Of the radial distortion that four or more photos of one camera share, in place of that.
+    /// Default: 0.01, as lenses have it at the corner of the picture.
+    pub joint_kappa_sigma: f64,
 }
 
 impl Default for Priors {
@@ -64,6 +67,7 @@ impl Default for Priors {
             cropped_sigma: 0.12,
             ratio_sigma: 0.005,
             kappa_sigma: 0.0,
+            joint_kappa_sigma: 0.01,
         }
     }
 }
@@ -79,6 +83,7 @@ impl Priors {
             cropped_sigma: 0.0,
             ratio_sigma: 0.0,
             kappa_sigma: 0.0,
+            joint_kappa_sigma: 0.0,
             ..Self::default()
         }
     }

@@ -27,6 +27,9 @@ impl Camera {
     /// `height` is in metres; the principal point is the middle of the picture, `image` its width
     /// and height in pixels.
     ///
+    /// # Panics
+    /// When `height` is not above 0: from below it would look up.
+    ///
     /// ```
     /// use petcomp::Camera;
     /// use petcomp::geom::Point3;
@@ -35,6 +38,7 @@ impl Camera {
     /// assert!((px.x - 400.0).abs() < 1e-9 && (px.y - 240.0).abs() < 1e-9 && depth == 1.0);
     /// ```
     pub fn looking_down(height: f64, focal_px: f64, image: [u32; 2]) -> Self {
+        assert!(height > 0.0, "height: {height}, expected above 0 (metres)");
         Self::look_at(
             Point3::new(0.0, 0.0, height),
             Point3::origin(),
@@ -208,6 +212,12 @@ mod tests {
             principal_px: Point2::new(320.0, 236.0),
             camera_from_world: Pose::from_parts(Vector3::new(0.02, -0.03, 1.1).into(), tilt * down),
         }
+    }
+
+    #[test]
+    #[should_panic(expected = "height: -1, expected above 0 (metres)")]
+    fn no_camera_below_the_surface_looks_down() {
+        Camera::looking_down(-1.0, 80.0, [64, 48]);
     }
 
     #[test]

@@ -18,6 +18,8 @@ pub(crate) const LABEL_SUFFIX: &str = ".label.json";
 const OWN_FORMAT: &str = "plane-label";
 /// How camera files are named.
 const CAMERA_SUFFIX: &str = ".camera.json";
+/// What they say that they are.
+const CAMERA_FORMAT: &str = "plane-camera";
 /// Relative noise of a focal length that was recorded together with a digital zoom, or is reckoned
 /// from the resolution of a sensor: of a picture of half the size it is twice as long.
 const ROUGH_FOCAL_SIGMA: f64 = 0.25;
@@ -206,8 +208,13 @@ fn ends_with(path: &Path, suffix: &str) -> bool {
         .is_some_and(|name| name.to_string_lossy().ends_with(suffix))
 }
 
+/// A file that is called a camera, as patterns such as `*.json` take in beside the labels.
+pub fn is_called_camera(path: &Path) -> bool {
+    ends_with(path, CAMERA_SUFFIX)
+}
+
 fn may_be_label(path: &Path) -> bool {
-    let is_json = ends_with(path, ".json") && !ends_with(path, CAMERA_SUFFIX);
+    let is_json = ends_with(path, ".json") && !is_called_camera(path);
     (is_json || ends_with(path, ".xml")) && !io::is_apple_double(path)
 }
 
@@ -231,6 +238,12 @@ fn labels_if_any(path: &Path, size: Option<[f64; 2]>) -> Result<Option<Vec<Label
     labels_of(path, &text, annotations, size).map(Some)
 }
 
+/// The text is a camera that was solved from a label.
+fn is_camera(text: &str) -> bool {
+    text.contains(CAMERA_FORMAT)
+        && io::parse_json::<Value>(text).is_ok_and(|value| value["format"] == CAMERA_FORMAT)
+}
+
 /// The text is a label of ours, or an array of them.
 fn is_own_label(text: &str) -> bool {
     // Large files of other programs are not parsed once more.
@@ -246,14 +259,12 @@ fn says_where(label: &Value) -> bool {
     label["format"] == OWN_FORMAT && (corners.is_array() || points.is_array())
 }
 
-/// The text of a label, without a byte order mark; for a photo instead of one, the error says what
-/// to do.
+/// The text of a label; for a photo instead of one, the error says what to do.
 fn label_text(path: &Path) -> Result<String> {
-    let text = io::read_text(path).map_err(|error| match io::read_header(path) {
+    io::read_text(path).map_err(|error| match io::read_header(path) {
         Err(_) => error,
         Ok(_) => photo_instead(path),
-    })?;
-    Ok(text.trim_start_matches('\u{feff}').to_owned())
+    })
 }
 
 /// The error of a photo that was given instead of its label.
@@ -270,6 +281,10 @@ fn photo_instead(photo: &Path) -> Error {
 
 /// A label of ours, or an array of them.
 fn own_labels(text: &str, path: &Path) -> Result<Vec<LabelledPhoto>> {
+    if is_camera(text) {
+        let what = format!("a solved camera ({CAMERA_FORMAT}), expected a label ({OWN_FORMAT})");
+        return Err(Error::file(path, what));
+    }
     parse_own_labels(text, path).map_err(|e| e.in_file(path))
 }
 

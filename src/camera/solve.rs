@@ -171,19 +171,20 @@ fn solve_without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Sol
         return Ok(solution);
     };
     if !conflict.is_with_exif() {
-        solution.warnings.push(conflict.warning());
+        let warning = conflict.warning(&solution);
+        solution.warnings.push(warning);
         return Ok(solution);
     }
     let second = solve_as_labelled(&without_exif_focal(label), options)?.solution;
-    let conflict = conflict.solved_without(&second);
-    if conflict.is_gross()
+    let warning = conflict.warning(&second);
+    if conflict.is_gross(&second)
         && second.misfit().is_none()
         && fits_exchanged_with_exif(label, options, solution.fit.chi2)
     {
-        solution.warnings.push(conflict.warning());
+        solution.warnings.push(warning);
         return Ok(solution);
     }
-    Ok(second.preferred_to(solution, conflict.warning()))
+    Ok(second.preferred_to(solution, warning))
 }
 
 /// With width and height exchanged the picture agrees with its EXIF value, and fits clearly better
@@ -220,7 +221,6 @@ impl Solution {
 pub(super) struct FocalConflict {
     source: PriorSource,
     prior_px: f64,
-    measured_px: f64,
     /// How far apart the two are, in standard deviations of the difference.
     sigmas: f64,
     /// The label states the camera's height, from which the focal length follows, too.
@@ -234,7 +234,6 @@ impl FocalConflict {
         let conflict = Self {
             source: problem.prior_source,
             prior_px: problem.units.focal_px(prior.mean),
-            measured_px: problem.units.focal_px(focal.from_data?.mean),
             sigmas: focal.prior_conflict(prior)?.abs(),
             has_height: !problem.residuals.priors.ln_height.is_flat(),
         };
@@ -246,37 +245,35 @@ impl FocalConflict {
         self.source == PriorSource::Exif
     }
 
-    /// With what the picture gives in a solution without that prior: what it gives beside a wrong
-    /// one is far off.
-    pub(super) fn solved_without(self, solution: &Solution) -> Self {
-        Self {
-            measured_px: solution.camera.focal_px.x,
-            ..self
-        }
+    /// A solution without the prior is farther from it than a wrong EXIF value alone explains.
+    fn is_gross(&self, without: &Solution) -> bool {
+        let ratio = without.camera.focal_px.x / self.prior_px;
+        libm::log(ratio).abs() > libm::log(GROSS_FOCAL_RATIO)
     }
 
-    /// Picture and prior are farther apart than a wrong EXIF value alone explains.
-    fn is_gross(&self) -> bool {
-        libm::log(self.measured_px / self.prior_px).abs() > libm::log(GROSS_FOCAL_RATIO)
-    }
-
-    pub(super) fn warning(&self) -> Diagnostic {
+    /// With the solution without the EXIF value, or else with the one that is taken.
+    pub(super) fn warning(&self, solution: &Solution) -> Diagnostic {
         let Self {
-            prior_px,
-            measured_px,
-            sigmas,
-            ..
+            prior_px, sigmas, ..
         } = *self;
+        let focal_px = solution.camera.focal_px.x;
         let [source, causes] = source_and_causes(self.source);
+        // What the corners give alone is known only where a solution goes by them alone: beside a
+        // wrong prior, the information that they have there puts it anywhere.
+        let found = if self.is_with_exif() {
+            format!("the corners give {focal_px:.0} px, {source} {prior_px:.0} px")
+        } else {
+            format!(
+                "taken as {focal_px:.0} px, between the {prior_px:.0} px of {source} and what the \
+                 corners give"
+            )
+        };
         let height = if self.has_height {
             ", or a wrong camera.height_m"
         } else {
             ""
         };
-        let what = format!(
-            "focal length: the corners give {measured_px:.0} px, {source} {prior_px:.0} px ({sigmas:.1} sigmas apart): \
-             {causes}{height}"
-        );
+        let what = format!("focal length: {found} ({sigmas:.1} sigmas apart): {causes}{height}");
         Diagnostic::warning(Code::FocalPriorConflict, what)
     }
 }
@@ -426,9 +423,8 @@ mod tests {
         assert!(refusal.contains(&expected), "{refusal}");
     }
 
-    #[test]
-    fn a_conflict_names_the_focal_length_that_is_taken() {
-        // EXIF data of 740 px, a lens of twice that.
+    /// A whole picture through a lens of about 1480 px.
+    fn label_of_1480_px() -> Label {
         let corners = [
             [235.8, 239.2],
             [1019.7, 215.7],
@@ -436,12 +432,36 @@ mod tests {
             [275.6, 738.8],
         ];
         let mut label = Label::new([1280, 960], corners, [0.56, 0.37]);
-        (label.image.cropped, label.camera.focal_35mm) = (Some(false), Some(20.0));
-        let solution = solve(&label, &SolveOptions::default()).unwrap();
+        label.image.cropped = Some(false);
+        label
+    }
+
+    /// The focal length that is taken, and what is said of that which was expected.
+    fn focal_conflict(label: &Label) -> (f64, String) {
+        let solution = solve(label, &SolveOptions::default()).unwrap();
         let mut warnings = solution.warnings.iter();
         let conflict = warnings.find(|w| w.code == Code::FocalPriorConflict);
-        let focal_px = solution.camera.focal_px.x;
+        let message = conflict.unwrap().message.clone();
+        (solution.camera.focal_px.x, message)
+    }
+
+    #[test]
+    fn a_conflict_names_the_focal_length_that_is_taken() {
+        let mut label = label_of_1480_px();
+        label.camera.focal_35mm = Some(20.0);
+        let (focal_px, said) = focal_conflict(&label);
         let told = format!("the corners give {focal_px:.0} px, EXIF data 740 px");
-        assert!(conflict.unwrap().message.contains(&told), "{conflict:?}");
+        assert!(said.contains(&told), "{said}");
+    }
+
+    #[test]
+    fn beside_a_stated_focal_length_it_is_not_said_what_the_corners_give() {
+        let mut label = label_of_1480_px();
+        (label.camera.focal_px, label.camera.focal_sigma) = (Some(739.6), Some(0.05));
+        let (focal_px, said) = focal_conflict(&label);
+        let told = format!(
+            "taken as {focal_px:.0} px, between the 740 px of the label and what the corners give ("
+        );
+        assert!(said.contains(&told), "{said}");
     }
 }

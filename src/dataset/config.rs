@@ -108,6 +108,18 @@ impl DatasetConfig {
         Ok(config)
     }
 
+    /// The same with paths from the root: files are read late, whatever the working folder is then.
+    ///
+    /// # Errors
+    /// Without a working folder.
+    pub(super) fn with_absolute_paths(mut self) -> Result<Self> {
+        for path in [&mut self.folder, &mut self.assets, &mut self.backgrounds] {
+            // An empty path is the working folder, too.
+            *path = io::absolute(&Path::new(".").join(path.as_path()))?;
+        }
+        Ok(self)
+    }
+
     /// Fails on the first value that cannot be right, by its path: `render.subsamples`.
     ///
     /// # Errors

@@ -4,7 +4,7 @@ use crate::asset::{Panorama, warn_of_bits};
 use crate::dataset::DatasetConfig;
 use crate::dataset::known_files::KnownFiles;
 use crate::error::{Error, Result};
-use crate::io::{self, Checksum};
+use crate::io;
 use crate::lru::{LruCache, Shared};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Weak};
@@ -63,8 +63,7 @@ impl EnvironmentMaps {
             return Ok(picture);
         }
         let path = self.path(name)?;
-        let picture = Panorama::read(&path)?;
-        self.check_file(&path, Checksum::from_file(&path)?.crc32)?;
+        let picture = Panorama::of_file(self.known.read(&path)?, &path)?;
         self.keep(name, picture, &path)
     }
 
@@ -149,6 +148,16 @@ mod tests {
             &first,
             &surroundings.picture("near.exr").unwrap()
         ));
+    }
+
+    #[test]
+    fn a_picture_is_of_the_bytes_that_its_file_is_known_by() {
+        let (_dir, config) = folder();
+        let surroundings = EnvironmentMaps::of(&config);
+        let path = config.folder.join("../far.exr");
+        surroundings.check_file(&path, 1).unwrap();
+        let refused = surroundings.picture("../far.exr").unwrap_err().to_string();
+        assert!(refused.contains("far.exr: "), "{refused}");
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::eval::page::EvalReportOptions;
 use crate::eval::{
     CocoTruth, EvalImage, Picture, YoloTruth, is_class_list, read_coco_results, read_coco_truth,
-    read_yolo_detections, read_yolo_truth, read_yolo_truth_of,
+    read_pose_truth, read_pose_truth_of, read_yolo_detections,
 };
 use crate::io;
 use std::path::{Path, PathBuf};
@@ -43,9 +43,9 @@ impl EvalTruth {
     /// and height of all, pixels, for YOLO labels without images. A choice takes neither.
     ///
     /// # Errors
-    /// Those of [`read_coco_truth`] and [`read_yolo_truth`]; [`Error::File`] for labels with
-    /// keypoints, a list that cannot be read, a choice without images, and [`Error::Field`] for one
-    /// with `images` or `size`.
+    /// Those of [`read_coco_truth`] and [`read_yolo_truth`](crate::eval::read_yolo_truth);
+    /// [`Error::File`] for a choice of labels with keypoints, a list that cannot be read, a choice
+    /// without images, and [`Error::Field`] for one with `images` or `size`.
     pub fn read(path: &Path, images: Option<&Path>, size: Option<[u32; 2]>) -> Result<Self> {
         if Self::is_coco(path) {
             return Self::of_coco(path, images);
@@ -58,8 +58,8 @@ impl EvalTruth {
             check_alone(images, size)?;
             return Self::of_images(path, path.join("data.yaml"), YoloSet::read(path)?.val);
         }
-        YoloSet::check_labels(path)?;
-        let truth = read_yolo_truth(path, images, size)?;
+        let keypoints = YoloSet::keypoint_numbers_of(path)?;
+        let truth = read_pose_truth(path, images, size, keypoints)?;
         Ok(Self::of_yolo(truth, path.into()))
     }
 
@@ -72,7 +72,7 @@ impl EvalTruth {
     }
 
     fn of_images(path: &Path, place: PathBuf, images: Vec<PathBuf>) -> Result<Self> {
-        YoloSet::check_labels(&place)?;
+        let keypoints = YoloSet::keypoint_numbers_of(&place)?;
         if images.is_empty() {
             let what = "no images to validate with, expected at least one";
             return Err(Error::file(path, what));
@@ -85,7 +85,10 @@ impl EvalTruth {
             let what = "no label files of its images, expected NAME.txt in labels";
             return Err(Error::file(path, what));
         }
-        Ok(Self::of_yolo(read_yolo_truth_of(&images)?, place))
+        Ok(Self::of_yolo(
+            read_pose_truth_of(&images, keypoints)?,
+            place,
+        ))
     }
 
     fn of_yolo(truth: YoloTruth, place: PathBuf) -> Self {
@@ -215,6 +218,19 @@ mod tests {
                 (vec!["cap".into()], 2)
             );
         }
+    }
+
+    #[test]
+    fn labels_with_keypoints_are_boxes_and_no_outlines() {
+        let root = set_and_choice();
+        let set = root.path().join("set");
+        std::fs::write(set.join("data.yaml"), "kpt_shape: [1, 3]\n").unwrap();
+        let label = "0 0.5 0.5 0.5 0.5 0.1 0.9 2\n";
+        std::fs::write(set.join("labels/val/a.txt"), label).unwrap();
+        let truth = EvalTruth::read(&set.join("labels/val"), None, None).unwrap();
+        let sheets = truth.with_detections(&root.path().join("found")).unwrap();
+        assert_eq!(sheets[0].truth[0].bbox, sheets[0].found[0].bbox);
+        assert_eq!(sheets[0].truth[0].bbox.x0, 2.0);
     }
 
     #[test]

@@ -56,12 +56,14 @@ const REMEMBERED_SEQUENCES: usize = 64;
 const MAX_RESAMPLES: usize = 8;
 
 impl Pipeline {
-    /// Opens the folders that a config names.
+    /// Opens the folders that a config names: from then on by paths from the root, so that the
+    /// working folder may change.
     ///
     /// # Errors
     /// A folder, manifest, label or cut-out that cannot be used; each names the file, the field and
     /// what was expected.
     pub fn open(config: DatasetConfig) -> Result<Self> {
+        let config = config.with_absolute_paths()?;
         let library = Library::open(&config.assets)?;
         Self::with_library(config, library)
     }
@@ -71,6 +73,7 @@ impl Pipeline {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn with_library(config: DatasetConfig, library: Library) -> Result<Self> {
+        let config = config.with_absolute_paths()?;
         let places = open_backgrounds(&config)?.into();
         let image = config.scene.image;
         Self::new(config, library.into(), places).with_sizes_checked_in(image)
@@ -174,6 +177,7 @@ impl Pipeline {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn open_for(config: DatasetConfig, scene: &Scene) -> Result<Self> {
+        let config = config.with_absolute_paths()?;
         let library = Library::open_some(&config.assets, |name: &str| {
             scene.objects.iter().any(|object| object.asset == name)
         })?;

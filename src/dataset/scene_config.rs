@@ -67,9 +67,14 @@ impl DatasetConfig {
 
     fn from_scene_table(mut table: Table, overrides: &[io::Override]) -> Result<Self> {
         leave_out_formats(&mut table);
+        let idle = table.keys().find(|key| !counts_for_scene(key)).cloned();
         let table: Table = io::from_table_with(table, overrides)?;
         check_scene_table(&table)?;
+        // This names what no recipe knows either, with what was probably meant.
         let config: Self = io::from_table(table)?;
+        if let Some(key) = idle {
+            return Err(of_no_scene(&key));
+        }
         config.check()?;
         Ok(config)
     }
@@ -161,6 +166,19 @@ fn check_scene_table(settings: &Table) -> Result<()> {
         Some(key) => Err(only_drawn(&format!("scene.{key}"))),
         None => Ok(()),
     }
+}
+
+/// A recipe's key that decides something of a scene that is there already.
+fn counts_for_scene(key: &str) -> bool {
+    let mut known = SCENE_KEYS.into_iter().chain(["pictures"]);
+    known.any(|path| path.split('.').next() == Some(key))
+}
+
+fn of_no_scene(key: &str) -> Error {
+    let known = SCENE_KEYS.join(", ");
+    let what =
+        format!("does nothing in a scene, expected {known} or pictures; folders are in files");
+    Error::value(key, what)
 }
 
 fn only_drawn(key: &str) -> Error {
@@ -357,6 +375,27 @@ mod tests {
         let settings = SceneSettings::from_table("[scene]\ngain_ev = 5\n".parse().unwrap());
         let told = DatasetConfig::from_settings(&settings, &[]).unwrap_err();
         assert_eq!(told.to_string(), format!("settings.{expected}"));
+    }
+
+    #[test]
+    fn what_does_nothing_in_a_scene_is_refused() {
+        let told = |settings: &str| {
+            let settings = SceneSettings::from_table(settings.parse().unwrap());
+            DatasetConfig::from_settings(&settings, &[])
+                .map_or_else(|e| e.to_string(), |_| "".into())
+        };
+        for (key, settings) in [
+            ("split", "[split]\nval_percent = 50\n"),
+            ("preset", "preset = \"real\"\n"),
+            ("assets", "assets = \"elsewhere\"\n"),
+            ("backgrounds", "backgrounds = \"elsewhere\"\n"),
+        ] {
+            let expected = format!("settings.{key}: does nothing in a scene, expected render, ");
+            assert!(told(settings).starts_with(&expected), "{}", told(settings));
+        }
+        let misspelt = told("[rendr]\nsubsamples = 2\n");
+        assert!(misspelt.contains("did you mean \"render\"?"), "{misspelt}");
+        assert_eq!(told("[pictures]\njpeg_quality = 5\n"), "");
     }
 
     #[test]

@@ -2,7 +2,10 @@
 
 use crate::bounds::Bounds;
 use crate::error::Result;
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+
+const PERCENT: Bounds = Bounds::new(0.0, 100.0, "percent");
 
 /// A part of a dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,6 +35,7 @@ impl Part {
 #[serde(default, deny_unknown_fields)]
 pub struct Split {
     /// Samples for validation, percent. Default: 20.
+    #[serde(deserialize_with = "percent")]
     pub val_percent: u8,
     /// Which ones those are. Default: `interleaved`.
     pub order: SplitOrder,
@@ -39,6 +43,15 @@ pub struct Split {
     /// 1, and 0 is the same.
     #[serde(skip)]
     pub sequence: u64,
+}
+
+/// What is no share is told the bounds of one, not those of its type.
+fn percent<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<u8, D::Error> {
+    let value = i64::deserialize(deserializer)?;
+    let share = u8::try_from(value).ok();
+    share
+        .filter(|&share| PERCENT.contains(share.into()))
+        .ok_or_else(|| D::Error::custom(PERCENT.refusal(value as f64)))
 }
 
 impl Default for Split {
@@ -65,7 +78,7 @@ pub enum SplitOrder {
 
 impl Split {
     pub(crate) fn check(&self) -> Result<()> {
-        Bounds::new(0.0, 100.0, "percent").check("val_percent", self.val_percent.into())
+        PERCENT.check("val_percent", self.val_percent.into())
     }
 
     /// The part of sample `k` of `count`.
@@ -97,6 +110,23 @@ impl Split {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_no_share_is_told_what_one_is() {
+        for (value, is_share) in [
+            (-5, false),
+            (0, true),
+            (100, true),
+            (101, false),
+            (300, false),
+        ] {
+            let split: Result<Split> = crate::io::parse_toml(&format!("val_percent = {value}"));
+            let told = split.map_or_else(|e| e.to_string(), |_| String::new());
+            assert_eq!(told.is_empty(), is_share, "{value}: {told}");
+            let expected = format!("val_percent: {value}, expected 0 to 100 (percent)");
+            assert!(is_share || told.starts_with(&expected), "{told}");
+        }
+    }
 
     fn count(split: Split, n: u64) -> usize {
         (0..n).filter(|&k| split.part(k, n) == Part::Val).count()

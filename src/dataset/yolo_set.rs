@@ -87,20 +87,18 @@ impl YoloSet {
         names.map_err(|(line, what)| yaml_problem(&path, line, &what))
     }
 
-    /// Whether the labels of a folder (`labels/val`, `labels`) are boxes or outlines, as far as a
-    /// `data.yaml` above it tells.
+    /// How many numbers of keypoints stand behind the box in the labels of a folder (`labels/val`,
+    /// `labels`), as far as a `data.yaml` above it tells; 0 without its `kpt_shape`.
     ///
     /// # Errors
-    /// [`Error::File`] for one that tells of keypoints.
-    pub fn check_labels(labels: &Path) -> Result<()> {
+    /// [`Error::File`] for a `kpt_shape` that is none.
+    pub fn keypoint_numbers_of(labels: &Path) -> Result<usize> {
         let Some(path) = yaml_above(labels)? else {
-            return Ok(());
+            return Ok(0);
         };
         let text = io::read_text(&path).unwrap_or_default();
-        match DataYaml::keypoint_problem(&text) {
-            Some((line, what)) => Err(yaml_problem(&path, line, &what)),
-            None => Ok(()),
-        }
+        let numbers = DataYaml::read_keypoint_numbers(&text);
+        numbers.map_err(|(line, what)| yaml_problem(&path, line, &what))
     }
 
     fn part(&self, part: Part) -> &[PathBuf] {
@@ -337,10 +335,10 @@ mod tests {
         assert_eq!(names("labels/val").unwrap(), ["cap"]);
         assert_eq!(names("labels").unwrap(), ["cap"]);
         assert!(names("a/labels/val").unwrap().is_empty());
-        let check = || YoloSet::check_labels(&set.path().join("labels/val"));
-        assert!(check().is_ok());
+        let keypoints = || YoloSet::keypoint_numbers_of(&set.path().join("labels/val"));
+        assert_eq!(keypoints().unwrap(), 0);
         std::fs::write(set.path().join("data.yaml"), "kpt_shape: [4, 3]\n").unwrap();
-        assert!(check().unwrap_err().to_string().contains("keypoints"));
+        assert_eq!(keypoints().unwrap(), 12);
         std::fs::write(set.path().join("data.yaml"), "nc: 2\nnames: [cap]\n").unwrap();
         let told = names("labels").unwrap_err().to_string();
         assert!(

@@ -18,10 +18,15 @@ pub(crate) struct DataYaml {
     test: Vec<String>,
     nc: Option<usize>,
     names: Vec<String>,
+    /// Numbers of the keypoints in a label.
+    keypoint_numbers: usize,
 }
 
 /// Most classes that are numbered where `nc` alone tells of them.
 const MAX_NUMBERED_CLASSES: usize = 10_000;
+
+/// Most keypoints of an object.
+const MAX_KEYPOINTS: usize = 10_000;
 
 /// What is wrong with a set whose labels have keypoints.
 const KEYPOINTS: &str = "kpt_shape: labels with keypoints, expected boxes (class cx cy w h) or outlines and no kpt_shape";
@@ -104,10 +109,18 @@ impl DataYaml {
         }
     }
 
-    /// What is wrong with a set whose labels have keypoints; none with any other.
-    pub(crate) fn keypoint_problem(text: &str) -> Option<Problem> {
-        let (_, problems) = Self::read_given(text);
-        problems.into_iter().find(|(_, what)| what == KEYPOINTS)
+    /// How many numbers the keypoints in a label have by `kpt_shape`, whatever else is wrong; 0
+    /// without it.
+    pub(crate) fn read_keypoint_numbers(text: &str) -> Result<usize, Problem> {
+        let (yaml, problems) = Self::read_given(text);
+        let of_shape = |what: &str| what.starts_with("kpt_shape: ") && what != KEYPOINTS;
+        match problems
+            .into_iter()
+            .find(|(_, what)| of_shape(what.as_str()))
+        {
+            Some(problem) => Err(problem),
+            None => Ok(yaml.keypoint_numbers),
+        }
     }
 
     /// What is there, and what is wrong with it.
@@ -142,7 +155,10 @@ impl DataYaml {
             "test" => self.test = value.texts(key)?,
             "nc" => self.nc = Some(value.count(key)?),
             "names" => return self.set_names(value),
-            "kpt_shape" if !matches!(value, Value::Null) => return Err((None, KEYPOINTS.into())),
+            "kpt_shape" if !matches!(value, Value::Null) => {
+                self.keypoint_numbers = value.keypoint_numbers(key)?;
+                return Err((None, KEYPOINTS.into()));
+            }
             _ => {}
         }
         Ok(())
@@ -227,6 +243,19 @@ impl Value {
             _ => ("no number", None),
         };
         number.ok_or_else(|| (None, format!("{key}: {found}, expected a number")))
+    }
+
+    /// Points by the numbers of each.
+    fn keypoint_numbers(&self, key: &str) -> Result<usize, Problem> {
+        let texts: &[String] = match self {
+            Self::List(texts) => &texts[..],
+            _ => &[],
+        };
+        let numbers = texts.iter().map(|text| text.parse::<usize>().ok());
+        match numbers.collect::<Option<Vec<_>>>().as_deref() {
+            Some(&[points @ 1..=MAX_KEYPOINTS, each @ 2..=3]) => Ok(points * each),
+            _ => Err((None, format!("{key}: expected [number of points, 2 or 3]"))),
+        }
     }
 
     fn bytes(&self) -> usize {
@@ -516,8 +545,14 @@ mod tests {
         let (_, problems) = DataYaml::read(text);
         assert_eq!(problems.len(), 1);
         assert_eq!(problems[0], (Some(4), KEYPOINTS.into()));
-        assert_eq!(DataYaml::keypoint_problem(text).as_ref(), problems.first());
-        assert!(DataYaml::keypoint_problem("names: 3\nkpt_shape:\n").is_none());
+        let numbers = DataYaml::read_keypoint_numbers;
+        assert_eq!(numbers(text), Ok(8));
+        assert_eq!(numbers("names: 3\nkpt_shape:\n"), Ok(0));
+        let expected = "kpt_shape: expected [number of points, 2 or 3]";
+        for bad in ["17", "[17]", "[17, 4]", "[0, 3]"] {
+            let told = numbers(&format!("kpt_shape: {bad}\n"));
+            assert_eq!(told, Err((Some(1), expected.into())), "{bad}");
+        }
     }
 
     #[test]

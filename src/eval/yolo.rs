@@ -22,6 +22,9 @@ pub struct YoloTruth {
     pub sizes: Vec<[u32; 2]>,
     /// The images, where they are found.
     pub pictures: Vec<Option<Picture>>,
+    /// How many numbers of keypoints stand behind the box in a label, and in a detection; they are
+    /// left aside.
+    pub keypoint_numbers: usize,
 }
 
 /// Reads `NAME.txt` of a folder of labels and of those below it: `class cx cy w h`, shares of the
@@ -41,6 +44,16 @@ pub fn read_yolo_truth(
     images: Option<&Path>,
     size: Option<[u32; 2]>,
 ) -> Result<YoloTruth> {
+    read_pose_truth(labels, images, size, 0)
+}
+
+/// As [`read_yolo_truth`], of labels with so many numbers of keypoints behind the box.
+pub(crate) fn read_pose_truth(
+    labels: &Path,
+    images: Option<&Path>,
+    size: Option<[u32; 2]>,
+    keypoints: usize,
+) -> Result<YoloTruth> {
     refuse_dataset(labels)?;
     let folder = LabelFolder::open(labels, images)?;
     if folder.labels.is_empty() {
@@ -48,9 +61,9 @@ pub fn read_yolo_truth(
     }
     let names = folder.names().into_par_iter();
     let all: Vec<_> = names
-        .map(|name| folder.read(name, size))
+        .map(|name| folder.read(name, size, keypoints))
         .collect::<Result<_>>()?;
-    Ok(YoloTruth::from_images(all))
+    Ok(YoloTruth::from_images(all, keypoints))
 }
 
 /// A dataset's folder has the labels of all its parts, and texts that are none.
@@ -106,7 +119,7 @@ impl LabelFolder {
         self.labels.keys().chain(self.images.keys()).collect()
     }
 
-    fn read(&self, name: &str, size: Option<[u32; 2]>) -> Result<LabelledImage> {
+    fn read(&self, name: &str, size: Option<[u32; 2]>, keypoints: usize) -> Result<LabelledImage> {
         let [label, image] =
             [&self.labels, &self.images].map(|files| files.get(name).map(PathBuf::as_path));
         let size = match (size, image) {
@@ -116,7 +129,7 @@ impl LabelFolder {
         };
         let sheet = EvalImage {
             group: sequence_beside(image, label),
-            ..EvalImage::new(name, truth_of(label, size)?)
+            ..EvalImage::new(name, truth_of(label, size, keypoints)?)
         };
         let picture = image.map(|path| picture_of(path.into(), size));
         Ok((sheet, size, picture))
@@ -138,14 +151,20 @@ impl LabelFolder {
 /// # Errors
 /// [`Error::File`] for an image that cannot be read, or a bad line.
 pub fn read_yolo_truth_of(images: &[PathBuf]) -> Result<YoloTruth> {
-    let all = images.par_iter().map(|image| read_image(image));
-    Ok(YoloTruth::from_images(all.collect::<Result<_>>()?))
+    read_pose_truth_of(images, 0)
 }
 
-fn read_image(image: &Path) -> Result<LabelledImage> {
+/// As [`read_yolo_truth_of`], of labels with so many numbers of keypoints behind the box.
+pub(crate) fn read_pose_truth_of(images: &[PathBuf], keypoints: usize) -> Result<YoloTruth> {
+    let all = images.par_iter().map(|image| read_image(image, keypoints));
+    let all = all.collect::<Result<_>>()?;
+    Ok(YoloTruth::from_images(all, keypoints))
+}
+
+fn read_image(image: &Path, keypoints: usize) -> Result<LabelledImage> {
     let size = image_size(image)?;
     let label = Some(label_of(image)).filter(|label| label.exists());
-    let truth = truth_of(label.as_deref(), size)?;
+    let truth = truth_of(label.as_deref(), size, keypoints)?;
     let picture = Some(picture_of(image.into(), size));
     let name = image.file_stem().unwrap_or_default().to_string_lossy();
     let sheet = EvalImage {
@@ -220,8 +239,11 @@ pub(super) fn is_picture(path: &Path) -> bool {
 }
 
 /// Nothing where there is no label file.
-fn truth_of(label: Option<&Path>, size: [u32; 2]) -> Result<Vec<GroundTruth>> {
-    label.map_or_else(|| Ok(Vec::new()), |label| read_truth(label, size))
+fn truth_of(label: Option<&Path>, size: [u32; 2], keypoints: usize) -> Result<Vec<GroundTruth>> {
+    label.map_or_else(
+        || Ok(Vec::new()),
+        |label| read_truth(label, size, keypoints),
+    )
 }
 
 fn picture_of(path: PathBuf, size: [u32; 2]) -> Picture {
@@ -252,7 +274,8 @@ pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> 
             let &i = known
                 .get(name.as_str())
                 .ok_or_else(|| Error::file(path, no_image(name, known.len())))?;
-            Ok((i, read_detections(path, truth.sizes[i])?))
+            let keypoints = truth.keypoint_numbers;
+            Ok((i, read_detections(path, truth.sizes[i], keypoints)?))
         })
         .collect::<Result<_>>()?;
     for (i, found) in found {
@@ -262,8 +285,11 @@ pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> 
 }
 
 impl YoloTruth {
-    fn from_images(images: Vec<LabelledImage>) -> Self {
-        let mut truth = Self::default();
+    fn from_images(images: Vec<LabelledImage>, keypoint_numbers: usize) -> Self {
+        let mut truth = Self {
+            keypoint_numbers,
+            ..Self::default()
+        };
         for (sheet, size, picture) in images {
             truth.sheets.push(sheet);
             truth.sizes.push(size);
@@ -295,22 +321,32 @@ pub(super) fn no_image(name: &str, count: usize) -> String {
     format!("no image \"{name}\" in the truth of {count} images")
 }
 
-fn read_truth(path: &Path, size: [u32; 2]) -> Result<Vec<GroundTruth>> {
-    parse_truth(&io::read_text(path)?, size).map_err(|what| Error::file(path, what))
+fn read_truth(path: &Path, size: [u32; 2], keypoints: usize) -> Result<Vec<GroundTruth>> {
+    let rows = parse_truth(&io::read_text(path)?, size, keypoints);
+    rows.map_err(|what| Error::file(path, what))
 }
 
-fn read_detections(path: &Path, size: [u32; 2]) -> Result<Vec<Detection>> {
-    parse_detections(&io::read_text(path)?, size).map_err(|what| Error::file(path, what))
+fn read_detections(path: &Path, size: [u32; 2], keypoints: usize) -> Result<Vec<Detection>> {
+    let rows = parse_detections(&io::read_text(path)?, size, keypoints);
+    rows.map_err(|what| Error::file(path, what))
 }
 
-fn parse_truth(text: &str, size: [u32; 2]) -> std::result::Result<Vec<GroundTruth>, String> {
-    let rows = parse_rows(text, 0)?.into_iter();
+fn parse_truth(
+    text: &str,
+    size: [u32; 2],
+    keypoints: usize,
+) -> std::result::Result<Vec<GroundTruth>, String> {
+    let rows = parse_rows(text, 0, keypoints)?.into_iter();
     Ok(rows.map(|row| row.truth(size)).collect())
 }
 
 /// With a confidence at the end of each line.
-fn parse_detections(text: &str, size: [u32; 2]) -> std::result::Result<Vec<Detection>, String> {
-    let rows = parse_rows(text, 1)?.into_iter();
+fn parse_detections(
+    text: &str,
+    size: [u32; 2],
+    keypoints: usize,
+) -> std::result::Result<Vec<Detection>, String> {
+    let rows = parse_rows(text, 1, keypoints)?.into_iter();
     Ok(rows.map(|row| row.found(size)).collect())
 }
 
@@ -320,9 +356,9 @@ pub(crate) fn sheet_of(
     found: &str,
     size: [u32; 2],
 ) -> std::result::Result<EvalImage, String> {
-    let truth = parse_truth(truth, size)?;
+    let truth = parse_truth(truth, size, 0)?;
     Ok(EvalImage {
-        found: parse_detections(found, size)?,
+        found: parse_detections(found, size, 0)?,
         ..EvalImage::new("", truth)
     })
 }
@@ -394,19 +430,27 @@ struct LabelRow {
 /// Boxes may reach beyond the image, but not so many times its side.
 const MAX_SHARE: f64 = 10.0;
 
+/// Numbers of a box: `cx cy w h`.
+const BOX_NUMBERS: usize = 4;
+
 /// Lines with `extra` numbers (a confidence or nothing) at their ends, behind a byte order mark or
 /// none.
-fn parse_rows(text: &str, extra: usize) -> std::result::Result<Vec<LabelRow>, String> {
+fn parse_rows(
+    text: &str,
+    extra: usize,
+    keypoints: usize,
+) -> std::result::Result<Vec<LabelRow>, String> {
     filled_lines(text.trim_start_matches('\u{feff}'))
-        .map(|(i, line)| parse_row(line, extra).map_err(|what| in_line(i, &what)))
+        .map(|(i, line)| parse_row(line, extra, keypoints).map_err(|what| in_line(i, &what)))
         .collect()
 }
 
-fn parse_row(line: &str, extra: usize) -> std::result::Result<LabelRow, String> {
+fn parse_row(line: &str, extra: usize, keypoints: usize) -> std::result::Result<LabelRow, String> {
     let mut words = line.split_ascii_whitespace();
     let class = parse_class(words.next().unwrap_or_default())?;
     let numbers = words.map(parse_finite);
-    let numbers: Vec<f64> = numbers.collect::<std::result::Result<_, _>>()?;
+    let mut numbers: Vec<f64> = numbers.collect::<std::result::Result<_, _>>()?;
+    leave_out_keypoints(&mut numbers, extra, keypoints)?;
     let (place, rest) = split_extra(&numbers, extra)?;
     check_shares(place)?;
     let shares = box_around(place).ok_or_else(|| too_few(&numbers, extra))?;
@@ -418,6 +462,29 @@ fn parse_row(line: &str, extra: usize) -> std::result::Result<LabelRow, String> 
         shares,
         confidence,
     })
+}
+
+/// Takes the numbers of keypoints out from behind those of the box; a row may do without them.
+fn leave_out_keypoints(
+    numbers: &mut Vec<f64>,
+    extra: usize,
+    keypoints: usize,
+) -> std::result::Result<(), String> {
+    // Behind a confidence there may be the id of a track.
+    let ends = |behind: usize| (extra..=2 * extra).contains(&behind);
+    let is_box = numbers.len().checked_sub(BOX_NUMBERS).is_some_and(ends);
+    if keypoints == 0 || is_box {
+        return Ok(());
+    }
+    let behind = numbers.len().checked_sub(BOX_NUMBERS + keypoints);
+    if !behind.is_some_and(ends) {
+        let count = numbers.len();
+        return Err(format!(
+            "{count} numbers behind the class, expected cx cy w h and {keypoints} of keypoints (kpt_shape)"
+        ));
+    }
+    numbers.drain(BOX_NUMBERS..BOX_NUMBERS + keypoints);
+    Ok(())
 }
 
 /// The numbers of the place, and those behind them.
@@ -658,7 +725,7 @@ mod tests {
 
     #[test]
     fn the_id_of_a_track_is_no_confidence() {
-        let parsed = |line: &str| parse_detections(line, [10, 10]);
+        let parsed = |line: &str| parse_detections(line, [10, 10], 0);
         let said =
             "line 1: 7, expected a confidence, 0 to 1; is it the id of a track? (save_conf=True)";
         assert_eq!(parsed("0 0.5 0.5 0.2 0.2 7").unwrap_err(), said);
@@ -672,6 +739,25 @@ mod tests {
         for bad in ["0 0.5 0.5 0.2 0.2 7 0.25", "0 0.1 0.1 0.2 0.2 0.3 0.25"] {
             let told = parsed(bad).unwrap_err();
             assert!(told.contains("6 numbers behind the class"), "{told}");
+        }
+    }
+
+    #[test]
+    fn keypoints_behind_a_box_are_left_aside() {
+        let (place, size) = ("1 0.5 0.5 0.2 0.4", [10, 10]);
+        let truth = |points: &str| parse_truth(&format!("{place} {points}"), size, 6);
+        let boxes = parse_truth(place, size, 0);
+        assert_eq!(truth("0.1 0.2 2 0.9 0.8 1"), boxes);
+        assert_eq!(truth(""), boxes);
+        let expected =
+            "line 1: 6 numbers behind the class, expected cx cy w h and 6 of keypoints (kpt_shape)";
+        assert_eq!(truth("0.1 0.2").unwrap_err(), expected);
+        let found = |points: &str, end: &str| {
+            let line = format!("{place} {points} {end}");
+            parse_detections(&line, size, 6).unwrap()
+        };
+        for end in ["0.25", "0.25 7"] {
+            assert_eq!(found("0.1 0.2 0.9 0.9 0.8 0.7", end), found("", "0.25"));
         }
     }
 

@@ -71,6 +71,8 @@ pub struct Header {
     /// The camera noted the size of this picture, or a whole multiple of it, and no program that
     /// edits pictures wrote the file: nothing was cut away.
     pub whole: bool,
+    /// The stored pixels are turned or mirrored to make the picture upright.
+    pub turned: bool,
     /// Texts that the file carries, by name.
     pub metadata: Vec<(String, String)>,
 }
@@ -91,6 +93,7 @@ impl Default for Header {
             digital_zoom: false,
             cropped: false,
             whole: false,
+            turned: false,
             metadata: Vec::new(),
         }
     }

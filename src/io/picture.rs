@@ -70,6 +70,7 @@ impl Picture {
             .flatten();
         warn_not_finite(&raster, source, wanted);
         warn_unusual_channels(&raster, source, wanted);
+        warn_left_out(&raster, source, wanted);
         Ok(Self {
             path: source.path.clone(),
             format: source.format,
@@ -216,6 +217,23 @@ fn warn_unusual_channels(raster: &Raster, source: &SourceFile, wanted: Wanted) {
             log::warn!("{path}: uses the channel {} as grey", raster.names[0])
         }
         _ => {}
+    }
+}
+
+/// Says where a TIFF has a sample behind its colours that it does not call alpha: most programs
+/// leave it out, some take it for alpha.
+fn warn_left_out(raster: &Raster, source: &SourceFile, wanted: Wanted) {
+    let picked = Wanted::Color.pick(&raster.names);
+    let is_without_alpha = picked.is_ok_and(|picked| picked.len() == 3);
+    if source.format != Format::Tiff || !wanted.is_color() || !is_without_alpha {
+        return;
+    }
+    let left_out = catch_panic(|| Ok(tiff::unspecified_samples(&source.bytes)));
+    if left_out.is_ok_and(|count| count > 0) {
+        let path = source.path.display();
+        log::warn!(
+            "{path}: has samples of no stated meaning beside its colours (ExtraSamples 0); left out, expected 1 or 2 where they are alpha"
+        );
     }
 }
 

@@ -118,6 +118,7 @@ fn apply_notes(header: &mut Header, notes: &CameraNotes) {
     let stored = [header.width, header.height];
     header.cropped = notes.has_other_shape(stored);
     header.whole = notes.has_same_size(stored);
+    header.turned = notes.orientation.turns();
     (header.width, header.height) = notes.orientation.size(stored.into());
     if header.data_size == [0; 2] {
         header.data_size = [header.width, header.height];

@@ -583,6 +583,21 @@ mod tests {
     }
 
     #[test]
+    fn bare_screen_within_an_outline_is_warned_of() {
+        let by_outline = CutOutOptions {
+            method: Some(MatteMethod::Outline),
+            ..Default::default()
+        };
+        let warned = |strokes: &[Stroke]| {
+            let cut = cut_out_corrected(&slab(GREEN), None, strokes, &by_outline).unwrap();
+            let mut codes = cut.diagnostics.iter().map(|d| d.code);
+            codes.any(|code| code == Code::ScreenLikeParts)
+        };
+        let ear = painted(Claim::Object, 10.0, &[[60.0, 25.0], [60.0, 15.0]]);
+        assert_eq!([warned(&[]), warned(&[ear])], [false, true]);
+    }
+
+    #[test]
     fn a_second_thing_is_no_object_where_a_person_says_so() {
         let mut photo = slab(GREEN);
         for (x, y) in (5..15).flat_map(|x| (5..70).map(move |y| (x, y))) {

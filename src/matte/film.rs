@@ -12,6 +12,7 @@ mod view;
 
 pub(super) use object::OPAQUE;
 pub use planes::film_planes;
+pub(super) use tint::is_bare_screen;
 pub use uncertainty::ColorUncertainty;
 pub(super) use view::view;
 
@@ -32,7 +33,7 @@ use serde::{Deserialize, Serialize};
 use solve::{Factor, Solver};
 use std::borrow::Cow;
 use std::ops::RangeInclusive;
-use tint::{DARKEST_SHARE, Tint, TintSamples, is_bare_screen};
+use tint::{DARKEST_SHARE, Tint, TintSamples};
 
 /// How film is solved for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -60,11 +60,14 @@ fn check_size(size: [usize; 2], row_stride: usize) -> Result<(), Failure> {
         .check_size(size)
         .map_err(|what| Failure::argument("width, height", what))?;
     let least = width * CHANNELS;
-    let fits = row_stride.checked_mul(height).is_some();
-    if row_stride >= least && fits {
-        return Ok(());
-    }
-    let what = format_args!("{row_stride} floats, expected at least {least}");
+    // What memory can hold at all.
+    let most = isize::MAX.unsigned_abs() / size_of::<f32>() / height;
+    let expected = match row_stride {
+        stride if stride < least => format!("at least {least}"),
+        stride if stride > most => format!("at most {most}"),
+        _ => return Ok(()),
+    };
+    let what = format_args!("{row_stride} floats, expected {expected}");
     Err(Failure::argument("row_stride", what))
 }
 
@@ -103,6 +106,11 @@ unsafe fn options_of(options: *const c_char) -> Result<KeyOptions, Failure> {
     }
     // SAFETY: promised.
     let json = unsafe { text("options", options) }?;
+    // A list would be read as the settings in their order.
+    if !json.trim_start().starts_with('{') {
+        let what = r#"no JSON object, expected one as {"clip_black": 0.1}"#;
+        return Err(Error::value("options", what).into());
+    }
     Ok(serde_json::from_str(json).map_err(|e| Error::value("options", e))?)
 }
 

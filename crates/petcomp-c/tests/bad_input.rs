@@ -53,6 +53,11 @@ fn wrong_sizes_of_a_picture_are_refused() {
     );
     assert_eq!(key(&pixels, [usize::MAX, 2, usize::MAX], null()), refused);
     assert_eq!(key(&pixels, [1, 2, usize::MAX], null()), refused);
+    assert_fails(
+        key(&pixels, [2, 2, 1 << 62], null()),
+        refused,
+        "row_stride: 4611686018427387904 floats, expected at most 1152921504606846975",
+    );
     assert_eq!(key(&pixels, [2, 2, 8], null()), Status::Ok);
     assert_eq!(message(), "");
 }
@@ -95,6 +100,11 @@ fn numbers_that_are_none_and_wrong_options_are_refused() {
     assert_eq!(
         key(&pixels, [2, 2, 8], c"\xff".as_ptr()),
         Status::BadArgument
+    );
+    assert_fails(
+        key(&pixels, [2, 2, 8], c"[]".as_ptr()),
+        Status::Value,
+        r#"options: no JSON object, expected one as {"clip_black": 0.1}"#,
     );
     pixels[9] = f32::NAN;
     assert_fails(

@@ -343,7 +343,7 @@ fn describe_lengths(metres: &[[f64; 2]]) -> String {
 fn write_sheet(folder: &Path, library: &Library, global: &GlobalArgs) -> anyhow::Result<()> {
     let first = folder.join(CONTACT_SHEET);
     let count = write_pages(library, &first)?;
-    remove_pages(&first, count)?;
+    asset::remove_contact_sheet(&first, count)?;
     match count {
         1 => global.print_look_at(&first),
         _ => global.print_status(format_args!(
@@ -362,13 +362,6 @@ fn write_pages(library: &Library, first: &Path) -> petcomp::Result<usize> {
         io::write(asset::contact_sheet_page(first, i), &page?)?;
     }
     Ok(count)
-}
-
-/// Deletes the pages of a contact sheet from one on, counted from 0.
-fn remove_pages(first: &Path, from: usize) -> petcomp::Result<()> {
-    let pages = (from..).map(|page| asset::contact_sheet_page(first, page));
-    let mut left = pages.take_while(|page| page.exists());
-    left.try_for_each(|page| std::fs::remove_file(&page).map_err(|e| Error::file(page, e)))
 }
 
 /// Draws the contact sheet of a folder whose manifest is another than before, though photos failed:

@@ -112,7 +112,8 @@ pub fn run(words: impl Iterator<Item = OsString>) -> u8 {
 
 fn parse_command_line(words: impl Iterator<Item = OsString>) -> Result<Program, clap::Error> {
     let words = diff::accept_idiff_spelling(words);
-    let program = short_help::with_short_help(Program::command());
+    let program = values::with_negative_numbers(Program::command());
+    let program = short_help::with_short_help(program);
     Program::from_arg_matches(&program.try_get_matches_from(words)?)
 }
 

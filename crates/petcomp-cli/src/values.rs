@@ -25,6 +25,19 @@ pub(crate) fn check_companion(
     }
 }
 
+/// The same program, whose options take a number below 0 for their value and say what they expect;
+/// clap would take it for another option.
+pub(crate) fn with_negative_numbers(program: clap::Command) -> clap::Command {
+    program
+        .mut_args(with_negative_number)
+        .mut_subcommands(with_negative_numbers)
+}
+
+fn with_negative_number(arg: clap::Arg) -> clap::Arg {
+    let is_option = !arg.is_positional() && arg.get_action().takes_values();
+    arg.allow_negative_numbers(is_option)
+}
+
 /// Four points from `X,Y X,Y X,Y X,Y`.
 pub(crate) fn parse_corners(text: &str) -> Result<[[f64; 2]; 4], String> {
     let points: Option<Vec<_>> = split_points(text).map(parse_point).collect();

@@ -303,6 +303,23 @@ fn a_camera_that_cannot_be_solved_stops_no_other_one() {
 }
 
 #[test]
+fn cameras_of_an_earlier_run_are_no_labels() {
+    let desk = Desk::with_recipe();
+    for name in ["a", "b"] {
+        desk.label(name, &desk.photo(name, IMAGE));
+    }
+    let labels = ["bg/a.label.json", "bg/b.label.json"];
+    let cameras = ["bg/a.camera.json", "bg/b.camera.json"];
+    desk.ok(&[&["camera", "solve"][..], &labels].concat());
+    for command in ["solve", "joint", "doctor"] {
+        desk.ok(&[&["camera", command][..], &cameras, &labels].concat());
+    }
+    let said = desk.refused(&["camera", "solve", "bg/a.camera.json"]);
+    let expected = "a.camera.json: a solved camera (plane-camera), expected a label (plane-label)";
+    assert!(said.contains(expected), "{said}");
+}
+
+#[test]
 fn a_camera_too_far_away_is_refused_however_it_is_solved() {
     let desk = Desk::with_recipe();
     let mut label = desk.photo("a", IMAGE);
@@ -341,6 +358,29 @@ fn a_lens_that_folds_the_photo_over_is_refused_wherever_its_label_is_read() {
             said.contains("a.label.json: camera.k1: -5, expected at least -1.4"),
             "{args:?}: {said}"
         );
+        assert_eq!(desk.run(args).status.code(), Some(3), "{args:?}: {said}");
+    }
+}
+
+#[test]
+fn an_impossible_value_of_a_label_is_data_and_not_a_file_that_cannot_be_used() {
+    let desk = Desk::with_recipe();
+    let mut label = desk.photo("a", IMAGE);
+    for (camera, message) in [
+        (json!({ "focal_px": 5.0 }), "camera.focal_px: 5, expected"),
+        (json!({ "height_m": -1.0 }), "camera.height_m: -1, expected"),
+    ] {
+        label["camera"] = camera;
+        desk.label("a", &label);
+        for args in [
+            &["camera", "solve", "bg/a.label.json"][..],
+            &["scene", "draw", "recipe.toml", "-o", "scene.json"],
+        ] {
+            let output = desk.run(args);
+            let said = text(&output.stderr);
+            assert!(said.contains(&format!("a.label.json: {message}")), "{said}");
+            assert_eq!(output.status.code(), Some(3), "{args:?}: {said}");
+        }
     }
 }
 
@@ -534,10 +574,12 @@ fn a_label_comes_from_nothing() {
     );
     let [said, _] = desk.ok(&["camera", "init", "bg/a.png", "--size", "0.56x0.37"]);
     assert!(said.contains("fill in surface.corners_px"), "{said}");
+    let again = ["camera", "init", "bg/a.png", "--size", "1x1"];
     assert!(
-        desk.refused(&["camera", "init", "bg/a.png", "--size", "1x1"])
+        desk.refused(&again)
             .contains("already exists; --force replaces it")
     );
+    assert_eq!(desk.run(&again).status.code(), Some(4));
     assert!(
         desk.refused(&["camera", "solve", "bg/a.label.json"])
             .contains("corners_px is missing or not filled in")
@@ -584,6 +626,18 @@ fn a_label_comes_from_nothing() {
         desk.refused(&["camera", "init", "bg/a.png", "--size", "0.56"])
             .contains("WIDTHxHEIGHT")
     );
+}
+
+#[test]
+fn a_size_in_millimetres_is_asked_about_before_a_label_is_written() {
+    let desk = Desk::with_recipe();
+    desk.photo("a", IMAGE);
+    let said = desk.refused(&["camera", "init", "bg/a.png", "--size", "560x370"]);
+    assert!(
+        said.contains("surface.width_m: 560, expected") && said.contains("is it in millimetres?"),
+        "{said}"
+    );
+    assert!(!desk.path("bg/a.label.json").exists());
 }
 
 /// The same four corners as other programs write them.

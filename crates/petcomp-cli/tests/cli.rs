@@ -226,6 +226,26 @@ fn an_option_without_the_one_that_it_belongs_to_is_refused() {
 }
 
 #[test]
+fn a_number_below_zero_is_a_value_and_no_option() {
+    let desk = Desk::new();
+    for (option, line) in [
+        ("--count <N>", "dataset generate recipe.toml -o out -n -3"),
+        (
+            "--threads <N>",
+            "dataset generate recipe.toml -o out -n 3 -j -3",
+        ),
+        (
+            "--seed <SEED>",
+            "dataset generate recipe.toml -o out -n 3 --seed -3",
+        ),
+    ] {
+        let said = desk.refused(&words(line));
+        let expected = format!("error: invalid value '-3' for '{option}': ");
+        assert!(said.starts_with(&expected), "{said}");
+    }
+}
+
+#[test]
 fn a_split_takes_the_options_of_its_own_way_alone() {
     let desk = Desk::new();
     for (options, option, own) in [

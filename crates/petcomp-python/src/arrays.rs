@@ -116,21 +116,45 @@ impl Photo {
     }
 }
 
-/// A matte of an argument: float32 from 0 to 1, or bool, height x width.
+/// A matte that was given: shares of pixels, or whether they are inside.
+pub(crate) enum GivenMatte {
+    Coverage(Foreign<Coverage>),
+    Inside(Foreign<u8>),
+}
+
+impl GivenMatte {
+    /// The matte of an argument: float32 from 0 to 1, or bool, height x width.
+    pub(crate) fn from_argument(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let array = array_of(name, argument)?;
+        let size = matte_size(name, array)?;
+        if is_of::<bool>(array) {
+            return foreign::<bool, _>(array, size).map(Self::Inside);
+        }
+        if !is_of::<f32>(array) {
+            let found = array.dtype();
+            let what = format!("dtype {found}, expected float32 (0 to 1) or bool");
+            return Err(wrong_type(name, &what));
+        }
+        let matte = foreign::<f32, Coverage>(array, size)?;
+        check_coverage(name, matte.view()).map_err(crate::errors::to_python)?;
+        Ok(Self::Coverage(matte))
+    }
+
+    /// `(width, height)`.
+    pub(crate) fn size(&self) -> (usize, usize) {
+        match self {
+            Self::Coverage(matte) => matte.view().size(),
+            Self::Inside(inside) => inside.view().size(),
+        }
+    }
+}
+
+/// A matte of an argument, copied.
 pub(crate) fn matte_of(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Image<Coverage>> {
-    let array = array_of(name, argument)?;
-    let size = matte_size(name, array)?;
-    if is_of::<bool>(array) {
-        return Ok(matte_of_mask(foreign::<bool, u8>(array, size)?.view()));
-    }
-    if !is_of::<f32>(array) {
-        let found = array.dtype();
-        let what = format!("dtype {found}, expected float32 (0 to 1) or bool");
-        return Err(wrong_type(name, &what));
-    }
-    let matte = copied(foreign::<f32, Coverage>(array, size)?.view());
-    check_coverage(name, &matte).map_err(crate::errors::to_python)?;
-    Ok(matte)
+    Ok(match GivenMatte::from_argument(name, argument)? {
+        GivenMatte::Coverage(matte) => copied(matte.view()),
+        GivenMatte::Inside(inside) => matte_of_mask(inside.view()),
+    })
 }
 
 fn matte_size(name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<[usize; 2]> {
@@ -150,28 +174,31 @@ fn matte_of_mask(inside: ImageView<'_, u8>) -> Image<Coverage> {
     Image::from_vec(width, height, shares.collect())
 }
 
-fn check_coverage(name: &str, matte: &Image<Coverage>) -> Result<()> {
-    let bad = matte
-        .pixels()
-        .iter()
-        .position(|c| !(0.0..=1.0).contains(&c.0));
-    bad.map_or(Ok(()), |i| {
-        let (value, at) = (matte.pixels()[i].0, place(i, matte.width()));
-        Err(Error::value(
-            name,
-            format!("{value} at {at}, expected 0 to 1"),
-        ))
-    })
+fn check_coverage(name: &str, matte: ImageView<'_, Coverage>) -> Result<()> {
+    for y in 0..matte.size().1 {
+        let row = matte.row(y);
+        if let Some(x) = row.iter().position(|c| !(0.0..=1.0).contains(&c.0)) {
+            let what = format!("{} at column {x}, row {y}, expected 0 to 1", row[x].0);
+            return Err(Error::value(name, what));
+        }
+    }
+    Ok(())
 }
 
 fn array_of<'a, 'py>(
     name: &str,
     argument: &'a Bound<'py, PyAny>,
 ) -> PyResult<&'a Bound<'py, PyUntypedArray>> {
-    argument.cast::<PyUntypedArray>().map_err(|_| {
+    let array = argument.cast::<PyUntypedArray>().map_err(|_| {
         let found = argument.get_type();
         wrong_type(name, &format!("{found}, expected an array of NumPy"))
-    })
+    })?;
+    let masked = argument.py().import("numpy.ma")?.getattr("MaskedArray")?;
+    match argument.is_instance(&masked)? {
+        // Its mask would be lost without a word.
+        true => Err(wrong_type(name, "a masked array, expected a plain one")),
+        false => Ok(array),
+    }
 }
 
 fn is_of<T: Element>(array: &Bound<'_, PyUntypedArray>) -> bool {
@@ -268,10 +295,6 @@ fn finite<P: Floats>(name: &str, pixels: Foreign<P>) -> Result<Pixels<P>> {
         }
     }
     Ok(Pixels::Given(pixels))
-}
-
-fn place(i: usize, width: usize) -> String {
-    format!("column {}, row {}", i % width, i / width)
 }
 
 /// A picture as an array, its memory moved: height x width, and the channels where there are

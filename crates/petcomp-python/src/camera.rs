@@ -45,7 +45,12 @@ impl Camera {
 
     #[staticmethod]
     fn looking_down(height: f64, focal_px: f64, image: [u32; 2]) -> PyResult<Self> {
-        check_finite("height", &[height, focal_px])?;
+        check_finite("height", &[height])?;
+        check_finite("focal_px", &[focal_px])?;
+        if height <= 0.0 {
+            let what = format_args!("{height}, expected above 0 (metres)");
+            return Err(wrong_value("height", what));
+        }
         checked(petcomp::Camera::looking_down(height, focal_px, image))
     }
 

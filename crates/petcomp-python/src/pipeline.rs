@@ -7,11 +7,11 @@ use crate::sample::{PictureFile, Policy, Sample};
 use crate::scene::{config_of, scene_of};
 use crate::work::{self, Stop};
 use petcomp::dataset::{self, DatasetConfig};
-use petcomp::io::{self, Override};
+use petcomp::io::Override;
 use petcomp::{Quality, Result, Scene};
 use pyo3::prelude::*;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Mutex;
 
 /// Everything that pictures are made from, opened once.
@@ -38,20 +38,6 @@ struct RecipeSource {
 }
 
 impl RecipeSource {
-    /// The recipe with paths from the root: files are read late, whatever the working folder is then.
-    fn config(&self) -> Result<DatasetConfig> {
-        let mut config = self.read()?;
-        for path in [
-            &mut config.folder,
-            &mut config.assets,
-            &mut config.backgrounds,
-        ] {
-            // An empty path is the working folder, too.
-            *path = io::absolute(&Path::new(".").join(path.as_path()))?;
-        }
-        Ok(config)
-    }
-
     fn read(&self) -> Result<DatasetConfig> {
         let overrides = self.overrides_at_quality()?;
         match &self.json {
@@ -73,7 +59,7 @@ impl RecipeSource {
 
 impl Opened {
     fn new(source: &RecipeSource) -> Result<Self> {
-        let pipeline = dataset::Pipeline::open(source.config()?)?;
+        let pipeline = dataset::Pipeline::open(source.read()?)?;
         let labels = &pipeline.config().labels;
         let policy = Policy {
             classes: labels.obstructed.classes(&pipeline.library().classes)?,

@@ -1,6 +1,6 @@
 //! A picture and its labels.
 
-use crate::arrays::{Given, matte_of, to_array};
+use crate::arrays::{Given, GivenMatte, to_array};
 use crate::document::text;
 use crate::errors::{internal, to_python, wrong_value};
 use crate::lock::locked;
@@ -10,7 +10,7 @@ use numpy::ndarray::Array2;
 use numpy::{PyArray2, PyArrayDyn};
 use petcomp::dataset::{self, Extent, LabelledObject, Obstructed, Pictures, Provenance};
 use petcomp::label::{Labels, ObjectLabel, RleMask};
-use petcomp::{Coverage, DeepImage, Image, ObjectId, PremulRgba, Srgb8, composite};
+use petcomp::{DeepImage, Image, ImageView, ObjectId, PremulRgba, Srgb8, composite};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex};
@@ -192,7 +192,10 @@ impl Sample {
         classes: Vec<String>,
     ) -> PyResult<Self> {
         let image = Given::from_argument("image", image)?;
-        let masks: PyResult<Vec<_>> = masks.iter().map(|mask| matte_of("masks", mask)).collect();
+        let masks: PyResult<Vec<_>> = masks
+            .iter()
+            .map(|mask| GivenMatte::from_argument("masks", mask))
+            .collect();
         let masks = masks?;
         check_classes(&object_classes, masks.len(), classes.len())?;
         let policy = Policy {
@@ -334,7 +337,7 @@ fn check_classes(object_classes: &[u32], masks: usize, classes: usize) -> PyResu
 
 fn labels_of(
     (width, height): (usize, usize),
-    masks: &[Image<Coverage>],
+    masks: &[GivenMatte],
     classes: &[u32],
 ) -> petcomp::Result<Labels> {
     let objects = (1..).zip(masks).zip(classes);
@@ -355,11 +358,11 @@ fn labels_of(
     })
 }
 
-fn object_of(id: u32, mask: &Image<Coverage>, class: u32) -> ObjectLabel {
-    let (width, height) = mask.size();
-    let mask = RleMask::from_fn([width as u32, height as u32], |x, y| {
-        mask[(x as usize, y as usize)].0 > 0.5
-    });
+fn object_of(id: u32, mask: &GivenMatte, class: u32) -> ObjectLabel {
+    let mask = match mask {
+        GivenMatte::Coverage(matte) => runs_of(matte.view(), |share| share.0 > 0.5),
+        GivenMatte::Inside(inside) => runs_of(inside.view(), |code| code != 0),
+    };
     ObjectLabel {
         id: ObjectId(id),
         class,
@@ -370,4 +373,12 @@ fn object_of(id: u32, mask: &Image<Coverage>, class: u32) -> ObjectLabel {
         visible_fraction: 1.0,
         ..ObjectLabel::default()
     }
+}
+
+/// The pixels of an object, read where they are: there may be many masks.
+fn runs_of<P: Copy>(pixels: ImageView<'_, P>, is_inside: impl Fn(P) -> bool) -> RleMask {
+    let (width, height) = pixels.size();
+    RleMask::from_fn([width as u32, height as u32], |x, y| {
+        is_inside(pixels.row(y as usize)[x as usize])
+    })
 }

@@ -207,6 +207,7 @@ def test_a_texture_seen_edge_on_or_from_behind_is_fine():
 def test_cameras_that_cannot_be_are_refused():
     for make in (
         lambda: petcomp.Camera.looking_down(math.nan, 80, [64, 48]),
+        lambda: petcomp.Camera.looking_down(0, 80, [64, 48]),
         lambda: petcomp.Camera.looking_down(1, -80, [64, 48]),
         lambda: petcomp.Camera.looking_down(1, 80, [0, 48]),
         lambda: petcomp.Camera.looking_down(1, 80, [10**9, 10**9]),
@@ -218,6 +219,48 @@ def test_cameras_that_cannot_be_are_refused():
     ):
         with pytest.raises((ValueError, TypeError, errors.CameraError)):
             make()
+
+
+def test_no_camera_looks_down_from_below_the_surface():
+    with pytest.raises(errors.InvalidValueError, match=re.escape("height: -1, expected above 0 (metres)")):
+        petcomp.Camera.looking_down(-1, 80, [64, 48])
+
+
+def test_a_number_out_of_range_is_an_error_of_petcomp():
+    with pytest.raises(errors.InvalidValueError, match="^threads: -1, expected 0 or more"):
+        petcomp.set_threads(-1)
+    with pytest.raises(errors.InvalidValueError, match="^size: .*, expected two whole numbers above 0"):
+        petcomp.evaluate("none.json", "none", size=(2**40, 48))
+
+
+def test_a_wrong_type_is_a_type_error(recipe):
+    for use in (
+        lambda: petcomp.set_threads("1"),
+        lambda: petcomp.Pipeline(recipe, quality=3),
+        lambda: petcomp.Camera.looking_down("1", 80, [64, 48]),
+        lambda: petcomp.io.read("none.png", 3),
+    ):
+        with pytest.raises(TypeError):
+            use()
+
+
+def test_a_mask_of_an_array_is_not_lost():
+    def masked(array):
+        return np.ma.masked_array(array, np.zeros_like(array, bool))
+
+    camera, plain = petcomp.Camera.looking_down(1, 80, [64, 48]), np.zeros((6, 8), bool)
+    boxes = {"boxes": masked(np.zeros((1, 4))), "classes": [0]}
+    for at, use in (
+        ("image", lambda: key(masked(PHOTO))),
+        ("screen", lambda: key(PHOTO, screen=masked(np.float32(GREEN)))),
+        ("garbage", lambda: key(PHOTO, garbage=masked(plain))),
+        ("masks", lambda: petcomp.Sample.from_masks(PHOTO, [masked(plain)], [0], ["a"])),
+        ("points", lambda: camera.project(masked(np.zeros((1, 3))))),
+        ("truth[0].boxes", lambda: petcomp.evaluate([{**boxes, "scores": [1]}], [boxes])),
+        ("scene.image", lambda: petcomp.Scene.from_dict({"image": masked(np.array([8, 6]))})),
+    ):
+        with pytest.raises(errors.ArgumentTypeError, match=re.escape(f"{at}: a masked array, expected a plain one")):
+            use()
 
 
 def test_a_rectangle_in_millimetres_is_no_rectangle_in_metres():

@@ -63,6 +63,7 @@ async function open(photo) {
   Object.assign(stage, { size: null, strokes: [] });
   stage.draw();
   list.choose(photo);
+  document.title = `${base(photo)} · Mattes`;
   for (const id of ["flags", "facts"]) at(id).replaceChildren();
   showReview();
   await trying(async () => {

@@ -73,13 +73,16 @@ async function changed({ redraw = false } = {}) {
 }
 
 async function draftOnce() {
-  const { edits } = recipe;
+  const { file, saved, edits } = recipe;
   try {
-    recipe.draft = await api("api/recipe/draft", { file: recipe.file, edits });
+    const draft = await api("api/recipe/draft", { file, edits });
+    // Another recipe was opened meanwhile, or this one as it is now.
+    if (saved !== recipe.saved) return;
+    recipe.draft = draft;
   } finally {
-    at("save").disabled = !edits.length;
+    at("save").disabled = !recipe.edits.length;
+    document.title = `${recipe.edits.length ? "• " : ""}${recipe.file} · petcomp studio`;
   }
-  document.title = `${edits.length ? "• " : ""}${recipe.file} · petcomp studio`;
   if (drafting.redraw) showSettings();
   else markSettings();
   // Something newer was asked for meanwhile, and is not in these controls yet.
@@ -240,10 +243,13 @@ async function showWhole(k) {
   });
 }
 
-function showText() {
+async function showText() {
+  const { file, edits } = recipe;
+  // What was edited last need not be in the draft that the settings show.
+  const { text } = await api("api/recipe/draft", { file, edits });
   const dialog = element("dialog", { class: "wide", "aria-label": "the file" },
-    element("h2", {}, recipe.file, recipe.edits.length ? " as it would be saved" : ""),
-    element("pre", {}, recipe.draft.text),
+    element("h2", {}, file, edits.length ? " as it would be saved" : ""),
+    element("pre", {}, text),
     element("form", { method: "dialog" }, element("button", { class: "main" }, "Close")));
   dialog.addEventListener("close", () => dialog.remove());
   document.body.append(dialog);
@@ -499,7 +505,7 @@ at("compare").addEventListener("click", () => pictures.set({ compare: !pictures.
 at("labels").addEventListener("click", () => pictures.set({ labels: !pictures.labels }));
 at("undo").addEventListener("click", undo);
 at("redo").addEventListener("click", redo);
-at("text").addEventListener("click", showText);
+at("text").addEventListener("click", () => trying(showText));
 addEventListener("beforeunload", (event) => { if (recipe.edits.length) event.preventDefault(); });
 
 shortcuts([
@@ -510,7 +516,7 @@ shortcuts([
   ["p", "the scenes before", () => nextScenes(-1)],
   ["b", "before and after", () => pictures.set({ compare: !pictures.compare })],
   ["l", "labels", () => pictures.set({ labels: !pictures.labels })],
-  ["f", "the file", showText],
+  ["f", "the file", () => trying(showText)],
   ["/", "find a setting", () => at("search").focus()],
 ]);
 

@@ -40,6 +40,7 @@ async function show(photo) {
   open = picture ? { photo, ...state } : null;
   view.show(picture);
   history.replaceState(null, "", query("scale", { photo }));
+  document.title = `${photo.split("/").pop()} · Scale`;
   at("title").textContent = photo.split("/").pop();
   list.choose(photo);
   [points.ruler, points.screen] = [[], []];

@@ -10,7 +10,7 @@ use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, ETAG, IF_NONE_MATCH};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use petcomp::io::{Format, ToFile};
+use petcomp::io::{Format, Header, ToFile};
 use petcomp::{Image, Mix, PremulRgba, filter, io};
 use serde::Deserialize;
 use std::path::Path;
@@ -126,13 +126,46 @@ fn over_black(path: &Path, side_px: usize, quality: u8) -> Answer<Response> {
     jpeg_of(&picture.map(PremulRgba::color), quality)
 }
 
-/// The type and the bytes of a file that every browser shows as petcomp reads it.
+/// The type and the bytes of a file that every browser shows as petcomp reads it. An upright JPEG
+/// is one without its EXIF data.
 fn plain_file(path: &Path) -> Answer<Option<(&'static str, Vec<u8>)>> {
-    let Some(kind) = plain_type(path)? else {
+    let header = io::read_header(path)?;
+    let Some(kind) = plain_type(path, &header)? else {
         return Ok(None);
     };
     let bytes = std::fs::read(path).map_err(unreadable)?;
-    Ok((!may_have_exif(&bytes)).then_some((kind, bytes)))
+    let plain = match header.format {
+        _ if !may_have_exif(&bytes) => Some(bytes),
+        Format::Jpeg if !header.turned => without_notes(&bytes).filter(|b| !may_have_exif(b)),
+        _ => None,
+    };
+    Ok(plain.map(|bytes| (kind, bytes)))
+}
+
+/// Markers of a JPEG: EXIF data and XMP, and where the pixels begin.
+const APP1: u8 = 0xe1;
+const START_OF_SCAN: u8 = 0xda;
+
+/// A JPEG without the EXIF data and XMP in front of its pixels; none of one with something else
+/// than segments there.
+fn without_notes(jpeg: &[u8]) -> Option<Vec<u8>> {
+    let (start, mut rest) = jpeg.split_at_checked(2)?;
+    let mut kept = start.to_vec();
+    loop {
+        let &[0xff, marker, high, low, ..] = rest else {
+            return None;
+        };
+        if marker == START_OF_SCAN {
+            kept.extend_from_slice(rest);
+            return Some(kept);
+        }
+        let length = 2 + usize::from(u16::from_be_bytes([high, low]));
+        let (segment, behind) = rest.split_at_checked(length)?;
+        if marker != APP1 {
+            kept.extend_from_slice(segment);
+        }
+        rest = behind;
+    }
 }
 
 /// Whether browsers may turn or scale a picture by EXIF data otherwise than petcomp: by an
@@ -143,8 +176,7 @@ fn may_have_exif(bytes: &[u8]) -> bool {
 }
 
 /// The type of a file whose pixels every browser shows as petcomp reads them.
-fn plain_type(path: &Path) -> Answer<Option<&'static str>> {
-    let header = io::read_header(path)?;
+fn plain_type(path: &Path, header: &Header) -> Answer<Option<&'static str>> {
     let bytes = std::fs::metadata(path).map_err(unreadable)?.len();
     Ok(match header.format {
         _ if bytes > MAX_PLAIN_BYTES => None,
@@ -204,6 +236,21 @@ mod tests {
         std::fs::write(&answered, sent).unwrap();
         let header = io::read_header(&answered).unwrap();
         assert_eq!((header.width, header.height), (20, 40));
+    }
+
+    /// Encoding 12 megapixels anew took 0.6 s at each opening.
+    #[test]
+    fn an_upright_photo_with_exif_data_is_sent_without_them_and_not_encoded_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let photo = folder.path().join("a.jpg");
+        io::write(&photo, &Image::filled(40, 20, LinearRgb::WHITE)).unwrap();
+        let plain = std::fs::read(&photo).unwrap();
+        let exif = b"\xff\xe1\0\x22Exif\0\0MM\0*\0\0\0\x08\
+            \0\x01\x01\x12\0\x03\0\0\0\x01\0\x01\0\0\0\0\0\0";
+        let noted = [&plain[..2], exif, &plain[2..]].concat();
+        std::fs::write(&photo, &noted).unwrap();
+        assert!(may_have_exif(&noted));
+        assert_eq!(body_of(&photo, None), plain);
     }
 
     #[test]

@@ -188,6 +188,39 @@ fn set_number(browser: &mut Browser, path: &str, value: &str) {
     ));
 }
 
+/// The title said that another recipe has edits, and its settings were those of the first.
+#[test]
+fn a_late_draft_of_one_recipe_is_not_shown_as_that_of_another() {
+    let Some(mut browser) = Browser::open(1440, 900) else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    for name in ["recipe.toml", "other.toml"] {
+        io::write_text(dir.path().join(name), tray::RECIPE).unwrap();
+    }
+    let studio = Studio::over(dir.path());
+    browser.go(&studio.page("recipe?file=recipe.toml"));
+    browser.wait_for(".setting");
+    browser.eval(
+        "const real = window.fetch; window.confirm = () => true; window.fetch = async (path, how) => { \
+         const reply = await real(path, how); if (!path.includes('draft')) return reply; \
+         await new Promise((done) => { window.late = done; }); return reply; }; null",
+    );
+    set_number(&mut browser, "scene.gain_ev", "0.25");
+    browser.wait("window.late !== undefined");
+    browser.eval(
+        "const files = document.querySelector('#file'); files.value = 'other.toml'; \
+         files.dispatchEvent(new Event('change')); null",
+    );
+    browser.wait("document.title === 'other.toml · petcomp studio'");
+    browser.eval("window.late(); new Promise((done) => setTimeout(done, 200)).then(() => null)");
+    browser.wait("document.title === 'other.toml · petcomp studio'");
+    let edited = browser.eval(EDITED);
+    assert_eq!(edited.as_u64(), Some(0));
+    let saving = browser.eval("document.querySelector('#save').disabled");
+    assert_eq!(saving.as_bool(), Some(true));
+}
+
 #[test]
 fn settings_show_what_two_undos_at_once_leave() {
     let Some(mut browser) = Browser::open(1440, 900) else {

@@ -74,6 +74,21 @@ impl Wanted {
         matches!(self, Self::Color | Self::Film)
     }
 
+    /// The names with an alpha behind them, where they are those of colours without one.
+    pub(crate) fn with_alpha(self, names: &[String]) -> Option<Vec<String>> {
+        let picks = |names: &[String]| self.pick(names).map_or(0, |picked| picked.len());
+        let layer = names[0].rfind('.').map_or("", |dot| &names[0][..=dot]);
+        let extended = [names, &[format!("{layer}A")]].concat();
+        let is_without = self.is_color() && picks(names) == 3 && picks(&extended) == 4;
+        is_without.then_some(extended)
+    }
+
+    /// Whether a channel is 1, and not 0, where nothing is stored: all light passes there.
+    pub(crate) fn is_one_where_empty(self, name: &str) -> bool {
+        let is_transmittance = VIEW_TRANSMITTANCE.contains(&name) || TRANSMITTANCE.contains(&name);
+        self == Self::Film && is_transmittance
+    }
+
     /// The message where the wanted channels are not there.
     pub(crate) fn missing_among(self, names: &[String]) -> String {
         format!(

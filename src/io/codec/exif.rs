@@ -4,7 +4,7 @@
 use super::orient::Orientation;
 use super::profile::ColorDescription;
 use exif::{Error, Exif, In, Tag, Value};
-use std::io::{BufRead, Seek};
+use std::io::{BufRead, Read, Seek, SeekFrom};
 
 /// Diagonal of 36 mm x 24 mm film, which equivalents of focal lengths refer to, millimetres.
 const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
@@ -39,6 +39,10 @@ const EDITORS: [&str; 20] = [
 ];
 /// Directories that a file may point to; cameras have three, and pixels may look like some.
 const MOST_POINTERS: usize = 8;
+/// Directories of pictures in a row that the reader follows.
+const MOST_PICTURES: usize = 8;
+/// Bytes of an entry of a directory.
+const ENTRY_BYTES: u64 = 12;
 /// What the reader says of notes whose first bytes are damaged.
 const DAMAGED_STARTS: [&str; 3] = [
     "Truncated TIFF header",
@@ -167,8 +171,122 @@ fn is_close(side: f64, expected: f64) -> bool {
     (side / expected - 1.0).abs() <= SIZE_TOLERANCE
 }
 
-/// Places in a file that look like a pointer to a directory; the file is at its start again then.
+/// Pointers to directories in a TIFF, or places in another file that look like one; the file is at
+/// its start again then.
 fn count_pointers(file: &mut (impl BufRead + Seek)) -> std::io::Result<usize> {
+    let header = read_at(file, 0, 8)?;
+    file.rewind()?;
+    let count = match TiffOrder::of(&header) {
+        // Pixels that are not compressed may look like any number of them.
+        Some(order) => order.count_pointers(file, order.number(&header[4..]))?,
+        None => count_likely_pointers(file)?,
+    };
+    file.rewind()?;
+    Ok(count)
+}
+
+/// So many bytes at a place in a file, or those up to its end.
+fn read_at(file: &mut (impl Read + Seek), place: u64, count: u64) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    file.seek(SeekFrom::Start(place))?;
+    file.by_ref().take(count).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// In which order a TIFF has the bytes of a number.
+#[derive(Clone, Copy)]
+enum TiffOrder {
+    LittleEndian,
+    BigEndian,
+}
+
+/// What a directory of a TIFF points to.
+struct TiffDirectory {
+    /// Directories of the camera, of its position, or of what it shares with others.
+    children: Vec<u64>,
+    /// That of the next picture; 0 for none.
+    next: u64,
+}
+
+impl TiffOrder {
+    /// None where a file with this header is no TIFF.
+    fn of(header: &[u8]) -> Option<Self> {
+        match header {
+            [b'I', b'I', 42, 0, _, _, _, _] => Some(Self::LittleEndian),
+            [b'M', b'M', 0, 42, _, _, _, _] => Some(Self::BigEndian),
+            _ => None,
+        }
+    }
+
+    fn number(self, bytes: &[u8]) -> u64 {
+        let append = |number: u64, byte: &u8| (number << 8) | u64::from(*byte);
+        match self {
+            Self::LittleEndian => bytes.iter().rev().fold(0, append),
+            Self::BigEndian => bytes.iter().fold(0, append),
+        }
+    }
+
+    /// Those that the reader follows: from pictures, and from what they point to.
+    fn count_pointers(self, file: &mut (impl Read + Seek), first: u64) -> std::io::Result<usize> {
+        let (mut next, mut count) = (first, 0);
+        for _ in 0..MOST_PICTURES {
+            let picture = self.read_directory(file, next)?;
+            count += picture.children.len();
+            if count > MOST_POINTERS {
+                break;
+            }
+            for child in picture.children {
+                count += self.read_directory(file, child)?.children.len();
+            }
+            next = picture.next;
+            if next == 0 {
+                break;
+            }
+        }
+        Ok(count)
+    }
+
+    fn read_directory(
+        self,
+        file: &mut (impl Read + Seek),
+        place: u64,
+    ) -> std::io::Result<TiffDirectory> {
+        let length = ENTRY_BYTES * self.number(&read_at(file, place, 2)?);
+        let entries = read_at(file, place + 2, length)?;
+        let next = self.number(&read_at(file, place + 2 + length, 4)?);
+        let mut children = Vec::new();
+        for (i, entry) in (0..).zip(entries.chunks_exact(ENTRY_BYTES as usize)) {
+            let start = place + 2 + ENTRY_BYTES * i;
+            if let Some((place, size)) = self.pointer_in(entry, start) {
+                children.push(self.number(&read_at(file, place, size)?));
+            }
+        }
+        Ok(TiffDirectory { children, next })
+    }
+
+    /// Where the pointer of an entry is that starts at some place, and its bytes: in the entry
+    /// itself, or elsewhere where there are several, of which the reader takes the first.
+    fn pointer_in(self, entry: &[u8], start: u64) -> Option<(u64, u64)> {
+        if !is_pointer([entry[0], entry[1], entry[2], entry[3]]) {
+            return None;
+        }
+        let size = match self.number(&entry[2..4]) {
+            3 => 2,
+            4 => 4,
+            _ => 1,
+        };
+        let is_inside = size * self.number(&entry[4..8]) <= 4;
+        let place = if is_inside {
+            start + 8
+        } else {
+            self.number(&entry[8..12])
+        };
+        Some((place, size))
+    }
+}
+
+/// Places in a file that look like a pointer to a directory.
+fn count_likely_pointers(file: &mut impl BufRead) -> std::io::Result<usize> {
     let (mut last, mut count) = ([0; 4], 0);
     loop {
         let bytes = file.fill_buf()?;
@@ -177,12 +295,10 @@ fn count_pointers(file: &mut (impl BufRead + Seek)) -> std::io::Result<usize> {
             count += usize::from(is_pointer(last));
         }
         match bytes.len() {
-            0 => break,
+            0 => return Ok(count),
             length => file.consume(length),
         }
     }
-    file.rewind()?;
-    Ok(count)
 }
 
 /// An entry begins so, in either byte order, that points to a directory: of the camera, of its
@@ -355,6 +471,29 @@ mod tests {
         file.extend(b"\x01\x12\0\x03\0\0\0\x01\0\x06\0\0");
         file.extend(b"\x87\x69\0\x04\0\0\0\x01\0\0\0\x08".repeat(1000));
         file.extend(b"\xa0\x05\0\x04\0\0\0\x01\0\0\0\x08".repeat(1000));
+        file.extend([0; 4]);
+        assert!(CameraNotes::read(Cursor::new(file)).unreadable);
+    }
+
+    #[test]
+    fn pixels_that_look_like_pointers_are_none() {
+        let mut file = unended();
+        file.extend([0; 8]);
+        file.extend(b"\x87\x69\0\x04".repeat(1000));
+        let notes = CameraNotes::read(Cursor::new(file));
+        assert_eq!(
+            (notes.orientation, notes.unreadable),
+            (Orientation(6), false)
+        );
+    }
+
+    /// A directory behind the first one, from which a thousand pointers lead on.
+    #[test]
+    fn pointers_of_a_directory_that_is_pointed_to_count() {
+        let mut file = b"MM\0*\0\0\0\x08\0\x01".to_vec();
+        file.extend(b"\x87\x69\0\x04\0\0\0\x01\0\0\0\x1a\0\0\0\0");
+        file.extend(1000_u16.to_be_bytes());
+        file.extend(b"\xa0\x05\0\x04\0\0\0\x01\0\0\0\x1a".repeat(1000));
         file.extend([0; 4]);
         assert!(CameraNotes::read(Cursor::new(file)).unreadable);
     }

@@ -245,6 +245,14 @@ pub(crate) fn camera_notes(mut file: impl BufRead + Seek) -> CameraNotes {
     }
 }
 
+/// How many samples of a pixel are neither colour nor said to be alpha.
+pub(crate) fn unspecified_samples(bytes: &[u8]) -> usize {
+    let decoder = Decoder::new(Cursor::new(bytes)).ok();
+    let extra = decoder.and_then(|mut decoder| extra_samples(&mut decoder).ok());
+    let extra = extra.unwrap_or_default();
+    extra.iter().filter(|kind| !is_alpha(&[**kind])).count()
+}
+
 /// Colours are multiplied by alpha, also in kinds of TIFF that the decoder cannot read.
 #[cfg(feature = "oiio")]
 pub(crate) fn has_associated_alpha(bytes: &[u8]) -> bool {
@@ -690,6 +698,25 @@ mod tests {
         ] {
             let told = decoded(raw).err().unwrap().to_string();
             assert!(told.starts_with("is a camera's raw file"), "{told}");
+        }
+    }
+
+    #[test]
+    fn a_fourth_sample_is_alpha_only_where_it_is_called_so() {
+        for (kind, unspecified, names) in [
+            (ExtraSamples::Unspecified, 1, "R G B"),
+            (ExtraSamples::UnassociatedAlpha, 0, "R G B A"),
+        ] {
+            let mut file = Cursor::new(Vec::new());
+            let mut encoder = TiffEncoder::new(&mut file).unwrap();
+            let mut image = encoder.new_image::<RGB8>(2, 1).unwrap();
+            image.extra_samples(&[kind]).unwrap();
+            image.write_data(&[1, 2, 3, 0, 4, 5, 6, 0]).unwrap();
+            let file = file.into_inner();
+            assert_eq!(unspecified_samples(&file), unspecified);
+            let read = decode(&file, &Limits::default()).unwrap();
+            assert_eq!(read.names.join(" "), names);
+            assert!(read.names.len() == 4 || read.samples == Samples::U8(vec![1, 2, 3, 4, 5, 6]));
         }
     }
 

@@ -18,6 +18,8 @@ use serde::de::DeserializeOwned;
 use std::path::Path;
 use toml::de::DeTable;
 
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
 /// Reads a TOML document.
 ///
 /// # Errors
@@ -170,7 +172,7 @@ pub(crate) fn read_json_data<T: DeserializeOwned>(path: impl AsRef<Path>) -> Res
         .map_err(|e| e.in_file(path))
 }
 
-/// Reads a text file.
+/// Reads a text file, without the byte order mark that editors of Windows put before it.
 ///
 /// # Errors
 /// [`Error::File`] for a file that is missing, not regular, larger than
@@ -186,8 +188,13 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     read_regular(path, (limit, "document_bytes"), "text file")
 }
 
+/// The text of a file behind its byte order mark, if it has one.
 fn utf8(path: &Path, bytes: Vec<u8>) -> Result<String> {
-    String::from_utf8(bytes).map_err(|_| Error::file(path, "not text (UTF-8)"))
+    let mut text = String::from_utf8(bytes).map_err(|_| Error::file(path, "not text (UTF-8)"))?;
+    if text.starts_with(BYTE_ORDER_MARK) {
+        text.drain(..BYTE_ORDER_MARK.len_utf8());
+    }
+    Ok(text)
 }
 
 /// Writes a document as TOML.
@@ -412,6 +419,26 @@ mod tests {
         let told = written("a.yaml").unwrap_err().to_string();
         let expected = "a.yaml: no format for this extension, expected .toml or .json";
         assert!(told.ends_with(expected), "{told}");
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_a_document() {
+        let folder = tempfile::tempdir().unwrap();
+        let marked = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, format!("\u{feff}{text}")).unwrap();
+            path
+        };
+        let expected = BTreeMap::from([("seed".to_owned(), 1)]);
+        let toml: BTreeMap<String, u32> = read_document(marked("a.toml", "seed = 1\n")).unwrap();
+        assert_eq!(toml, expected);
+        let json: BTreeMap<String, u32> = read_document(marked("a.json", "{\"seed\": 1}")).unwrap();
+        assert_eq!(json, expected);
+        let data: BTreeMap<String, u32> =
+            read_json_data(marked("b.json", "{\"seed\": 1}")).unwrap();
+        assert_eq!(data, expected);
+        let rows = read_text(marked("a.txt", "0 0.5 0.5 0.2 0.2\n")).unwrap();
+        assert!(rows.starts_with("0 0.5"), "{rows:?}");
     }
 
     #[test]

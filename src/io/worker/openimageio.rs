@@ -12,6 +12,7 @@ use crate::io::header::Window;
 use crate::io::limits::{Demand, Limits, affordable};
 use crate::io::source::SourceFile;
 use cxx::UniquePtr;
+use half::f16;
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -51,8 +52,7 @@ pub(crate) fn start() -> Result<(), Refusal> {
 /// The shape of a picture, without its samples.
 pub(crate) fn shape(source: &SourceFile, limits: &Limits) -> Result<Shape, Refusal> {
     let (_, layout) = open(source, limits)?;
-    let all: Vec<usize> = (0..layout.channels.len()).collect();
-    Ok(layout.shape(&all))
+    Ok(layout.shape(&layout.channels))
 }
 
 /// Samples as the file has them, in the requested window; `prepare` gets their shape and the number
@@ -71,18 +71,19 @@ pub(crate) fn decode(
     let mut picked = wanted.pick(&layout.channels)?;
     // Grey is picked three times over for colour, but carried once.
     picked.dedup();
+    let shown = ShownChannels::new(&layout, picked, wanted);
     let (width, height) = (layout.width as usize, layout.height as usize);
-    limits.check_memory(width, height, picked.len())?;
-    let bytes = layout.larger_window_bytes() * working_copies(source.format);
-    prepare(layout.shape(&picked), bytes)?;
+    limits.check_memory(width, height, shown.names.len())?;
+    let bytes = layout.larger_window_bytes(shown.names.len()) * working_copies(source.format);
+    prepare(layout.shape(&shown.names), bytes)?;
     // Not before: a worker has the memory for a picture only once it is prepared.
     affordable(bytes)?;
-    let samples = read_samples(source.format, &reader, &layout, &picked)?;
+    let samples = read_samples(source.format, &reader, &layout, &shown)?;
     let (samples, display_encoded) = interpret(samples, source.format, &layout.color_space)?;
     Ok(Raster {
         width,
         height,
-        names: layout.names_of(&picked),
+        names: shown.names,
         samples,
         display_encoded,
         premultiplied: false,
@@ -121,12 +122,12 @@ fn refused(format: Format, e: &cxx::Exception) -> Refusal {
 }
 
 impl Layout {
-    /// The shape of some of the channels, as far as it is known before they are decoded.
-    fn shape(&self, picked: &[usize]) -> Shape {
+    /// The shape of a picture of these channels, as far as it is known before they are decoded.
+    fn shape(&self, names: &[String]) -> Shape {
         Shape {
             width: self.width as usize,
             height: self.height as usize,
-            names: self.names_of(picked),
+            names: names.to_vec(),
             sample: self.sample(),
             display_encoded: false,
         }
@@ -182,10 +183,11 @@ impl Layout {
         (self.data_width * self.data_height) as usize * self.channels.len()
     }
 
-    /// Bytes of all channels in the larger of both windows: one is cut or padded to the other.
-    fn larger_window_bytes(&self) -> u64 {
+    /// Bytes of all channels, or of those that are shown where they are more, in the larger of both
+    /// windows: one is cut or padded to the other.
+    fn larger_window_bytes(&self, shown_channels: usize) -> u64 {
         let pixels = (self.data_width * self.data_height).max(self.width * self.height);
-        let channels = self.channels.len() as u64;
+        let channels = self.channels.len().max(shown_channels) as u64;
         pixels as u64 * channels * u64::from(self.bytes.unsigned_abs())
     }
 
@@ -211,35 +213,76 @@ impl Layout {
     }
 }
 
+/// The channels that a picture is shown with.
+struct ShownChannels {
+    /// Indices of those that the file has.
+    picked: Vec<usize>,
+    /// Their names; those of colours without alpha that are not stored everywhere have one behind
+    /// them.
+    names: Vec<String>,
+    /// Which are 1, and not 0, where nothing is stored.
+    ones: Vec<bool>,
+}
+
+impl ShownChannels {
+    fn new(layout: &Layout, picked: Vec<usize>, wanted: Wanted) -> Self {
+        let all = (0..layout.height as usize, 0..layout.width as usize);
+        let mut names = layout.names_of(&picked);
+        if layout.visible() != all
+            && let Some(extended) = wanted.with_alpha(&names)
+        {
+            names = extended;
+        }
+        let ones = names.iter().map(|name| wanted.is_one_where_empty(name));
+        Self {
+            ones: ones.collect(),
+            picked,
+            names,
+        }
+    }
+}
+
 fn read_samples(
     format: Format,
     reader: &ffi::Reader<'_>,
     layout: &Layout,
-    picked: &[usize],
+    shown: &ShownChannels,
 ) -> Result<Samples, Refusal> {
     let mut samples = Samples::zeroed(layout.sample(), layout.data_samples());
     ffi::read(reader, layout, samples.bytes_mut()).map_err(|e| refused(format, &e))?;
     Ok(match samples {
-        Samples::U8(v) => Samples::U8(windowed(v, layout, picked)),
-        Samples::U16(v) => Samples::U16(windowed(v, layout, picked)),
-        Samples::F16(v) => Samples::F16(windowed(v, layout, picked)),
-        Samples::F32(v) => Samples::F32(windowed(v, layout, picked)),
+        Samples::U8(v) => Samples::U8(windowed(v, layout, shown, u8::MAX)),
+        Samples::U16(v) => Samples::U16(windowed(v, layout, shown, u16::MAX)),
+        Samples::F16(v) => Samples::F16(windowed(v, layout, shown, f16::ONE)),
+        Samples::F32(v) => Samples::F32(windowed(v, layout, shown, 1.0)),
     })
 }
 
-/// The picked channels, cut or padded with zeros from the data window to the display window.
-fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize]) -> Vec<T> {
+/// The shown channels, cut or padded from the data window to the display window; `full` stands for
+/// 1.
+fn windowed<T: Copy + Default>(
+    samples: Vec<T>,
+    layout: &Layout,
+    shown: &ShownChannels,
+    full: T,
+) -> Vec<T> {
     let (width, height) = (layout.width as usize, layout.height as usize);
-    let stride = layout.channels.len();
-    if layout.is_shown_as_stored(picked) {
+    let (stride, count) = (layout.channels.len(), shown.names.len());
+    if layout.is_shown_as_stored(&shown.picked) {
         return samples;
     }
-    let mut out = vec![T::default(); width * height * picked.len()];
+    let ones = shown.ones.iter();
+    let empty: Vec<T> = ones
+        .map(|&is_one| if is_one { full } else { T::default() })
+        .collect();
+    let mut out = empty.repeat(width * height);
     let (ys, xs) = layout.visible();
     for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {
         let pixel = &samples[layout.data_pixel(x, y) * stride..][..stride];
-        let to = (y * width + x) * picked.len();
-        copy_picked(&mut out[to..], pixel, picked);
+        let to = &mut out[(y * width + x) * count..][..count];
+        // An alpha that the file does not have is 1 where something is stored.
+        to.fill(full);
+        copy_picked(to, pixel, &shown.picked);
     }
     out
 }
@@ -331,6 +374,30 @@ fn note((key, value): (String, String)) -> ffi::Note {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Channels, names joined, and samples of a picture of 2 x 1 pixels of which the first alone is
+    /// stored, each sample 7.
+    fn padded(channels: &[&str], wanted: Wanted) -> (String, Vec<u8>) {
+        let mut layout = written_layout((2, 1), channels, Bits::Eight);
+        layout.data_width = 1;
+        let picked = wanted.pick(&layout.channels).unwrap();
+        let shown = ShownChannels::new(&layout, picked, wanted);
+        let samples = windowed(vec![7; channels.len()], &layout, &shown, u8::MAX);
+        (shown.names.join(" "), samples)
+    }
+
+    #[test]
+    fn what_is_not_stored_is_transparent() {
+        let rgb = padded(&["R", "G", "B"], Wanted::Color);
+        assert_eq!(rgb, ("R G B A".into(), vec![7, 7, 7, 255, 0, 0, 0, 0]));
+        let rgba = padded(&["R", "G", "B", "A"], Wanted::Color);
+        assert_eq!(rgba, ("R G B A".into(), vec![7, 7, 7, 7, 0, 0, 0, 0]));
+        let (names, film) = padded(&["R", "G", "B", "VR", "VG", "VB"], Wanted::Film);
+        assert_eq!(names, "R G B VR VG VB");
+        assert_eq!(film, [7, 7, 7, 7, 7, 7, 0, 0, 0, 255, 255, 255]);
+        let matte = padded(&["Y"], Wanted::Coverage);
+        assert_eq!(matte, ("Y".into(), vec![7, 0]));
+    }
 
     #[test]
     fn what_is_thrown_becomes_an_error() {

@@ -1,13 +1,16 @@
 //! What each method makes of the part of a photo around the object.
 
 use super::{CleanScreen, CutOutOptions, MatteMethod, ObjectRegion};
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
+use crate::filter;
 use crate::image::{Image, Mask};
 use crate::matte::clipping::clipping_level;
-use crate::matte::film::{ColorUncertainty, FilmInput, FilmMatte, solve_film};
+use crate::matte::film::{ColorUncertainty, FilmInput, FilmMatte, is_bare_screen, solve_film};
 use crate::matte::key::{Keying, Screen};
 use crate::matte::prepared::Prepared;
+use crate::matte::screen::{is_keyable, strongest_channel};
+use crate::matte::stroke::unclaimed;
 use crate::pixel::{Coverage, Film, LinearRgb, PremulRgba};
 
 /// A matte in the region around the object.
@@ -33,13 +36,20 @@ impl Matted {
         match options.method.unwrap_or_default() {
             MatteMethod::Physical => Self::physical(prepared, screen, region, options),
             MatteMethod::Key => Self::keyed(prepared, screen, region, options),
-            MatteMethod::Outline => Ok(Self::outline(region)),
+            MatteMethod::Outline => Ok(Self::outline(screen, region)),
         }
     }
 
-    fn outline(ObjectRegion { photo, cut, .. }: &ObjectRegion) -> Self {
-        let cutout = photo.zip_map(cut, |p, m| p.opaque().masked(m));
-        Self::grey(MatteMethod::Outline, cutout, 0.0)
+    fn outline(screen: &CleanScreen, region: &ObjectRegion) -> Self {
+        let cutout = region
+            .photo
+            .zip_map(&region.cut, |p, m| p.opaque().masked(m));
+        let share = bare_share(screen, region);
+        let bare = (share > MAX_BARE_SHARE).then(|| bare_within(share));
+        Self {
+            diagnostics: bare.into_iter().collect(),
+            ..Self::grey(MatteMethod::Outline, cutout, 0.0)
+        }
     }
 
     fn physical(
@@ -104,6 +114,37 @@ impl From<FilmMatte> for Matted {
             diagnostics: matte.diagnostics,
         }
     }
+}
+
+/// Nearer than this to its rim, what is within an outline may be screen by the outline's error.
+const RIM_PX: f64 = 2.0;
+/// A larger share of bare screen within an outline is worth a warning.
+const MAX_BARE_SHARE: f64 = 0.05;
+
+/// The share of what an outline encloses that is bare screen, as between the turns of a wire; 0
+/// where the screen has no colour to tell it from clear plastic.
+fn bare_share(screen: &CleanScreen, region: &ObjectRegion) -> f64 {
+    if !is_keyable(screen.color) {
+        return 0.0;
+    }
+    let inside = filter::erode(&region.cut.map(|c| c.0 > 0.5), RIM_PX);
+    let plate = screen.plate.crop(region.around).image;
+    let key = strongest_channel(screen.color);
+    let bare = region.photo.zip3_map(&plate, &inside, |p, k, inside| {
+        inside && is_bare_screen(p.into(), k.into(), key)
+    });
+    let bare = unclaimed(bare, region.claims.as_ref());
+    bare.count() as f64 / inside.count().max(1) as f64
+}
+
+fn bare_within(share: f64) -> Diagnostic {
+    Diagnostic::warning(
+        Code::ScreenLikeParts,
+        format_args!(
+            "{:.0} % of what the outline encloses looks like bare screen, and is cut out as if it were the object; with the method \"physical\" it is see-through",
+            100.0 * share
+        ),
+    )
 }
 
 /// Mean of a matte where a mask is set; 0 where it is empty.

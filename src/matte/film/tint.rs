@@ -77,7 +77,7 @@ const MAX_THICKNESS_FACTOR: f32 = 1.3;
 const EQUAL_MISFIT: f32 = 0.1;
 
 /// Nothing lies on the screen there: plastic passes less of its strongest channel, `key`.
-pub(super) fn is_bare_screen(pixel: [f32; 3], screen: [f32; 3], key: usize) -> bool {
+pub(in crate::matte) fn is_bare_screen(pixel: [f32; 3], screen: [f32; 3], key: usize) -> bool {
     pixel[key] >= MIN_BARE_SHARE * screen[key] && screen_shade(pixel, screen).is_some()
 }
 

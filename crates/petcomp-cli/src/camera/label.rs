@@ -68,13 +68,11 @@ impl InitLabelArgs {
         })
     }
 
-    fn check_is_free(&self, path: &Path) -> anyhow::Result<()> {
-        anyhow::ensure!(
-            self.force || !path.exists(),
-            "{}: already exists; --force replaces it",
-            path.display()
-        );
-        Ok(())
+    fn check_is_free(&self, path: &Path) -> petcomp::Result<()> {
+        match self.force || !path.exists() {
+            true => Ok(()),
+            false => Err(Error::file(path, "already exists; --force replaces it")),
+        }
     }
 
     /// What is known without looking at the photo's pixels.
@@ -84,6 +82,7 @@ impl InitLabelArgs {
         if let Some([w, h]) = self.size {
             (label.surface.width_m, label.surface.height_m) = (Some(w), Some(h));
         }
+        camera::check_size(&label)?;
         label.surface.corners_px = self.corners;
         Ok(label)
     }

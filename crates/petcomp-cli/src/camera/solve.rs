@@ -44,9 +44,21 @@ pub(crate) struct JointArgs {
 }
 
 impl LabelFileArgs {
+    /// The given files, without the cameras of an earlier run where a pattern took these in too.
+    fn files(&self) -> Vec<&Path> {
+        let given = || self.labels.iter().map(PathBuf::as_path);
+        let labels: Vec<&Path> = given()
+            .filter(|path| !camera::is_called_camera(path))
+            .collect();
+        match labels.is_empty() {
+            true => given().collect(),
+            false => labels,
+        }
+    }
+
     /// All labels of all files.
     fn read_all(&self) -> petcomp::Result<Vec<LabelledPhoto>> {
-        let files = self.labels.iter().map(|path| self.read_file(path));
+        let files = self.files().into_iter().map(|path| self.read_file(path));
         Ok(files.collect::<petcomp::Result<Vec<_>>>()?.concat())
     }
 
@@ -57,13 +69,14 @@ impl LabelFileArgs {
     /// Does something with every label; where there are several, one that cannot be used does not
     /// stop the others.
     fn for_each(&self, act: impl Fn(&LabelledPhoto) -> anyhow::Result<()>) -> anyhow::Result<()> {
-        if let [path] = &self.labels[..]
+        let files = self.files();
+        if let [path] = files[..]
             && let [labelled] = &self.read_file(path)?[..]
         {
             return act(labelled);
         }
         let mut batch = FileBatch::default();
-        for path in &self.labels {
+        for path in files {
             match self.read_file(path) {
                 Ok(labels) => labels.iter().for_each(|one| batch.count(act(one))),
                 Err(error) => batch.count(Err(error.into())),
@@ -77,7 +90,7 @@ impl SolveArgs {
     /// One file can hold one camera only, and not a label or a photo too.
     fn check_output(&self) -> anyhow::Result<()> {
         if let Some(output) = &self.output {
-            io::check_distinct(&self.labels.labels, [output])?;
+            io::check_distinct(self.labels.files(), [output])?;
             let count = self.labels.read_all()?.len();
             anyhow::ensure!(count == 1, "-o: {count} labels, expected one");
         }
@@ -205,17 +218,20 @@ pub(super) fn accepted(
         return Ok(solution);
     }
     if let Some(error) = solution.misfit() {
-        return Err(needs_force(&labelled.source, &error));
+        return Err(needs_force(&labelled.source, error.into()));
     }
     // Pictures may show the middle of the photo alone.
     camera::check_lens(&solution.camera, solution.k1())
-        .map_err(|e| needs_force(&labelled.source, &e))?;
+        .map_err(|e| needs_force(&labelled.source, e))?;
     Ok(solution)
 }
 
-fn needs_force(label: &Path, why: &dyn std::fmt::Display) -> Error {
-    let what = format!("{why}; --force accepts it nevertheless");
-    Error::file(label, what)
+fn needs_force(label: &Path, why: Error) -> Error {
+    let advised = |what: &dyn std::fmt::Display| format!("{what}; --force accepts it nevertheless");
+    match why {
+        Error::Value { at, what } => Error::value(at, advised(&what)).in_file(label),
+        other => Error::file(label, advised(&other)),
+    }
 }
 
 fn located(error: SolveError, labelled: &LabelledPhoto) -> Error {

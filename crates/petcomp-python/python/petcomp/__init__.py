@@ -13,13 +13,12 @@ interpreter lock, and Ctrl-C ends it within a second.
 
 from __future__ import annotations
 
-from . import asset, camera, errors, io, matte
-from ._petcomp import set_threads
+from . import _petcomp, asset, camera, errors, io, matte
 from .camera import Camera
 from .dataset import DatasetCounts, Progress, generate
 from .errors import Error
 from .evaluation import Metrics, evaluate
-from .pipeline import Pipeline
+from .pipeline import Pipeline, _number
 from .sample import Sample
 from .scene import Scene
 from .shot import Card, Shot, render
@@ -48,3 +47,8 @@ __all__ = [
     "render",
     "set_threads",
 ]
+
+
+def set_threads(count: int) -> None:
+    """Sets how many threads work: 0 to 1024, where 0 is one for each core."""
+    _petcomp.set_threads(_number("threads", count))

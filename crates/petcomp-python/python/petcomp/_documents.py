@@ -8,17 +8,21 @@ import os
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import numpy as np
+
 from .errors import ArgumentTypeError, InvalidValueError
 
-__all__ = ["check_count", "class_names", "dumped", "folder_of", "loaded", "overrides", "path_of", "plain"]
+__all__ = ["check_array", "class_names", "dumped", "folder_of", "loaded", "overrides", "path_of", "plain"]
 
 _MOST_LEVELS = 60
 #: An array that only says that it is large must not be written out.
 _MOST_NUMBERS = 10_000_000
 
 
-def check_count(name: str, value: Any, most: int = _MOST_NUMBERS) -> None:
-    """Refuses arrays with more numbers than a document may have, before any is looked at."""
+def check_array(name: str, value: Any, most: int = _MOST_NUMBERS) -> None:
+    """Refuses arrays with a mask or more numbers than a document may have, before any is looked at."""
+    if isinstance(value, np.ma.MaskedArray):
+        raise ArgumentTypeError(f"{name}: a masked array, expected a plain one")
     size = getattr(value, "size", 0)
     if isinstance(size, int) and size > most:
         raise InvalidValueError(f"{name}: {size} numbers, expected at most {most}")
@@ -61,7 +65,7 @@ def _key(at: str, key: Any) -> str:
 
 def _plain_scalar(at: str, value: Any, level: int) -> Any:
     if hasattr(value, "tolist"):
-        check_count(at, value)
+        check_array(at, value)
         return _plain(at, value.tolist(), level + 1)
     if isinstance(value, os.PathLike):
         return os.fspath(value)

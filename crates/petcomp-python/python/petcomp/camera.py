@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _petcomp
-from ._documents import check_count, dumped, loaded
+from ._documents import check_array, dumped, loaded
 from ._show import table
 from .errors import InvalidValueError
 
@@ -28,14 +28,14 @@ _MOST_COORDINATES = 3 * 2**27
 
 def _floats(name: str, value: Any, shape: tuple[int, ...]) -> list[Any]:
     """Finite numbers of a shape, -1 being any length."""
-    check_count(name, value)
+    check_array(name, value)
     result: list[Any] = _array(name, value, shape).tolist()
     return result
 
 
 def _array(name: str, value: Any, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
     """The same as an array whose rows follow each other."""
-    check_count(name, value, _MOST_COORDINATES)
+    check_array(name, value, _MOST_COORDINATES)
     try:
         array = np.require(value, np.float64, ["C", "A"])
     except (TypeError, ValueError):
@@ -107,7 +107,7 @@ class Camera:
 
     @classmethod
     def looking_down(cls, height: float, focal_px: float, image: Sequence[int]) -> Camera:
-        """Straight above the origin, ``height`` in metres, the picture's top towards ``+y``."""
+        """Straight above the origin, ``height`` in metres and above 0, the picture's top towards ``+y``."""
         return cls(_petcomp.Camera.looking_down(height, focal_px, _pixels("image", image)))
 
     @classmethod

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _petcomp
-from ._documents import check_count, class_names, folder_of, loaded, path_of
+from ._documents import check_array, class_names, folder_of, loaded, path_of
 from ._show import table
+from .camera import _pixels
 from .errors import ArgumentTypeError, InvalidValueError
 from .pipeline import _number
 
@@ -86,7 +87,7 @@ def evaluate(
     """
     question = class_names(classes), _number("rounds", rounds), _number("seed", seed)
     if isinstance(predictions, (str, os.PathLike)) and isinstance(truth, (str, os.PathLike)):
-        shape = None if size is None else [_number("size", side) for side in size]
+        shape = None if size is None else _pixels("size", size)
         place = None if output is None else folder_of("output", output)
         paths = path_of("predictions", predictions), path_of("truth", truth)
         text = _petcomp.evaluate_files(*paths, shape, place, question)
@@ -143,7 +144,7 @@ def _classes(at: str, labels: Any, count: int) -> list[int]:
 def _numbers(at: str, value: Any) -> npt.NDArray[np.float64]:
     if value is None:
         raise InvalidValueError(f"{at}: missing, expected numbers")
-    check_count(at, value)
+    check_array(at, value)
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:

@@ -5,8 +5,6 @@ use petcomp::camera::{self, Priors, Solution, SolveOptions};
 
 /// Photos of one camera that are solved jointly.
 pub(super) const PHOTOS_TOGETHER: usize = 8;
-/// Distortion that several photos of one camera may find, as a standard deviation.
-const JOINT_KAPPA_SIGMA: f64 = 0.01;
 
 /// What the camera is really like, and what the solver assumes of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,14 +51,10 @@ impl Lens {
         }
     }
 
-    fn priors(self, method: SolveMethod) -> Priors {
-        match (self, method) {
-            (Self::Ideal, _) => Priors::ideal().with_free_focal(),
-            (Self::Realistic, SolveMethod::Joint) => Priors {
-                kappa_sigma: JOINT_KAPPA_SIGMA,
-                ..Priors::default()
-            },
-            (Self::Realistic, _) => Priors::default(),
+    fn priors(self) -> Priors {
+        match self {
+            Self::Ideal => Priors::ideal().with_free_focal(),
+            Self::Realistic => Priors::default(),
         }
     }
 }
@@ -91,7 +85,7 @@ impl SolveMethod {
 
     pub(super) fn options(self, lens: Lens) -> SolveOptions {
         SolveOptions {
-            priors: lens.priors(self),
+            priors: lens.priors(),
             max_iterations: self.max_iterations(),
             ..Default::default()
         }

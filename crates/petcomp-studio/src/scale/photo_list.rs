@@ -160,7 +160,7 @@ pub(super) fn save(folder: &Folder, new: &ScaledPhoto<'_>, version: Option<&str>
     let before = entries_of(&text, &list)?;
     let file = listed_name(folder, &before, new.photo)?.unwrap_or(file.into());
     let changed = with_scale(&text, &file, new);
-    let after = entries_of(&changed, &list)?;
+    let after = entries_of(&changed, &list).map_err(|_| not_in_tables(&list))?;
     let classes = classes_of(&text, &list)?;
     let entry = changed_entry(&before, &after, &file, &list)?;
     check_entry(entry, classes, &list)?;
@@ -191,15 +191,21 @@ fn changed_entry<'a>(
         let others = entries.iter().filter(|entry| !names(entry, file));
         others.cloned().collect::<Vec<_>>()
     };
+    if before.iter().filter(|entry| names(entry, file)).count() > 1 {
+        let what = format!("{list}: photos: {file} is listed more than once, expected once");
+        return Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what));
+    }
     let mine: Vec<&Table> = after.iter().filter(|entry| names(entry, file)).collect();
     match mine[..] {
         [mine] if others(before) == others(after) && has_scale(mine) => Ok(mine),
-        _ => {
-            let what =
-                format!("{list}: its photos are not written as {HEADER}; copy the line there");
-            Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
-        }
+        _ => Err(not_in_tables(list)),
     }
+}
+
+/// What is wrong with a list whose photos are no tables of their own.
+fn not_in_tables(list: &str) -> Refusal {
+    let what = format!("{list}: its photos are not written as {HEADER}; copy the line there");
+    Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what)
 }
 
 /// Fails on an entry for which `asset build` would refuse the whole list, which declares `classes`,
@@ -249,11 +255,7 @@ fn with_scale(text: &str, file: &str, new: &ScaledPhoto<'_>) -> String {
 /// The lines of a photo's table with another scale, before the empty ones and the remarks at its
 /// end: those may be the next photo's.
 fn changed_block(block: &[String], scale: PhotoScale) -> Vec<String> {
-    let mut lines: Vec<String> = block
-        .iter()
-        .filter(|line| !is_scale(line))
-        .cloned()
-        .collect();
+    let mut lines = without_scale(block);
     let says = |line: &String| !matches!(line.trim().chars().next(), None | Some('#'));
     let last = lines.iter().rposition(says);
     let end = last.map_or(0, |last| last + 1);
@@ -261,22 +263,62 @@ fn changed_block(block: &[String], scale: PhotoScale) -> Vec<String> {
     lines
 }
 
+/// The lines of a photo's table without those of its scale.
+fn without_scale(block: &[String]) -> Vec<String> {
+    let (mut kept, mut rest) = (Vec::new(), block);
+    while !rest.is_empty() {
+        let (value, behind) = rest.split_at(lines_of_first(rest));
+        if !is_scale(&value[0]) {
+            kept.extend_from_slice(value);
+        }
+        rest = behind;
+    }
+    kept
+}
+
+/// How many lines the first of a table's values takes: a list may go over several.
+fn lines_of_first(lines: &[String]) -> usize {
+    let mut counts = 1..=lines.len();
+    counts.find(|&n| is_whole(&lines[..n])).unwrap_or(1)
+}
+
+/// No value goes on behind the lines.
+fn is_whole(lines: &[String]) -> bool {
+    table_of(&lines.join("\n"), "").is_ok()
+}
+
 /// The lines of a photo's table, its header among them.
 fn block_of(lines: &[String], file: &str) -> Option<std::ops::Range<usize>> {
-    let is_header = |line: &String| line.trim_start().starts_with('[');
-    let starts = (0..lines.len()).filter(|&i| lines[i].trim() == HEADER);
-    let blocks = starts.map(|start| {
-        let rest = lines[start + 1..].iter().position(is_header);
-        start..rest.map_or(lines.len(), |rest| start + 1 + rest)
-    });
-    blocks.into_iter().find(|block| {
+    let starts = (0..lines.len()).filter(|&i| is_header(&lines[i]));
+    let mut blocks = starts.filter_map(|start| table_from(lines, start));
+    blocks.find(|block| {
         let text = lines[block.clone()].join("\n");
         entries_of(&text, "").is_ok_and(|entries| entries.iter().any(|entry| names(entry, file)))
     })
 }
 
+/// The lines of the table whose header is at `start`. A line that begins with a bracket ends it,
+/// but for one of a list that goes over several.
+fn table_from(lines: &[String], start: usize) -> Option<std::ops::Range<usize>> {
+    let is_end = |i: usize| {
+        lines
+            .get(i)
+            .is_none_or(|line| line.trim_start().starts_with('['))
+    };
+    let ends = (start + 1..=lines.len()).filter(|&i| is_end(i));
+    let mut blocks = ends.map(|end| start..end);
+    blocks.find(|block| is_whole(&lines[block.clone()]))
+}
+
+/// Whether a photo's table begins: there may be spaces and a remark.
+fn is_header(line: &str) -> bool {
+    let header = line.split('#').next().unwrap_or_default();
+    header.replace(' ', "").trim() == HEADER
+}
+
 fn is_scale(line: &str) -> bool {
     let key = line.split('=').next().unwrap_or_default().trim();
+    let key = key.trim_matches(['"', '\'']);
     line.contains('=') && SCALE_KEYS.contains(&key)
 }
 
@@ -401,6 +443,32 @@ mod tests {
         let class = saved(LIST_NAME, declared, &cup("a.png", 2e3)).unwrap_err();
         let expected = "photos.toml: class: \"cup \"1\"\", expected one of cup, lid";
         assert_eq!(class, expected);
+    }
+
+    #[test]
+    fn a_scale_is_replaced_however_it_is_written() {
+        let list = |scale: &str| {
+            format!("[[ photos ]] # first\nfile = \"a.png\"\n{scale}asset = \"a\"\nclass = \"c\"\n")
+        };
+        let corners = "screen_size = [0.3, 0.2]\nscreen_corners = [\n  [1, 2],\n  [3, 4],\n  \
+            [5, 6],\n  [7, 8],\n]\n";
+        let expected = format!("{}px_per_metre = 2000.0\n", list(""));
+        for scale in ["\"length\" = 0.2\n", corners] {
+            let after = saved(LIST_NAME, &list(scale), &cup("a.png", 2e3));
+            assert_eq!(after.as_ref(), Ok(&expected), "{scale}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_changed_is_refused_for_what_it_is() {
+        let refused = |text: &str| saved(LIST_NAME, text, &cup("a.png", 2e3)).unwrap_err();
+        let entry = "[[photos]]\nfile = \"a.png\"\nasset = \"a\"\nclass = \"c\"\n";
+        let twice = refused(&[entry, entry].concat());
+        let expected = "photos.toml: photos: a.png is listed more than once, expected once";
+        assert_eq!(twice, expected);
+        for in_one_line in ["photos = []\n", "photos = [{ file = \"a.png\" }]\n"] {
+            assert!(refused(in_one_line).contains("not written as [[photos]]"));
+        }
     }
 
     #[test]

@@ -401,13 +401,18 @@ pub(crate) fn decode(
         convert_colors(&mut samples, &mut names, &file.space())?;
     }
     let stored = file.stored_in(part, window);
-    if stored != [0..width, 0..height]
-        && let Some(extended) = names_with_alpha(wanted, &names)
-    {
-        limits.check_memory(width, height, extended.len())?;
-        affordable((width * height * extended.len()) as u64 * FLOAT_BYTES)?;
-        samples = add_alpha(&samples, names.len(), width, &stored);
-        names = extended;
+    if stored != [0..width, 0..height] {
+        let ones: Vec<bool> = names
+            .iter()
+            .map(|name| wanted.is_one_where_empty(name))
+            .collect();
+        fill_empty(&mut samples, &ones, width, &stored);
+        if let Some(extended) = wanted.with_alpha(&names) {
+            limits.check_memory(width, height, extended.len())?;
+            affordable((width * height * extended.len()) as u64 * FLOAT_BYTES)?;
+            samples = add_alpha(&samples, names.len(), width, &stored);
+            names = extended;
+        }
     }
     Ok(Raster {
         width,
@@ -419,13 +424,19 @@ pub(crate) fn decode(
     })
 }
 
-/// The channels of colours without alpha, and one for it behind them.
-fn names_with_alpha(wanted: Wanted, names: &[String]) -> Option<Vec<String>> {
-    let picks = |names: &[String]| wanted.pick(names).map_or(0, |picked| picked.len());
-    let layer = names[0].rfind('.').map_or("", |dot| &names[0][..=dot]);
-    let extended = [names, &[format!("{layer}A")]].concat();
-    let is_without = wanted.is_color() && picks(names) == 3 && picks(&extended) == 4;
-    is_without.then_some(extended)
+/// Makes the channels that are to be `ones` 1 outside the stored columns and rows.
+fn fill_empty(
+    samples: &mut [f32],
+    ones: &[bool],
+    width: usize,
+    [columns, rows]: &[Range<usize>; 2],
+) {
+    let pixels = samples.chunks_exact_mut(ones.len()).enumerate();
+    let is_empty = |i: usize| !(columns.contains(&(i % width)) && rows.contains(&(i / width)));
+    for (_, pixel) in pixels.filter(|(i, _)| is_empty(*i)) {
+        let filled = pixel.iter_mut().zip(ones).filter(|(_, is_one)| **is_one);
+        filled.for_each(|(sample, _)| *sample = 1.0);
+    }
 }
 
 /// Puts an alpha behind the samples of each pixel: 1 in the stored columns and rows, 0 elsewhere.
@@ -485,6 +496,7 @@ fn convert_colors(
 mod tests {
     use super::*;
     use crate::io::codec::exr::{Compression, encode, float_samples};
+    use crate::pixel::{Film, LinearRgb};
     use exr::prelude::{AnyChannel, AnyChannels, Encoding, Layer, LayerAttributes, WritableImage};
     use std::io::Cursor;
 
@@ -710,6 +722,18 @@ mod tests {
         assert_eq!(read(&["R", "G", "B"], (1, 1), data).1, [half; 3]);
         assert_eq!(read(&["Y", "A"], (1, 1), display).1, [half, half, 0.0, 0.0]);
         assert_eq!(read(&["A"], (1, 1), display), ("A".into(), vec![half, 0.0]));
+    }
+
+    #[test]
+    fn a_film_passes_all_light_where_nothing_is_stored() {
+        for names in ["VR VG VB", "TR TG TB"] {
+            let channels: Vec<&str> = "R G B A".split(' ').chain(names.split(' ')).collect();
+            let file = file_of(vec![part("a", &channels, (1, 1))]);
+            let read = decode(&file, &Limits::default(), Wanted::Film, Window::Display);
+            let film = read.unwrap().into_image::<Film>(None).unwrap();
+            let half = LinearRgb::grey(0.5);
+            assert_eq!(film.pixels(), [Film::new(half, half), Film::default()]);
+        }
     }
 
     #[test]
