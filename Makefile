@@ -31,9 +31,9 @@ WORLD     := experiments/cache/world
 # What the package for Python is tested with, in a virtual environment of its own.
 PACKAGE   := target/package
 PYTEST    := numpy pytest hypothesis mypy nbclient nbformat ipykernel
-# Where `make c` installs, from the root as petcomp.pc needs it, and the major version that programs ask for when they start.
+# Where `make c` installs, an absolute path as petcomp.pc needs it, and the major version that programs ask for when they start.
 PREFIX    := $(CURDIR)/target/c
-override PREFIX := $(abspath $(PREFIX))
+override PREFIX := $(abspath $(patsubst ~/%,$(HOME)/%,$(PREFIX)))
 C_VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' crates/petcomp-c/Cargo.toml)
 C_MAJOR   := $(firstword $(subst ., ,$(C_VERSION)))
 # A manylinux wheel must not be larger.

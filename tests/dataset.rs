@@ -2185,6 +2185,21 @@ fn whatever_decides_a_picture_or_a_label_is_compared_before_a_dataset_goes_on() 
 }
 
 #[test]
+fn another_config_of_an_open_pipeline_has_absolute_paths_too() {
+    let dir = tempfile::tempdir().unwrap();
+    write_world(dir.path());
+    let here = std::env::current_dir().unwrap();
+    let recipe = io::relative(&dir.path().join("recipe.toml"), &here);
+    let config = || DatasetConfig::read(&recipe, &[]).unwrap();
+    assert!(config().assets.is_relative());
+    let opened = Pipeline::open(config()).unwrap();
+    let image = opened.config().scene.image;
+    let again = opened.with_config(config(), image).unwrap();
+    assert_eq!(again.config(), opened.config());
+    assert!(again.config().assets.is_absolute());
+}
+
+#[test]
 fn a_mask_beside_one_photo_of_several_is_known() {
     let dir = tempfile::tempdir().unwrap();
     write_world(dir.path());

@@ -100,19 +100,30 @@ fn build_beside(
     progress: &(dyn Fn(usize, usize) + Sync),
     stop: &AtomicBool,
 ) -> Result<Built> {
-    let before = read_or_new(folder).ok();
-    let built = build_in(folder, known, list, progress, stop);
-    if read_or_new(folder).ok() != before {
-        // It shows other cut-outs than there are now.
-        remove_contact_sheet(&folder.join(CONTACT_SHEET), 0)?;
+    // Where there was no cut-out, no sheet is ours.
+    let before = read_or_new(folder)
+        .ok()
+        .filter(|manifest| !manifest.assets.is_empty());
+    let built = build_in(known, list, folder, progress, stop);
+    if before.is_some() && read_or_new(folder).ok() != before {
+        remove_old_sheet(folder);
     }
     built
 }
 
+/// Deletes the contact sheet of other cut-outs than there are now; one that cannot be deleted must
+/// not hide what was built, or why it was not.
+fn remove_old_sheet(folder: &Path) {
+    if let Err(error) = remove_contact_sheet(&folder.join(CONTACT_SHEET), 0) {
+        log::warn!("{error}");
+    }
+}
+
+/// The same, whatever the contact sheet shows then.
 fn build_in(
-    folder: &Path,
     known: &Manifest,
     list: &Path,
+    folder: &Path,
     progress: &(dyn Fn(usize, usize) + Sync),
     stop: &AtomicBool,
 ) -> Result<Built> {
@@ -398,18 +409,27 @@ mod tests {
     fn a_contact_sheet_of_other_cut_outs_goes() {
         let folder = folder_with(TWO);
         let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
-        build(&list, &out, &|_, _| ()).unwrap();
         let pages = [CONTACT_SHEET, "contact_sheet_2.png"].map(|name| out.join(name));
         let left = || {
             build(&list, &out, &|_, _| ()).unwrap();
             pages.each_ref().map(|page| page.exists())
         };
+        // Where no cut-out was, they are somebody's own.
+        io::create_folder(&out).unwrap();
         for page in &pages {
             std::fs::write(page, "").unwrap();
         }
         assert_eq!(left(), [true; 2]);
-        std::fs::write(&list, TWO.replace("length = 0.3", "length = 0.2")).unwrap();
+        assert_eq!(left(), [true; 2]);
+        let length_is = |length: &str| {
+            std::fs::write(&list, TWO.replace("0.3", length)).unwrap();
+        };
+        length_is("0.2");
         assert_eq!(left(), [false; 2]);
+        // One that cannot be deleted leaves the build as it is.
+        io::create_folder(&pages[0]).unwrap();
+        length_is("0.4");
+        assert_eq!(left(), [true, false]);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::DEFAULT_THICKNESS;
 use super::capture_entry::CaptureEntry;
+use super::concave::concave_warning;
 use super::entry::PhotoEntry;
 use super::files;
 use super::manifest::{CaptureRecord, PhotoRecord};
@@ -318,7 +319,9 @@ impl<'a> Placed<'a> {
 
     fn all_diagnostics(&self, measured: &Measured) -> Vec<Diagnostic> {
         let all = self.diagnostics.iter().chain(&measured.diagnostics);
-        all.cloned().collect()
+        all.cloned()
+            .chain(concave_warning(&measured.outline))
+            .collect()
     }
 }
 

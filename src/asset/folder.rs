@@ -3,6 +3,7 @@
 use super::MANIFEST;
 use super::capture_entry::CaptureEntry;
 use super::captured::{CapturedObject, captured_object};
+use super::concave::concave_warning;
 use super::entry::PhotoEntry;
 use super::files;
 use super::flow_file;
@@ -259,12 +260,18 @@ fn new_record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Resul
     let scale = entry.scale()?;
     let measured = MeasuredSize::new(cut, scale, photo);
     scale.check_length(measured.object_m[0], &entry.source())?;
-    let warnings = measured.size_mismatch.into_iter().chain(photo.diagnostic());
+    let warnings = [
+        measured.size_mismatch,
+        photo.diagnostic(),
+        concave_warning(&cut.outline),
+    ];
     Ok(PhotoRecord {
         source: entry.source(),
         object_m: measured.object_m,
         error_m: measured.error_m,
-        diagnostics: to_review(cut).chain(warnings).collect(),
+        diagnostics: to_review(cut)
+            .chain(warnings.into_iter().flatten())
+            .collect(),
         ..matte_record(cut, entry.cut_out_file(), measured.px_per_metre)
     })
 }

@@ -65,7 +65,7 @@ impl Library {
 
     /// The library of a manifest that was read or written just now.
     pub(super) fn from_manifest(folder: &Path, manifest: Manifest) -> Result<Self> {
-        let mut photos = open_all(folder, &manifest).into_iter();
+        let mut photos = open_all(folder, &manifest)?.into_iter();
         let assets = manifest.assets.into_iter().map(|asset| {
             let own = photos.by_ref().take(asset.photos.len());
             let own = own.collect::<Result<_>>()?;
@@ -121,13 +121,13 @@ impl Library {
 }
 
 /// The photos of a manifest in its order.
-fn open_all(folder: &Path, manifest: &Manifest) -> Vec<Result<Photo>> {
-    let files = Arc::new(CutOutFiles::in_folder(folder));
+fn open_all(folder: &Path, manifest: &Manifest) -> Result<Vec<Result<Photo>>> {
+    let files = Arc::new(CutOutFiles::in_folder(folder)?);
     let records: Vec<(String, &PhotoRecord)> = places_and_records(manifest).collect();
-    records
+    let photos = records
         .par_iter()
-        .map(|(at, record)| open(folder, record, at, &files))
-        .collect()
+        .map(|(at, record)| open(folder, record, at, &files));
+    Ok(photos.collect())
 }
 
 /// All photos of a manifest, with their places in it.

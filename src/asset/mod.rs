@@ -15,6 +15,7 @@ mod body;
 mod build;
 mod capture_entry;
 mod captured;
+mod concave;
 mod contact_sheet;
 mod entry;
 mod equirectangular;

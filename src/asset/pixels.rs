@@ -132,12 +132,16 @@ pub(super) struct CutOutFiles {
 }
 
 impl CutOutFiles {
-    /// None of them read yet.
-    pub(super) fn in_folder(folder: &Path) -> Self {
-        Self {
-            folder: folder.to_owned(),
+    /// None of them read yet: they are read late, whatever the working folder is then.
+    ///
+    /// # Errors
+    /// Without a working folder.
+    pub(super) fn in_folder(folder: &Path) -> Result<Self> {
+        Ok(Self {
+            // An empty path is the working folder, too.
+            folder: io::absolute(&Path::new(".").join(folder))?,
             kept: LruCache::of_bytes(most_bytes()),
-        }
+        })
     }
 
     /// The pixels of a record, whose files have these checksums.

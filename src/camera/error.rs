@@ -65,7 +65,7 @@ pub enum SolveError {
     #[error("{at}: {what}")]
     OutOfBounds {
         /// Which value.
-        at: String,
+        at: &'static str,
         /// What it was, and what was expected.
         what: String,
     },
@@ -151,10 +151,10 @@ impl SolveError {
     /// with it.
     fn impossible_field(&self) -> Option<&str> {
         match self {
-            Self::NonFinite(at) | Self::OutOfRange { at, .. } | Self::NotPositive { at, .. } => {
-                Some(at)
-            }
-            Self::OutOfBounds { at, .. } => Some(at),
+            Self::NonFinite(at)
+            | Self::OutOfRange { at, .. }
+            | Self::NotPositive { at, .. }
+            | Self::OutOfBounds { at, .. } => Some(at),
             Self::BadImage(_) => Some("image"),
             Self::CropOutside { .. } => Some("image.crop"),
             Self::BadDimensions(_) => Some("surface"),
@@ -236,7 +236,7 @@ mod tests {
                 value: -1.0,
             },
             SolveError::OutOfBounds {
-                at: "camera.focal_px".into(),
+                at: "camera.focal_px",
                 what: "26, expected 200 to 400000".into(),
             },
         ];

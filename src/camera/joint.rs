@@ -53,8 +53,8 @@ impl OutlierPhoto {
 }
 
 /// Solves photos of one camera together: they share focal length, principal point and distortion,
-/// and photos of one surface share its sides. Distortion is an unknown of four photos or more
-/// ([`Priors::joint_kappa_sigma`](super::Priors::joint_kappa_sigma)).
+/// and photos of one surface share its sides. Distortion is an unknown of four photos or more that
+/// can be used ([`Priors::joint_kappa_sigma`](super::Priors::joint_kappa_sigma)).
 ///
 /// The labels have to agree in the shape of their pictures; one may be a reduced copy. See
 /// [`group_by_camera`]. The principal point or the k1 that one of them states holds for all. A
@@ -67,50 +67,80 @@ impl OutlierPhoto {
 pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, SolveError> {
     refuse_different_cameras(labels)?;
     let labels = with_shared_lens(labels);
-    let options = &with_shared_kappa(options, labels.len());
-    let photos = solve_alone(&labels, options)?;
+    let photos = solve_each(&labels, options);
+    refuse_none(&photos)?;
+    let shared_options = with_shared_kappa(options);
+    let distorted = solve_distorted(&labels, &shared_options);
+    let (measured, options) = match &distorted {
+        Some(distorted) => (distorted, &shared_options),
+        None => (&photos, options),
+    };
     let solver = JointSolver {
         labels: &labels,
-        alone: &photos,
+        alone: measured,
         options,
     };
     let estimate = solver.without_wrong_exif()?;
-    Ok(Joint::new(photos, estimate))
+    // Photos that stay alone keep the options as they are: one photo cannot tell distortion.
+    Ok(Joint::new(photos.clone(), measured, estimate))
 }
 
-/// The options for so many photos of one lens.
-fn with_shared_kappa(options: &SolveOptions, photos: usize) -> SolveOptions {
+/// The options for photos that share a distortion.
+fn with_shared_kappa(options: &SolveOptions) -> SolveOptions {
     let mut shared = options.clone();
-    if photos >= LEAST_PHOTOS_FOR_KAPPA {
-        shared.priors.kappa_sigma = options.priors.joint_kappa_sigma;
-    }
+    let kappa_sigma = &mut shared.priors.kappa_sigma;
+    *kappa_sigma = kappa_sigma.max(options.priors.joint_kappa_sigma);
     shared
 }
 
-/// What each photo gives.
-///
-/// # Errors
-/// The first photo's where none gives anything.
-fn solve_alone(
+/// What each photo gives with these options; none where too few of them fit a camera to tell the
+/// distortion that they share.
+fn solve_distorted(
     labels: &[Label],
     options: &SolveOptions,
-) -> Result<Vec<Result<Solution, SolveError>>, SolveError> {
-    let photos: Vec<_> = labels.iter().map(|label| solve(label, options)).collect();
+) -> Option<Vec<Result<Solution, SolveError>>> {
+    if labels.len() < LEAST_PHOTOS_FOR_KAPPA {
+        return None;
+    }
+    let photos = solve_each(labels, options);
+    let fitting = photos.iter().filter(|photo| fits(photo)).count();
+    (fitting >= LEAST_PHOTOS_FOR_KAPPA).then_some(photos)
+}
+
+/// What each photo gives.
+fn solve_each(labels: &[Label], options: &SolveOptions) -> Vec<Result<Solution, SolveError>> {
+    labels.iter().map(|label| solve(label, options)).collect()
+}
+
+/// A camera fits the photo when it is alone.
+fn fits(photo: &Result<Solution, SolveError>) -> bool {
+    photo
+        .as_ref()
+        .is_ok_and(|solution| solution.misfit().is_none())
+}
+
+/// Fails with the first photo's error where none gives anything.
+fn refuse_none(photos: &[Result<Solution, SolveError>]) -> Result<(), SolveError> {
     match photos.first() {
         Some(Err(error)) if photos.iter().all(Result::is_err) => Err(error.clone()),
-        _ => Ok(photos),
+        _ => Ok(()),
     }
 }
 
 impl Joint {
-    /// What the photos give alone, and those that agree together.
-    fn new(alone: Vec<Result<Solution, SolveError>>, together: Option<JointEstimate>) -> Self {
+    /// What the photos give alone, and those that agree together; `measured` is what each gives
+    /// with the options of all together.
+    fn new(
+        alone: Vec<Result<Solution, SolveError>>,
+        measured: &[Result<Solution, SolveError>],
+        together: Option<JointEstimate>,
+    ) -> Self {
         let mut joint = Self {
-            outliers: misfit_outliers(&alone),
+            outliers: misfit_outliers(measured),
             photos: alone,
         };
         match together {
-            Some(estimate) if estimate.is_contradictory(&joint.photos) => joint.warn(&estimate),
+            Some(estimate) if estimate.is_contradictory(measured) => joint.warn(&estimate),
             Some(estimate) => joint.apply(estimate),
             None => {}
         }
@@ -155,7 +185,7 @@ fn misfit_outlier(photo: usize, solution: &Solution) -> Option<OutlierPhoto> {
     solution.misfit().map(|_| OutlierPhoto { photo, chi2 })
 }
 
-/// Photos of one camera, and what each gives alone.
+/// Photos of one camera, and what each gives alone, with the same options.
 struct JointSolver<'a> {
     labels: &'a [Label],
     alone: &'a [Result<Solution, SolveError>],
@@ -231,7 +261,8 @@ impl JointSolver<'_> {
     /// What the photos that fit give together, but for those that contradict the others; pictures
     /// of unknown framing are treated as pictures of this one.
     fn estimate(&self, unknown: Framing) -> Result<Option<JointEstimate>, SolveError> {
-        let mut used: Vec<usize> = (0..self.labels.len()).filter(|i| self.fits(*i)).collect();
+        let fits = |&photo: &usize| fits(&self.alone[photo]);
+        let mut used: Vec<usize> = (0..self.labels.len()).filter(fits).collect();
         let mut outliers = Vec::new();
         let most_outliers = self.labels.len() / PHOTOS_PER_OUTLIER;
         while !used.is_empty() {
@@ -264,13 +295,6 @@ impl JointSolver<'_> {
             shared_dof: bundle.shared_degrees_of_freedom(),
             outliers: Vec::new(),
         })
-    }
-
-    /// A camera fits the photo when it is alone.
-    fn fits(&self, photo: usize) -> bool {
-        self.alone[photo]
-            .as_ref()
-            .is_ok_and(|solution| solution.misfit().is_none())
     }
 }
 
@@ -491,7 +515,7 @@ fn is_part(label: &Label) -> bool {
 mod tests {
     use super::*;
     use crate::camera::simulate::{Scenario, View};
-    use crate::camera::{LabelPoint, distorted};
+    use crate::camera::{LabelPoint, Priors, distorted};
     use crate::geom::Point3;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -542,21 +566,60 @@ mod tests {
     }
 
     #[test]
-    fn fewer_than_four_photos_are_a_pinhole_s() {
-        let (labels, _) = labels(1, 3, [25.0, 40.0]);
+    fn fewer_than_four_photos_that_can_be_used_are_a_pinhole_s() {
+        let (mut labels, _) = labels(1, 4, [25.0, 40.0]);
+        labels[3].surface.corners_px = Some([[0.0; 2]; 4]);
+        for labels in [&labels[..3], &labels] {
+            let joint = solve_joint(labels, &SolveOptions::default()).unwrap();
+            let mut photos = joint.photos.iter().flatten();
+            assert!(photos.all(|solution| solution.kappa == 0.0));
+        }
+    }
+
+    #[test]
+    fn a_wider_prior_of_the_distortion_is_kept() {
+        let shared = |kappa_sigma: f64| {
+            let priors = Priors {
+                kappa_sigma,
+                ..Priors::default()
+            };
+            let options = SolveOptions {
+                priors,
+                ..SolveOptions::default()
+            };
+            with_shared_kappa(&options).priors.kappa_sigma
+        };
+        assert_eq!([shared(0.0), shared(0.05)], [0.01, 0.05]);
+    }
+
+    /// Photos of one camera, the last of them at another zoom.
+    fn labels_at_two_zooms(count: usize, zoomed: usize) -> Vec<Label> {
+        let views = Scenario::default().views(31, 1, count, [25.0, 40.0]);
+        let mut labels: Vec<Label> = views.into_iter().map(|view| view.label).collect();
+        for label in &mut labels[count - zoomed..] {
+            for [x, y] in label.surface.corners_px.as_mut().unwrap() {
+                (*x, *y) = (2000.0 + 1.5 * (*x - 2000.0), 1500.0 + 1.5 * (*y - 1500.0));
+            }
+        }
+        labels
+    }
+
+    #[test]
+    fn photos_that_contradict_each_other_are_solved_as_alone() {
+        let labels = labels_at_two_zooms(4, 2);
         let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
-        let mut photos = joint.photos.iter().flatten();
-        assert!(photos.all(|solution| solution.kappa == 0.0));
+        for (label, photo) in labels.iter().zip(&joint.photos) {
+            let photo = photo.as_ref().unwrap();
+            let told = |w: &Diagnostic| w.message.contains("which needs another camera.id");
+            assert!(photo.warnings.iter().any(told), "{:?}", photo.warnings);
+            let alone = solve(label, &SolveOptions::default()).unwrap();
+            assert_eq!((photo.kappa, photo.camera), (0.0, alone.camera));
+        }
     }
 
     #[test]
     fn photos_at_two_zooms_are_solved_alone_and_say_so() {
-        let views = Scenario::default().views(31, 1, 3, [25.0, 40.0]);
-        let mut labels: Vec<Label> = views.into_iter().map(|view| view.label).collect();
-        let corners = labels[2].surface.corners_px.as_mut().unwrap();
-        for [x, y] in corners {
-            (*x, *y) = (2000.0 + 1.5 * (*x - 2000.0), 1500.0 + 1.5 * (*y - 1500.0));
-        }
+        let labels = labels_at_two_zooms(3, 1);
         let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
         let photos: Vec<_> = joint.photos.iter().map(|p| p.as_ref().unwrap()).collect();
         for photo in &photos {

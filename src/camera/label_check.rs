@@ -95,7 +95,7 @@ fn check_focal(camera: &LabelCamera, image: [u32; 2]) -> Result<(), SolveError> 
 
 /// Too short a focal length is asked about.
 fn check_length(
-    at: &str,
+    at: &'static str,
     length: Option<f64>,
     expected: &RangeInclusive<f64>,
     question: &str,
@@ -111,7 +111,7 @@ fn check_length(
     };
     let [length, least, most] = [length, least, most].map(number);
     Err(SolveError::OutOfBounds {
-        at: at.into(),
+        at,
         what: format!("{length}, expected {least} to {most} for a picture of this size{asked}"),
     })
 }
@@ -120,7 +120,7 @@ fn check_length(
 fn check_fixed(camera: &LabelCamera) -> Result<(), SolveError> {
     if camera.focal_fixed && camera.focal_px.is_none() && camera.focal_35mm.is_none() {
         return Err(SolveError::OutOfBounds {
-            at: "camera.focal_fixed".into(),
+            at: "camera.focal_fixed",
             what: "true, expected camera.focal_px or focal_35mm beside it".into(),
         });
     }
@@ -146,12 +146,12 @@ fn check_albedo(albedo: Option<Albedo>) -> Result<(), SolveError> {
     shares.try_for_each(|share| check_within("surface.albedo", Some(share), &ALBEDO))
 }
 
-fn check_within(at: &str, value: Option<f64>, bounds: &Bounds) -> Result<(), SolveError> {
+fn check_within(at: &'static str, value: Option<f64>, bounds: &Bounds) -> Result<(), SolveError> {
     let Some(value) = value.filter(|&value| !bounds.contains(value)) else {
         return Ok(());
     };
     Err(SolveError::OutOfBounds {
-        at: at.into(),
+        at,
         what: bounds.refusal(value),
     })
 }

@@ -103,6 +103,6 @@ pub use solution::{Fit, Solution};
 pub use solution::{FocalFinding, Sigma};
 pub use solve::solve;
 pub use stored::PhotoCamera;
-pub(crate) use stored::photo_cameras;
+pub(crate) use stored::{photo_camera, photo_cameras};
 #[doc(hidden)]
 pub use uncertainty::UNKNOWN_NAMES as UNKNOWNS;

@@ -54,8 +54,8 @@ pub struct Priors {
     pub ratio_sigma: f64,
     /// Of the radial distortion. Default: 0, the picture is a pinhole's.
     pub kappa_sigma: f64,
-    /// Of the radial distortion that four or more photos of one camera share, in place of that.
-    /// Default: 0.01, as lenses have it at the corner of the picture.
+    /// Of the radial distortion that four or more photos of one camera share, where that is
+    /// smaller. Default: 0.01, as lenses have it at the corner of the picture.
     pub joint_kappa_sigma: f64,
 }
 

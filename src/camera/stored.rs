@@ -57,6 +57,27 @@ pub(crate) fn photo_cameras(labels: &[LabelledPhoto], force: bool) -> Result<Vec
         .collect()
 }
 
+/// The camera of one of these labelled photos, as [`photo_cameras`] finds it: nothing else has to
+/// be right.
+///
+/// # Errors
+/// As [`photo_cameras`], of this photo alone.
+pub(crate) fn photo_camera(
+    labelled: &LabelledPhoto,
+    labels: &[LabelledPhoto],
+    force: bool,
+) -> Result<PhotoCamera> {
+    check_label(&labelled.label).map_err(|error| in_label(error, labelled))?;
+    let file = read_camera_file(labelled)?;
+    let sized = |label: &LabelledPhoto| {
+        with_stored_size(label, read_camera_file(label).ok().flatten().as_ref())
+    };
+    let known: Vec<LabelledPhoto> = labels.iter().map(sized).collect();
+    let known = known.iter().map(|l| (l.name.as_str(), &l.label)).collect();
+    let labelled = with_stored_size(labelled, file.as_ref());
+    PhotoCamera::new(&labelled, file.as_ref(), &known, force)
+}
+
 impl PhotoCamera {
     /// The stored camera, unless it does not match its label any more.
     fn new(

@@ -16,6 +16,7 @@ use crate::scene::{Background, CameraSource, Wall};
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use std::slice;
 use std::sync::Arc;
 
 /// A part of a photo so small is worth a warning where only that fits into the pictures' shape.
@@ -88,16 +89,52 @@ impl BackgroundPhoto {
             return Err(Error::file(folder, what));
         }
         let sightings = camera::photo_cameras(&labels, options.force)?;
-        warn_of_cameras(&labels, &sightings);
+        let places = Self::open_seen(&labels, &sightings, options.image)?;
+        warn_of_unlabelled(folder, &places);
+        Ok(places)
+    }
+
+    /// The labelled photo of this name alone, whose camera only is found; all of them where none
+    /// has it.
+    pub(crate) fn named(
+        name: &str,
+        folder: &Path,
+        options: BackgroundOptions,
+    ) -> Result<Vec<Self>> {
+        let labels = camera::labels_in(folder, options.surface_size)?;
+        let Some(labelled) = labels.iter().find(|labelled| labelled.name == name) else {
+            return Self::all(folder, options);
+        };
+        let seen = camera::photo_camera(labelled, &labels, options.force)?;
+        Self::open_seen(slice::from_ref(labelled), &[seen], options.image)
+    }
+
+    fn open_seen(
+        labels: &[LabelledPhoto],
+        sightings: &[PhotoCamera],
+        image: [u32; 2],
+    ) -> Result<Vec<Self>> {
+        warn_of_cameras(labels, sightings);
         let memory = Arc::new(PhotoMemory::of_bytes(asset::most_bytes()));
         let opened = labels
             .iter()
-            .zip(&sightings)
-            .map(|(label, seen)| Self::open(label, seen, options.image, &memory));
+            .zip(sightings)
+            .map(|(label, seen)| Self::open(label, seen, image, &memory));
         let places = opened.collect::<Result<Vec<_>>>()?;
         warn_of_shapes(&places);
-        warn_of_unlabelled(folder, &places);
         Ok(places)
+    }
+
+    /// All that the photos of a folder are read from, those too that were not opened.
+    pub(crate) fn files_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<PathBuf>> {
+        let labels = camera::labels_in(folder, size)?;
+        let files = labels.iter().flat_map(|labelled| {
+            let photo = labelled.photo();
+            let front = photo.as_deref().and_then(front_beside);
+            let own = [labelled.source.clone(), labelled.beside("camera.json")];
+            own.into_iter().chain(photo).chain(front)
+        });
+        Ok(files.collect())
     }
 
     fn open(
@@ -147,14 +184,6 @@ impl BackgroundPhoto {
             memory: memory.clone(),
             photo,
         }
-    }
-
-    /// All that it is read from: its label and camera, the photo and its mask.
-    pub(crate) fn files(&self) -> impl Iterator<Item = PathBuf> {
-        let camera = format!("{}.camera.json", self.background.name);
-        let camera = self.label.with_file_name(camera);
-        let files = [self.label.clone(), camera, self.photo.clone()];
-        files.into_iter().chain(self.front.clone())
     }
 
     /// Fails where pictures were made of another photo or mask than those of these checksums; from
@@ -289,9 +318,10 @@ impl BackgroundPhoto {
         path: &Path,
         [width, height]: [usize; 2],
     ) -> Result<Image<P>> {
-        let photo = self.memory.files.read::<P>(path)?;
-        self.check_size(path, photo.size())?;
-        Ok(filter::resize(&photo.into_crop(self.kept), width, height))
+        self.memory.files.read(path, |photo: Image<P>| {
+            self.check_size(path, photo.size())?;
+            Ok(filter::resize(&photo.into_crop(self.kept), width, height))
+        })
     }
 
     fn check_size(&self, path: &Path, (w, h): (usize, usize)) -> Result<()> {

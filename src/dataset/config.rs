@@ -108,7 +108,7 @@ impl DatasetConfig {
         Ok(config)
     }
 
-    /// The same with paths from the root: files are read late, whatever the working folder is then.
+    /// The same with absolute paths: files are read late, whatever the working folder is then.
     ///
     /// # Errors
     /// Without a working folder.
@@ -178,9 +178,22 @@ impl DatasetConfig {
         toml::to_string_pretty(&config).map_err(|e| Error::file(path, e))
     }
 
+    /// The same in pictures of another size: what it says in pixels grows or shrinks with their
+    /// longer side.
+    #[doc(hidden)]
+    pub fn with_image(mut self, image: [u32; 2]) -> Self {
+        let longer = |[w, h]: [u32; 2]| f64::from(w.max(h));
+        let factor = longer(image) / longer(self.scene.image);
+        self.scene.image = image;
+        self.scene.finish = self.scene.finish.scaled(factor);
+        self.labels.simplify *= factor;
+        self
+    }
+
     /// The same in pictures of half the width and height, for a first look: the same scenes.
     pub fn preview(mut self) -> Self {
-        self.scene.image = self.scene.image.map(|side| (side / 2).max(MIN_SIDE_PX));
+        let halved = self.scene.image.map(|side| (side / 2).max(MIN_SIDE_PX));
+        self = self.with_image(halved);
         if self.labels.archives().is_some() {
             self.labels.formats.clear();
         }
@@ -208,6 +221,7 @@ impl DatasetConfig {
 mod tests {
     use super::*;
     use crate::dataset::settings::{ends, told_keys};
+    use crate::scene::{Blur, Range};
     use toml::{Table, Value};
 
     /// Whole numbers and broken ones that are equal are the same.
@@ -405,6 +419,22 @@ mod tests {
             same(&again).replace("x/y/../../", ""),
             format!("{}/sky.hdr", dir.path().display())
         );
+    }
+
+    #[test]
+    fn a_preview_halves_what_is_said_in_pixels() {
+        let recipe = "[scene]\nimage = [640, 480]\n[scene.finish]\nblur_px = [0, 0.5]\n\
+                      chromatic_px = -3\ncamera_blur_px = 2\n[labels]\nsimplify = 1\n";
+        let config: DatasetConfig = toml::from_str(recipe).unwrap();
+        let preview = config.preview();
+        let finish = preview.scene.finish;
+        assert_eq!(preview.scene.image, [320, 240]);
+        assert_eq!(finish.camera_blur_px, Range::fixed(1.0));
+        assert_eq!(finish.blur_px, Blur::Known(Range::new(0.0, 0.25)));
+        assert_eq!(finish.chromatic_px, Range::fixed(-1.5));
+        assert_eq!(preview.labels.simplify, 0.5);
+        let smallest = DatasetConfig::default().with_image([10, 10]).preview();
+        assert_eq!(smallest, DatasetConfig::default().with_image([10, 10]));
     }
 
     #[test]

@@ -63,7 +63,8 @@ impl EnvironmentMaps {
             return Ok(picture);
         }
         let path = self.path(name)?;
-        let picture = Panorama::of_file(self.known.read(&path)?, &path)?;
+        let of_image = |image| Panorama::of_file(image, &path);
+        let picture = self.known.read(&path, of_image)?;
         self.keep(name, picture, &path)
     }
 
@@ -157,7 +158,24 @@ mod tests {
         let path = config.folder.join("../far.exr");
         surroundings.check_file(&path, 1).unwrap();
         let refused = surroundings.picture("../far.exr").unwrap_err().to_string();
-        assert!(refused.contains("far.exr: "), "{refused}");
+        let expected = "far.exr: has other bytes than when its folder was opened";
+        assert!(refused.ends_with(expected), "{refused}");
+    }
+
+    #[test]
+    fn a_picture_that_was_refused_may_be_repaired() {
+        let (_dir, config) = folder();
+        let surroundings = EnvironmentMaps::of(&config);
+        let path = config.folder.join("../far.exr");
+        let whole = std::fs::read(&path).unwrap();
+        std::fs::write(&path, "no picture").unwrap();
+        assert!(surroundings.picture("../far.exr").is_err());
+        let square = Image::filled(2, 2, LinearRgb::WHITE);
+        io::write(&path, &square).unwrap();
+        assert!(surroundings.picture("../far.exr").is_err());
+        std::fs::write(&path, &whole).unwrap();
+        surroundings.picture("../far.exr").unwrap();
+        assert!(surroundings.check_file(&path, 1).is_err());
     }
 
     #[test]

@@ -44,8 +44,9 @@ impl EvalTruth {
     ///
     /// # Errors
     /// Those of [`read_coco_truth`] and [`read_yolo_truth`](crate::eval::read_yolo_truth);
-    /// [`Error::File`] for a choice of labels with keypoints, a list that cannot be read, a choice
-    /// without images, and [`Error::Field`] for one with `images` or `size`.
+    /// [`Error::File`] for a `data.yaml` with keypoints that is the choice (a list of such images
+    /// is taken), a list that cannot be read, a choice without images, and [`Error::Field`] for one
+    /// with `images` or `size`.
     pub fn read(path: &Path, images: Option<&Path>, size: Option<[u32; 2]>) -> Result<Self> {
         if Self::is_coco(path) {
             return Self::of_coco(path, images);
@@ -224,13 +225,15 @@ mod tests {
     fn labels_with_keypoints_are_boxes_and_no_outlines() {
         let root = set_and_choice();
         let set = root.path().join("set");
-        std::fs::write(set.join("data.yaml"), "kpt_shape: [1, 3]\n").unwrap();
+        let yaml = "kpt_shape: [1, 3]\nnames: [cap]\n";
+        std::fs::write(set.join("data.yaml"), yaml).unwrap();
         let label = "0 0.5 0.5 0.5 0.5 0.1 0.9 2\n";
         std::fs::write(set.join("labels/val/a.txt"), label).unwrap();
         let truth = EvalTruth::read(&set.join("labels/val"), None, None).unwrap();
         let sheets = truth.with_detections(&root.path().join("found")).unwrap();
         assert_eq!(sheets[0].truth[0].bbox, sheets[0].found[0].bbox);
         assert_eq!(sheets[0].truth[0].bbox.x0, 2.0);
+        assert_eq!(truth.class_names(), ["cap"]);
     }
 
     #[test]

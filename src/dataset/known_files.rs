@@ -6,7 +6,7 @@ use crate::image::Image;
 use crate::io::{self, FromFile};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// CRC-32 of files by their paths: as a dataset's plan tells them, or as pictures were first made.
 #[derive(Debug, Default)]
@@ -15,24 +15,42 @@ pub(crate) struct KnownFiles {
 }
 
 impl KnownFiles {
-    /// Reads a picture.
+    /// Reads a picture and makes something of it. A file that nothing can be made of is not known
+    /// from then on: it may be repaired.
     ///
     /// # Errors
-    /// As [`io::read`]; other bytes than the file is known by.
-    pub(crate) fn read<P: FromFile>(&self, path: &Path) -> Result<Image<P>> {
-        io::read_checked(path, |bytes| self.compare(path, crc32fast::hash(bytes)))
+    /// As [`io::read`], and those of `make`; other bytes than the file is known by.
+    pub(crate) fn read<P: FromFile, T>(
+        &self,
+        path: &Path,
+        make: impl FnOnce(Image<P>) -> Result<T>,
+    ) -> Result<T> {
+        let mut crc32 = 0;
+        let picture = io::read_checked(path, |bytes| {
+            crc32 = crc32fast::hash(bytes);
+            self.compare(path, crc32)
+        })?;
+        let made = make(picture)?;
+        self.check(path, crc32)?;
+        Ok(made)
     }
 
-    /// Fails where a file is known by another checksum than this one.
+    /// Fails where a file is known by another checksum than this one, by which it is known from now
+    /// on.
     pub(crate) fn check(&self, path: &Path, crc32: u32) -> Result<()> {
-        let compared = self.compare(path, crc32);
+        let known = *self.lock().entry(path.to_owned()).or_insert(crc32);
+        let compared = asset::check_unchanged(crc32, known);
         compared.map_err(|what| Error::file(path, what))
     }
 
+    /// Fails where a file is known by another checksum than this one.
     fn compare(&self, path: &Path, crc32: u32) -> std::result::Result<(), String> {
+        let known = self.lock().get(path).copied();
+        asset::check_unchanged(crc32, known.unwrap_or(crc32))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<PathBuf, u32>> {
         let checksums = self.checksums.lock();
-        let mut checksums = checksums.unwrap_or_else(PoisonError::into_inner);
-        let known = checksums.entry(path.to_owned()).or_insert(crc32);
-        asset::check_unchanged(crc32, *known)
+        checksums.unwrap_or_else(PoisonError::into_inner)
     }
 }

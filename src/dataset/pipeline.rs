@@ -56,8 +56,8 @@ const REMEMBERED_SEQUENCES: usize = 64;
 const MAX_RESAMPLES: usize = 8;
 
 impl Pipeline {
-    /// Opens the folders that a config names: from then on by paths from the root, so that the
-    /// working folder may change.
+    /// Opens the folders that a config names: from then on by absolute paths, so that the working
+    /// folder may change.
     ///
     /// # Errors
     /// A folder, manifest, label or cut-out that cannot be used; each names the file, the field and
@@ -80,7 +80,8 @@ impl Pipeline {
     }
 
     /// The same for pictures that may be smaller than the recipe's own of `whole` pixels: objects
-    /// need be large enough in those alone.
+    /// need be large enough in those alone. Paths stay as the config has them, in messages too: the
+    /// working folder must not change.
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -91,7 +92,8 @@ impl Pipeline {
         Self::new(config, library, places).with_sizes_checked_in(whole)
     }
 
-    /// The same for a recipe that is being tuned: falls are remembered.
+    /// As [`open_reduced`](Self::open_reduced) for a recipe that is being tuned: falls are
+    /// remembered.
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -110,6 +112,11 @@ impl Pipeline {
     /// As [`open`](Self::open).
     #[doc(hidden)]
     pub fn with_config(&self, config: DatasetConfig, whole: [u32; 2]) -> Result<Self> {
+        // What was opened by absolute paths is known by those.
+        let config = match self.config.assets.is_absolute() {
+            true => config.with_absolute_paths()?,
+            false => config,
+        };
         let library = match self.config.assets == config.assets {
             true => self.library.clone(),
             false => Library::open(&config.assets)?.into(),
@@ -172,7 +179,7 @@ impl Pipeline {
     }
 
     /// The same for one scene that is there already: only cut-outs of the assets that it names are
-    /// read, and known.
+    /// read, and known, and of the labelled photos its own.
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -184,7 +191,8 @@ impl Pipeline {
         let places = if scene.plate.is_empty() {
             Vec::new()
         } else {
-            open_backgrounds(&config)?
+            let options = background_options(&config);
+            BackgroundPhoto::named(&scene.plate, &config.backgrounds, options)?
         };
         Ok(Self::new(config, library.into(), places.into()))
     }
@@ -222,14 +230,23 @@ impl Pipeline {
     /// photos of the place with what lies beside them, the environment maps.
     ///
     /// # Errors
-    /// Those of [`Manifest::read`].
+    /// A manifest or label that cannot be read.
     #[doc(hidden)]
     pub fn input_files(&self, scene: &Scene) -> Result<Vec<PathBuf>> {
-        let DatasetConfig { assets, folder, .. } = &self.config;
+        let DatasetConfig {
+            assets,
+            backgrounds,
+            folder,
+            surface_size,
+            ..
+        } = &self.config;
         let manifest = Manifest::read(assets)?;
         let photos = manifest.assets.iter().flat_map(|asset| &asset.photos);
         let cut_outs = photos.flat_map(|photo| photo.files());
-        let places = self.places.iter().flat_map(BackgroundPhoto::files);
+        let places = match self.places.is_empty() {
+            true => Vec::new(),
+            false => BackgroundPhoto::files_in(backgrounds, *surface_size)?,
+        };
         let listed = self.surroundings.files().map(|(_, path)| path);
         let named = scene.environment.iter().map(|map| folder.join(&map.file));
         let files = cut_outs.map(|file| assets.join(file));
@@ -567,12 +584,15 @@ fn falls_of(config: &DatasetConfig) -> Falls {
 
 /// The labelled photos that a config names.
 fn open_backgrounds(config: &DatasetConfig) -> Result<Vec<BackgroundPhoto>> {
-    let options = BackgroundOptions {
+    BackgroundPhoto::all(&config.backgrounds, background_options(config))
+}
+
+fn background_options(config: &DatasetConfig) -> BackgroundOptions {
+    BackgroundOptions {
         image: config.scene.image,
         surface_size: config.surface_size,
         force: config.force_cameras,
-    };
-    BackgroundPhoto::all(&config.backgrounds, options)
+    }
 }
 
 /// Whether two configs take the same photos in the same way.

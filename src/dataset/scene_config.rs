@@ -67,9 +67,9 @@ impl DatasetConfig {
 
     fn from_scene_table(mut table: Table, overrides: &[io::Override]) -> Result<Self> {
         leave_out_formats(&mut table);
-        let idle = table.keys().find(|key| !counts_for_scene(key)).cloned();
         let table: Table = io::from_table_with(table, overrides)?;
         check_scene_table(&table)?;
+        let idle = table.keys().find(|key| !counts_for_scene(key)).cloned();
         // This names what no recipe knows either, with what was probably meant.
         let config: Self = io::from_table(table)?;
         if let Some(key) = idle {
@@ -369,6 +369,11 @@ mod tests {
         assert_eq!(told, expected);
         let whole = given("scene={gain_ev=5}").unwrap_err();
         assert!(whole.starts_with("scene: decides"), "{whole}");
+        let idle = given("split.val_percent=5").unwrap_err();
+        assert!(
+            idle.starts_with("settings.split: does nothing in a scene"),
+            "{idle}"
+        );
         for counts in ["scene.settle.attempts=3", "pictures.jpeg_quality=5"] {
             assert!(given(counts).is_ok(), "{counts}");
         }

@@ -91,7 +91,7 @@ impl YoloSet {
     /// `labels`), as far as a `data.yaml` above it tells; 0 without its `kpt_shape`.
     ///
     /// # Errors
-    /// [`Error::File`] for a `kpt_shape` that is none.
+    /// [`Error::File`] for an invalid `kpt_shape`.
     pub fn keypoint_numbers_of(labels: &Path) -> Result<usize> {
         let Some(path) = yaml_above(labels)? else {
             return Ok(0);

@@ -25,7 +25,7 @@ pub(crate) struct DataYaml {
 /// Most classes that are numbered where `nc` alone tells of them.
 const MAX_NUMBERED_CLASSES: usize = 10_000;
 
-/// Most keypoints of an object.
+/// Maximum number of keypoints of an object.
 const MAX_KEYPOINTS: usize = 10_000;
 
 /// What is wrong with a set whose labels have keypoints.
@@ -99,11 +99,12 @@ impl DataYaml {
         (yaml, problems)
     }
 
-    /// The names of the classes alone, whatever else is missing.
+    /// The names of the classes alone, whatever else is missing, of labels with keypoints too.
     pub(crate) fn read_names(text: &str) -> Result<Vec<String>, Problem> {
         let (yaml, problems) = Self::read_given(text);
         let unnamed = yaml.names_problem().map(|what| (None, what));
-        match problems.into_iter().next().or(unnamed) {
+        let wrong = problems.into_iter().find(|(_, what)| what != KEYPOINTS);
+        match wrong.or(unnamed) {
             None => Ok(yaml.names),
             Some(problem) => Err(problem),
         }
@@ -545,6 +546,8 @@ mod tests {
         let (_, problems) = DataYaml::read(text);
         assert_eq!(problems.len(), 1);
         assert_eq!(problems[0], (Some(4), KEYPOINTS.into()));
+        let names = DataYaml::read_names("kpt_shape: [4, 2]\nnames: [cap]\n");
+        assert_eq!(names, Ok(vec!["cap".into()]));
         let numbers = DataYaml::read_keypoint_numbers;
         assert_eq!(numbers(text), Ok(8));
         assert_eq!(numbers("names: 3\nkpt_shape:\n"), Ok(0));

@@ -433,14 +433,13 @@ const MAX_SHARE: f64 = 10.0;
 /// Numbers of a box: `cx cy w h`.
 const BOX_NUMBERS: usize = 4;
 
-/// Lines with `extra` numbers (a confidence or nothing) at their ends, behind a byte order mark or
-/// none.
+/// Lines with `extra` numbers (a confidence or nothing) at their ends.
 fn parse_rows(
     text: &str,
     extra: usize,
     keypoints: usize,
 ) -> std::result::Result<Vec<LabelRow>, String> {
-    filled_lines(text.trim_start_matches('\u{feff}'))
+    filled_lines(text)
         .map(|(i, line)| parse_row(line, extra, keypoints).map_err(|what| in_line(i, &what)))
         .collect()
 }
@@ -479,8 +478,13 @@ fn leave_out_keypoints(
     let behind = numbers.len().checked_sub(BOX_NUMBERS + keypoints);
     if !behind.is_some_and(ends) {
         let count = numbers.len();
+        let confidence = if extra == 0 {
+            ""
+        } else {
+            ", and a confidence (save_conf=True)"
+        };
         return Err(format!(
-            "{count} numbers behind the class, expected cx cy w h and {keypoints} of keypoints (kpt_shape)"
+            "{count} numbers behind the class, expected cx cy w h and {keypoints} of keypoints (kpt_shape){confidence}"
         ));
     }
     numbers.drain(BOX_NUMBERS..BOX_NUMBERS + keypoints);
@@ -716,10 +720,11 @@ mod tests {
 
     #[test]
     fn a_byte_order_mark_is_no_part_of_the_class() {
-        let marked = |line: &str| format!("\u{feff}{line}");
-        let (label, found) = ("3 0.5 0.5 0.2 0.4\n", "3 0.5 0.5 0.2 0.4 0.9\n");
-        let sheet = sheet_of(&marked(label), &marked(found), [100, 200]).unwrap();
-        assert_eq!(sheet, sheet_of(label, found, [100, 200]).unwrap());
+        let labels = folder(&[("a.txt", "\u{feff}3 0.5 0.5 0.2 0.4\n")]);
+        let found = folder(&[("a.txt", "\u{feff}3 0.5 0.5 0.2 0.4 0.9\n")]);
+        let mut truth = read_yolo_truth(labels.path(), None, Some([100, 200])).unwrap();
+        read_yolo_detections(found.path(), &mut truth).unwrap();
+        let sheet = &truth.sheets[0];
         assert_eq!((sheet.truth[0].class, sheet.found[0].class), (3, 3));
     }
 
@@ -759,6 +764,9 @@ mod tests {
         for end in ["0.25", "0.25 7"] {
             assert_eq!(found("0.1 0.2 0.9 0.9 0.8 0.7", end), found("", "0.25"));
         }
+        let unsure = parse_detections(&format!("{place} 0.1 0.2 2 0.9 0.8 1"), size, 6);
+        let expected = "line 1: 10 numbers behind the class, expected cx cy w h and 6 of keypoints (kpt_shape), and a confidence (save_conf=True)";
+        assert_eq!(unsure.unwrap_err(), expected);
     }
 
     #[test]

@@ -73,6 +73,8 @@ pub struct Header {
     pub whole: bool,
     /// The stored pixels are turned or mirrored to make the picture upright.
     pub turned: bool,
+    /// The camera noted Adobe RGB, which counts where the file has no colour profile.
+    pub noted_adobe_rgb: bool,
     /// Texts that the file carries, by name.
     pub metadata: Vec<(String, String)>,
 }
@@ -94,6 +96,7 @@ impl Default for Header {
             cropped: false,
             whole: false,
             turned: false,
+            noted_adobe_rgb: false,
             metadata: Vec::new(),
         }
     }

@@ -21,14 +21,14 @@
 //!
 //! Premultiplication happens here, in linear light. A fourth sample that a TIFF does not call alpha
 //! (`ExtraSamples` 0) is left out with a warning. The orientation noted by a camera is applied. An
-//! EXR is cropped or padded with transparent black from its data window to its display window
-//! ([`Window`] keeps the former), and converted if it names other primaries. A colour profile (ICC)
-//! of primaries and curves, such as Display P3 or Adobe RGB, is applied to display codes, as are
-//! code points of Rec. 709, Rec. 2020 and Display P3 with the curve of sRGB or none, and a camera's
-//! word (EXIF) for Adobe RGB in a JPEG or TIFF without profile; others are named in a warning and
-//! the codes treated as sRGB. Inks (CMYK) are multiplied; CIELab is refused. Samples that are
-//! infinite or NaN are counted in a warning, and become codes of 0 or full scale where integers are
-//! written.
+//! EXR is cropped or padded with transparent black (a film passes all light there) from its data
+//! window to its display window ([`Window`] keeps the former), and converted if it names other
+//! primaries. A colour profile (ICC) of primaries and curves, such as Display P3 or Adobe RGB, is
+//! applied to display codes, as are code points of Rec. 709, Rec. 2020 and Display P3 with the
+//! curve of sRGB or none, and a camera's word (EXIF) for Adobe RGB in a JPEG or TIFF without
+//! profile; others are named in a warning and the codes treated as sRGB. Inks (CMYK) are
+//! multiplied; CIELab is refused. Samples that are infinite or NaN are counted in a warning, and
+//! become codes of 0 or full scale where integers are written.
 //!
 //! # What holds for untrusted files
 //!

@@ -170,6 +170,11 @@ fn usable_profile(
         log::warn!("{path}: has a colour profile, but float samples; treated as linear Rec. 709");
         return None;
     }
+    if profile.as_ref().is_some_and(|profile| profile.lacks_table) {
+        log::warn!(
+            "{path}: has a colour profile with a table, which is not applied; its primaries and curves are"
+        );
+    }
     profile
 }
 
@@ -220,19 +225,19 @@ fn warn_unusual_channels(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     }
 }
 
-/// Says where a TIFF has a sample behind its colours that it does not call alpha: most programs
-/// leave it out, some take it for alpha.
+/// Says where a TIFF has samples behind its colours, the first of which it does not call alpha:
+/// most programs leave them out, some take that one for alpha.
 fn warn_left_out(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     let picked = Wanted::Color.pick(&raster.names);
     let is_without_alpha = picked.is_ok_and(|picked| picked.len() == 3);
     if source.format != Format::Tiff || !wanted.is_color() || !is_without_alpha {
         return;
     }
-    let left_out = catch_panic(|| Ok(tiff::unspecified_samples(&source.bytes)));
-    if left_out.is_ok_and(|count| count > 0) {
+    let left_out = catch_panic(|| Ok(tiff::has_unspecified_sample(&source.bytes)));
+    if left_out.unwrap_or(false) {
         let path = source.path.display();
         log::warn!(
-            "{path}: has samples of no stated meaning beside its colours (ExtraSamples 0); left out, expected 1 or 2 where they are alpha"
+            "{path}: has samples beside its colours, the first of which is not called alpha (ExtraSamples 1 or 2); left out"
         );
     }
 }

@@ -2,6 +2,7 @@
 
 use super::codec::FromFile;
 use super::codec::exif::CameraNotes;
+use super::codec::profile::ColorDescription;
 use super::codec::refusal::Refusal;
 #[cfg(feature = "oiio")]
 use super::decode::decode_elsewhere;
@@ -47,7 +48,7 @@ pub fn read_with<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> 
 #[cfg(feature = "pipeline")]
 pub(crate) fn read_checked<P: FromFile>(
     path: &Path,
-    check: impl Fn(&[u8]) -> std::result::Result<(), String>,
+    check: impl FnOnce(&[u8]) -> std::result::Result<(), String>,
 ) -> Result<Image<P>> {
     let options = ReadOptions::default();
     let source = SourceFile::open(path, &options.limits)?;
@@ -119,6 +120,7 @@ fn apply_notes(header: &mut Header, notes: &CameraNotes) {
     header.cropped = notes.has_other_shape(stored);
     header.whole = notes.has_same_size(stored);
     header.turned = notes.orientation.turns();
+    header.noted_adobe_rgb = matches!(notes.color, Some(ColorDescription::AdobeRgb));
     (header.width, header.height) = notes.orientation.size(stored.into());
     if header.data_size == [0; 2] {
         header.data_size = [header.width, header.height];

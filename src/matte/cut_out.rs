@@ -248,6 +248,8 @@ struct ObjectRegion {
     cut: Image<Coverage>,
     /// What a person says of the transmittance.
     claims: Option<Claims>,
+    /// What a person says of the outline.
+    drawn: Option<Claims>,
 }
 
 impl ObjectRegion {
@@ -261,13 +263,15 @@ impl ObjectRegion {
         let around = hull_roi(&found.hull, options.margin_px.max(options.reach_px()), size);
         let cropped = |claims: &Option<Claims>| claims.as_ref().map(|said| said.crop(around));
         let boundary = options.within.of_object(found).crop(around);
-        let boundary = corrected_coverage(boundary, cropped(&claims.outline).as_ref());
+        let drawn = cropped(&claims.outline);
+        let boundary = corrected_coverage(boundary, drawn.as_ref());
         Self {
             around,
             kept: hull_roi(&found.hull, options.margin_px, size),
             photo: prepared.photo.crop(around),
             cut: softened(&boundary, options.soften_px),
             claims: cropped(&claims.transmittance),
+            drawn,
         }
     }
 

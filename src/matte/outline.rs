@@ -59,6 +59,14 @@ impl Outline {
         self.rings.iter().map(|ring| signed_area(ring)).sum()
     }
 
+    /// Area over that of the convex hull, 0 to 1 (OpenCV's solidity); 1 where there is nothing.
+    pub fn solidity(&self) -> f64 {
+        match signed_area(&self.hull()) {
+            whole if whole > 0.0 => self.area() / whole,
+            _ => 1.0,
+        }
+    }
+
     /// How wide a long strip of this area and outline would be: twice the area over the length of
     /// its rings, pixels; 0 where there is nothing.
     pub fn width(&self) -> f64 {
@@ -252,6 +260,12 @@ mod tests {
             outline.area()
         );
         assert!(signed_area(&outline.rings[0]) > 0.0 && signed_area(&outline.rings[1]) < 0.0);
+    }
+
+    #[test]
+    fn a_ring_is_less_solid_than_what_it_lies_around() {
+        assert!((Outline::around(&ring()).solidity() - (1.0 - 144.0 / 400.0)).abs() < 0.01);
+        assert_eq!(Outline::default().solidity(), 1.0);
     }
 
     #[test]

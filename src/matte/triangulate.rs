@@ -30,7 +30,8 @@ pub struct TriangulateOptions {
     /// Largest offset of the object from the first photo that is moved back, pixels. Default: 8.
     pub max_shift_px: f64,
     /// Moved back, what the screens do not change must agree between the photos: least
-    /// correlation, 0 to 1. Default: 0.5.
+    /// correlation, 0 to 1; 0 for a dyed object, of which the screens change everything. Default:
+    /// 0.5.
     pub least_agreement: f64,
     /// A channel is determined where its transmittance has at most this standard deviation.
     /// Default: 0.05.
@@ -361,9 +362,11 @@ impl Aligner<'_> {
 
     fn too_unlike(&self, found: &Registered) -> Option<String> {
         let (agreement, least) = (found.agreement, self.options.least_agreement);
-        (found.sigma_px < MAX_JUDGED_SIGMA_PX && agreement < least).then(|| {
+        // Photos of a dyed object may even be opposite, and 0 lets all through.
+        let is_unlike = agreement.max(0.0) < least;
+        (found.sigma_px < MAX_JUDGED_SIGMA_PX && is_unlike).then(|| {
             format!(
-                "correlation with the first is {agreement:.2}, expected {least:.2}; did the object turn or the light change?"
+                "correlation with the first is {agreement:.2}, expected {least:.2}; did the object turn or the light change, or is it dyed? a dyed one is let through by --set film.least_agreement=0"
             )
         })
     }

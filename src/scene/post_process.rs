@@ -240,6 +240,20 @@ impl Default for PostProcessRanges {
 }
 
 impl PostProcessRanges {
+    /// The same for pictures whose sides are `factor` times as long: what is said in pixels grows
+    /// or shrinks with them.
+    pub(crate) fn scaled(self, factor: f64) -> Self {
+        Self {
+            blur_px: match self.blur_px {
+                Blur::Known(sigma_px) => Blur::Known(sigma_px.scaled(factor)),
+                Blur::MatchPlate => Blur::MatchPlate,
+            },
+            chromatic_px: self.chromatic_px.scaled(factor),
+            camera_blur_px: self.camera_blur_px.scaled(factor),
+            ..self
+        }
+    }
+
     /// `own` draws what differs between pictures of one sequence: noise.
     pub(super) fn draw(&self, draws: &Draws, own: &Draws) -> PostProcess {
         PostProcess {

@@ -66,6 +66,11 @@ impl Range {
         Self::fixed((self.min + self.max) / 2.0)
     }
 
+    /// All of it times a factor.
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        Self::new(self.min * factor, self.max * factor)
+    }
+
     /// The value at a path.
     pub fn draw(&self, draws: &Draws, path: &str) -> f64 {
         let value = self.min + (self.max - self.min) * draws.unit(path);

@@ -2,7 +2,7 @@
 //! process: no other test runs beside this one.
 #![expect(unsafe_code, reason = "calls what C calls")]
 
-use petcomp::asset::{self, PhotoEntry, Scale};
+use petcomp::asset::{self, Library, PhotoEntry, Scale};
 use petcomp::{Image, LinearRgb, io};
 use petcomp_c::*;
 use std::ffi::CString;
@@ -60,7 +60,10 @@ fn an_open_pipeline_does_not_follow_the_working_folder() {
     write_project(&other, 0.8);
     std::env::set_current_dir(&own).unwrap();
     let pipeline = open(Path::new("recipe.toml"));
+    let library = Library::open("assets").unwrap();
     std::env::set_current_dir(&other).unwrap();
     let [own, other] = [own, other].map(|folder| picture(open(&folder.join("recipe.toml"))));
     assert!(own != other && picture(pipeline) == own);
+    std::env::set_current_dir(folder.path()).unwrap();
+    assert!(library.assets[0].photos[0].pixels().is_ok());
 }

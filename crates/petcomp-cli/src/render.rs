@@ -15,7 +15,7 @@ pub(crate) struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Picture to write: .png, .jpg as the recipe's `pictures` says, or .exr for scene-linear values
-    /// with alpha
+    /// with alpha; in a .png or .jpg a scene without a plate lies over black, without alpha
     #[arg(short, long, value_name = "PICTURE")]
     output: PathBuf,
     /// draft, normal or reference: how finely everything is computed; by default as the recipe or

@@ -300,15 +300,36 @@ fn batches_of_sets_that_name_other_classes_are_refused() {
 }
 
 #[test]
+fn what_is_trained_on_twice_or_validates_too_is_told() {
+    let desk = Desk::new();
+    write_unsplit_set(&desk, "real", 3, "[cap]");
+    write_unsplit_set(&desk, "made", 3, "[cap]");
+    let kit = "dataset train-kit -o kit --real real --synthetic";
+    let output = desk.run(&words(&format!("{kit} made")));
+    let told = text(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    let why = "real: 3 of 3 images for validation are also trained on; see `dataset split`";
+    assert!(told.contains(why), "{told}");
+    let batches = "dataset batches -o batches.jsonl --real real --synthetic";
+    for line in [kit, batches] {
+        let told = desk.refused(&words(&format!("{line} ./real")));
+        let why = "real/images/0.png is also a real image, expected other images than in real";
+        assert!(told.contains(why), "{told}");
+    }
+}
+
+#[test]
 fn a_set_for_training_alone_has_batches_and_anchors() {
     let desk = Desk::new();
-    write_slab(&desk.path("set/images/a.png"));
-    desk.write("set/labels/a.txt", "0 0.5 0.5 0.4 0.4\n");
-    desk.write("set/none.txt", "");
-    let yaml = "train: images\nval: none.txt\nnames: [cap]\n";
-    desk.write("set/data.yaml", yaml);
+    for set in ["set", "made"] {
+        write_slab(&desk.path(format!("{set}/images/a.png")));
+        desk.write(format!("{set}/labels/a.txt"), "0 0.5 0.5 0.4 0.4\n");
+        desk.write(format!("{set}/none.txt"), "");
+        let yaml = "train: images\nval: none.txt\nnames: [cap]\n";
+        desk.write(format!("{set}/data.yaml"), yaml);
+    }
     desk.ok(&words(
-        "dataset batches --real set --synthetic set -o batches.jsonl",
+        "dataset batches --real set --synthetic made -o batches.jsonl",
     ));
     let said = desk.ok(&words("dataset anchors set -n 1"));
     assert!(said.contains("mean IoU 1.000"), "{said}");
@@ -686,6 +707,18 @@ fn ablations_differ_in_the_switch_that_is_asked_for() {
 }
 
 #[test]
+fn a_switch_that_cannot_work_is_told_before_anything_is_made() {
+    let desk = Desk::new();
+    demo(&desk);
+    let ablate = "dataset ablate demo/recipe.toml -n 1 --switch assets=nowhere -o out";
+    let output = desk.run(&words(ablate));
+    let told = text(&output.stderr);
+    assert!(!output.status.success(), "{told}");
+    assert!(told.contains("error: assets=nowhere: "), "{told}");
+    assert!(!desk.path("out/all/dataset").exists());
+}
+
+#[test]
 fn recipes_of_long_switches_are_written() {
     let desk = Desk::new();
     desk.write("recipe.toml", "[scene]\nobjects = 3\n");
@@ -916,8 +949,8 @@ fn no_command_writes_over_what_it_reads() {
         &["dataset", "subset", "set", "--head", "0.5", "-o", "set"],
         &["dataset", "split", "a", "-o", "b"],
         &["dataset", "subset", "a", "--head", "0.5", "-o", "b"],
-        &words("dataset batches --real c --synthetic c -o c/data.yaml")[..],
-        &words("dataset batches --real c --synthetic c -o ./c/images/0.png")[..],
+        &words("dataset batches --real c --synthetic a -o c/data.yaml")[..],
+        &words("dataset batches --real c --synthetic a -o ./c/images/0.png")[..],
         &words("dataset report c -o c/data.yaml")[..],
         &words("dataset sheet c -o ./c/index.jsonl")[..],
         &words("dataset sheet c -o c/images/train/000000.png")[..],
@@ -985,12 +1018,13 @@ fn images_that_no_list_can_name_are_refused() {
     use std::os::unix::ffi::OsStrExt;
     let desk = Desk::new();
     write_unsplit_set(&desk, "set", 1, "[cap]");
+    write_unsplit_set(&desk, "made", 1, "[cap]");
     let odd = std::ffi::OsStr::from_bytes(b"set/images/\xff.png");
     desk.write(Path::new(odd), "");
     for command in [
-        "dataset batches --real set --synthetic set -o b.jsonl",
+        "dataset batches --real set --synthetic made -o b.jsonl",
         "dataset subset set --head 1 -o half",
-        "dataset train-kit --real set --synthetic set -o kit",
+        "dataset train-kit --real set --synthetic made -o kit",
     ] {
         let told = desk.refused(&words(command));
         assert!(told.contains("a name that is not UTF-8"), "{told}");
@@ -1807,6 +1841,16 @@ fn an_environment_map_lies_beside_its_recipe() {
     );
 }
 
+/// A label that no camera fits: one corner lies inside the triangle of the others.
+const DENTED_LABEL: &str = r#"{
+  "format": "plane-label", "version": 1,
+  "image": { "file": "other.jpg", "width": 1280, "height": 960 },
+  "surface": {
+    "width_m": 0.56, "height_m": 0.37,
+    "corners_px": [[235.8, 239.2], [1019.7, 215.7], [500.0, 400.0], [275.6, 738.8]]
+  }
+}"#;
+
 #[test]
 fn a_scene_is_rendered_without_its_recipe() {
     let desk = Desk::new();
@@ -1862,12 +1906,19 @@ fn a_scene_is_rendered_without_its_recipe() {
         &front,
     )
     .unwrap();
+    // Nor does it matter that no camera fits the label of another photo, but where all are opened.
+    desk.write("places/other.label.json", DENTED_LABEL);
+    let places = ["--set", "backgrounds=\"../places\""];
+    let all = ["scene", "draw", "demo/recipe.toml", "-o", "no.toml"];
+    let refused = desk.refused(&[&all[..], &places].concat());
+    assert!(refused.contains("other.label.json: "), "{refused}");
     let hidden = |args: &[&str]| {
-        let places = ["--set", "backgrounds=\"../places\""];
         with_set(&[&["label", scene, "demo/recipe.toml"], args, &places].concat());
     };
     hidden(&["-o", "hidden.json"]);
     hidden(&["-o", "shown.json", "--overlay", "hidden.png"]);
+    let over_places = ["render", scene, "demo/recipe.toml", "-o", "hidden.exr"];
+    with_set(&[&over_places[..], &places].concat());
     let boxes = |name: &str| -> Vec<_> {
         let labels: petcomp::label::Labels = petcomp::io::read_json(desk.path(name)).unwrap();
         labels

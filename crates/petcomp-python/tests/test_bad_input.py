@@ -229,8 +229,12 @@ def test_no_camera_looks_down_from_below_the_surface():
 def test_a_number_out_of_range_is_an_error_of_petcomp():
     with pytest.raises(errors.InvalidValueError, match="^threads: -1, expected 0 or more"):
         petcomp.set_threads(-1)
-    with pytest.raises(errors.InvalidValueError, match="^size: .*, expected two whole numbers above 0"):
-        petcomp.evaluate("none.json", "none", size=(2**40, 48))
+    for size, expected in (
+        ((2**40, 48), "two whole numbers from 1 to 2147483648"),
+        (("640", "480"), "numbers of shape"),
+    ):
+        with pytest.raises(errors.InvalidValueError, match=f"^size: .*, expected {expected}"):
+            petcomp.evaluate("none.json", "none", size=size)
 
 
 def test_a_wrong_type_is_a_type_error(recipe):

@@ -247,6 +247,8 @@ async function showText() {
   const { file, edits } = recipe;
   // What was edited last need not be in the draft that the settings show.
   const { text } = await api("api/recipe/draft", { file, edits });
+  // Another dialog was opened meanwhile.
+  if (document.querySelector("dialog[open]")) return;
   const dialog = element("dialog", { class: "wide", "aria-label": "the file" },
     element("h2", {}, file, edits.length ? " as it would be saved" : ""),
     element("pre", {}, text),
@@ -465,6 +467,7 @@ async function open(file) {
   meanwhile = null;
   Object.assign(recipe, { file, version: opened.version, draft: opened, saved: opened, edits: [] });
   Object.assign(steps, { past: [], future: [], path: "" });
+  drafting.redraw = false;
   history.replaceState(null, "", query("recipe", { file }));
   at("file").value = file;
   document.title = `${file} · petcomp studio`;

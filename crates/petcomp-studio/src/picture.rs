@@ -127,7 +127,7 @@ fn over_black(path: &Path, side_px: usize, quality: u8) -> Answer<Response> {
 }
 
 /// The type and the bytes of a file that every browser shows as petcomp reads it. An upright JPEG
-/// is one without its EXIF data.
+/// is sent without its EXIF data.
 fn plain_file(path: &Path) -> Answer<Option<(&'static str, Vec<u8>)>> {
     let header = io::read_header(path)?;
     let Some(kind) = plain_type(path, &header)? else {
@@ -135,36 +135,63 @@ fn plain_file(path: &Path) -> Answer<Option<(&'static str, Vec<u8>)>> {
     };
     let bytes = std::fs::read(path).map_err(unreadable)?;
     let plain = match header.format {
-        _ if !may_have_exif(&bytes) => Some(bytes),
-        Format::Jpeg if !header.turned => without_notes(&bytes).filter(|b| !may_have_exif(b)),
-        _ => None,
+        Format::Jpeg => without_metadata(&bytes),
+        _ => Some(bytes),
     };
+    let plain = plain.filter(|bytes| !may_have_exif(bytes));
     Ok(plain.map(|bytes| (kind, bytes)))
 }
 
-/// Markers of a JPEG: EXIF data and XMP, and where the pixels begin.
+// Markers of ISO/IEC 10918-1, table B.1: Huffman tables, start of scan, end of image, and
+// application segment 1 with EXIF data or XMP.
+const DHT: u8 = 0xc4;
+const SOS: u8 = 0xda;
+const EOI: u8 = 0xd9;
 const APP1: u8 = 0xe1;
-const START_OF_SCAN: u8 = 0xda;
 
-/// A JPEG without the EXIF data and XMP in front of its pixels; none of one with something else
-/// than segments there.
-fn without_notes(jpeg: &[u8]) -> Option<Vec<u8>> {
+/// A JPEG without EXIF data, XMP and what is behind the end of the picture: cameras put a smaller
+/// one there with EXIF data of its own. None of one that not every browser shows, or with something
+/// else than segments in it.
+fn without_metadata(jpeg: &[u8]) -> Option<Vec<u8>> {
     let (start, mut rest) = jpeg.split_at_checked(2)?;
     let mut kept = start.to_vec();
-    loop {
-        let &[0xff, marker, high, low, ..] = rest else {
+    while !rest.starts_with(&[0xff, EOI]) {
+        let (segment, behind) = rest.split_at_checked(segment_bytes(rest)?)?;
+        if is_rare_frame(segment) {
             return None;
-        };
-        if marker == START_OF_SCAN {
-            kept.extend_from_slice(rest);
-            return Some(kept);
         }
-        let length = 2 + usize::from(u16::from_be_bytes([high, low]));
-        let (segment, behind) = rest.split_at_checked(length)?;
-        if marker != APP1 {
+        if segment[1] != APP1 {
             kept.extend_from_slice(segment);
         }
         rest = behind;
+    }
+    kept.extend_from_slice(&[0xff, EOI]);
+    Some(kept)
+}
+
+/// Length of the first segment of the rest of a JPEG, with the pixels that follow it.
+fn segment_bytes(jpeg: &[u8]) -> Option<usize> {
+    let &[0xff, marker, high, low, ..] = jpeg else {
+        return None;
+    };
+    let length = 2 + usize::from(u16::from_be_bytes([high, low]));
+    if marker != SOS {
+        return Some(length);
+    }
+    let mut pairs = jpeg.get(length..)?.windows(2);
+    // Neither an escaped byte of pixels nor padding nor a restart.
+    let end = pairs.position(|pair| pair[0] == 0xff && !matches!(pair[1], 0 | 0xff | 0xd0..=0xd7));
+    Some(length + end?)
+}
+
+/// The header of a picture that not every browser shows: other than 8 bits, lossless,
+/// hierarchical, arithmetic-coded.
+fn is_rare_frame(segment: &[u8]) -> bool {
+    match segment[1] {
+        DHT => false,
+        0xc0..=0xc2 => segment.get(4) != Some(&8),
+        0xc3..=0xcf => true,
+        _ => false,
     }
 }
 
@@ -180,6 +207,7 @@ fn plain_type(path: &Path, header: &Header) -> Answer<Option<&'static str>> {
     let bytes = std::fs::metadata(path).map_err(unreadable)?.len();
     Ok(match header.format {
         _ if bytes > MAX_PLAIN_BYTES => None,
+        Format::Jpeg if header.turned || header.noted_adobe_rgb => None,
         Format::Jpeg => Some("image/jpeg"),
         Format::Png if header.bits == 8 => Some("image/png"),
         _ => None,
@@ -251,6 +279,56 @@ mod tests {
         std::fs::write(&photo, &noted).unwrap();
         assert!(may_have_exif(&noted));
         assert_eq!(body_of(&photo, None), plain);
+        // A preview behind the picture, as many cameras write it.
+        std::fs::write(&photo, [&noted[..], &noted].concat()).unwrap();
+        assert_eq!(body_of(&photo, None), plain);
+    }
+
+    #[test]
+    fn a_photo_in_a_camera_s_adobe_rgb_is_sent_in_srgb() {
+        let folder = tempfile::tempdir().unwrap();
+        let (photo, answered) = (folder.path().join("a.jpg"), folder.path().join("b.jpg"));
+        io::write(
+            &photo,
+            &Image::filled(40, 20, LinearRgb::new(0.2, 0.4, 0.2)),
+        )
+        .unwrap();
+        let light = |path: &Path| io::read::<LinearRgb>(path).unwrap()[(8, 8)];
+        let own_codes = light(&photo);
+        let exif = b"\xff\xe1\0\x52Exif\0\0MM\0*\0\0\0\x08\
+            \0\x01\x87\x69\0\x04\0\0\0\x01\0\0\0\x1a\0\0\0\0\
+            \0\x02\xa0\x01\0\x03\0\0\0\x01\xff\xff\0\0\
+            \xa0\x05\0\x04\0\0\0\x01\0\0\0\x38\0\0\0\0\
+            \0\x01\0\x01\0\x02\0\0\0\x04R03\0\0\0\0\0";
+        let mut jpeg = std::fs::read(&photo).unwrap();
+        jpeg.splice(2..2, exif.iter().copied());
+        std::fs::write(&photo, jpeg).unwrap();
+        std::fs::write(&answered, body_of(&photo, None)).unwrap();
+        let (sent, expected) = (light(&answered), light(&photo));
+        assert!(
+            (sent.r - expected.r).abs() < 0.01,
+            "{sent:?}, expected {expected:?}"
+        );
+        assert!((sent.r - own_codes.r).abs() > 0.03, "{sent:?}");
+    }
+
+    /// Browsers do not decode these; OpenImageIO does.
+    #[test]
+    fn an_arithmetic_coded_or_12_bit_photo_is_not_sent_as_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let photo = folder.path().join("a.jpg");
+        io::write(&photo, &Image::filled(40, 20, LinearRgb::WHITE)).unwrap();
+        let jpeg = std::fs::read(&photo).unwrap();
+        assert_eq!(without_metadata(&jpeg).as_ref(), Some(&jpeg));
+        let frame = jpeg
+            .windows(2)
+            .position(|pair| pair.starts_with(&[0xff, 0xc0]))
+            .unwrap();
+        for (place, byte) in [(frame + 1, 0xc9), (frame + 4, 12)] {
+            let mut rare = jpeg.clone();
+            rare[place] = byte;
+            assert_eq!(without_metadata(&rare), None);
+        }
     }
 
     #[test]

@@ -162,7 +162,7 @@ impl Fitting<'_> {
         Difference::new(&real, &own.log_sizes(), self.options.seed)
     }
 
-    /// Fits where objects come to lie by a lever, and returns the candidate that it is nearest to.
+    /// Fits where objects come to lie by a lever, and returns the recipe's own candidate.
     fn fit_lever(
         &mut self,
         lever: &Lever,
@@ -174,7 +174,7 @@ impl Fitting<'_> {
             self.keys.push(self.unfitted_lever(lever));
             return Ok(own);
         }
-        let mut candidates = self.candidates(lever, own, times)?;
+        let candidates = self.candidates(lever, own, times)?;
         let places = places_of(boxes.iter().map(Vec::as_slice));
         let fitted = starts::choose(&candidates, &places, self.options.seed);
         self.keys.push(FittedKey {
@@ -182,11 +182,26 @@ impl Fitting<'_> {
             why: describe_lever(lever, &candidates, &fitted),
             ..self.unfitted_lever(lever)
         });
-        let chosen = fitted.range.map_or(0, |_| fitted.best);
-        if let Some(range) = fitted.range {
-            (lever.set)(&mut self.config.scene, range);
+        self.take_lever(lever, candidates, &fitted, times)
+    }
+
+    /// Sets what was fitted, and returns the recipe's own candidate from then on.
+    fn take_lever(
+        &mut self,
+        lever: &Lever,
+        mut candidates: Vec<Candidate>,
+        fitted: &FittedLever,
+        times: &[f64],
+    ) -> Result<Candidate> {
+        let Some(range) = fitted.range else {
+            return Ok(candidates.swap_remove(0));
+        };
+        (lever.set)(&mut self.config.scene, range);
+        match range.min == range.max {
+            true => Ok(candidates.swap_remove(fitted.best).of_recipe()),
+            // The falls of its best value are not those of the range.
+            false => self.candidate(None, times),
         }
-        Ok(candidates.swap_remove(chosen).of_recipe())
     }
 
     fn unfitted_lever(&self, lever: &Lever) -> FittedKey {
@@ -422,4 +437,79 @@ fn count_text(count: &Count) -> String {
 fn listed(numbers: &[f64]) -> String {
     let texts: Vec<String> = numbers.iter().map(f64::to_string).collect();
     format!("[{}]", texts.join(", "))
+}
+
+#[cfg(feature = "settle")]
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::{self, PhotoEntry, Scale};
+    use crate::dataset::fit::{FitOptions, Steps};
+    use crate::dataset::{DatasetConfig, Pipeline};
+    use crate::{Image, LinearRgb, io};
+    use std::path::Path;
+    use std::sync::atomic::AtomicBool;
+
+    static NEVER: AtomicBool = AtomicBool::new(false);
+
+    /// A folder of one asset, a red slab.
+    fn write_slab(folder: &Path) {
+        let slab = Image::from_fn(120, 80, |x, y| {
+            match (30..90).contains(&x) && (25..55).contains(&y) {
+                true => LinearRgb::new(0.6, 0.05, 0.05),
+                false => LinearRgb::new(0.04, 0.4, 0.08),
+            }
+        });
+        let photo = folder.join("slab.png");
+        io::write(&photo, &slab).unwrap();
+        let entry = PhotoEntry::new(photo, "slab", "cap", Scale::Length(0.2));
+        asset::add_photo(folder.join("assets"), &entry, &[], &Default::default()).unwrap();
+    }
+
+    /// Of a recipe with these keys of the scene.
+    fn fitting(folder: &Path, keys: &str) -> Fitting<'static> {
+        write_slab(folder);
+        let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/samples");
+        let backgrounds = samples.join("backgrounds");
+        let text = format!("backgrounds = {backgrounds:?}\n[scene]\nimage = [240, 180]\n{keys}");
+        let recipe = folder.join("recipe.toml");
+        io::write_text(&recipe, &text).unwrap();
+        let config = DatasetConfig::read(&recipe, &[]).unwrap();
+        Fitting {
+            pipeline: Pipeline::open(config.clone()).unwrap(),
+            belt: None,
+            config,
+            options: FitOptions {
+                falls: 2,
+                ..FitOptions::default()
+            },
+            keys: Vec::new(),
+            moved_paths: Vec::new(),
+            steps: Steps::new(&|_, _| {}),
+            stop: &NEVER,
+        }
+    }
+
+    #[test]
+    fn after_a_fitted_range_the_recipe_is_judged_by_falls_of_that_range() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut fitting = fitting(folder.path(), "collider = \"hull\"\n");
+        let real = [[0.3, 0.4], [0.5, 0.6], [0.6, 0.5]].map(|[x, y]| vec![[x, y, 0.1, 0.1]]);
+        let times = label_histogram(&real.each_ref().map(Vec::len));
+        let [spread, _, collider] = &LEVERS;
+        let heap = fitting.candidate(Some((spread, 0.0)), &times).unwrap();
+        let fitted = FittedLever {
+            best: 0,
+            range: Some(Range::new(0.0, 1.0)),
+            distances: Vec::new(),
+            agreement: 1.0,
+        };
+        let own = fitting.take_lever(spread, vec![heap], &fitted, &times);
+        // "hull" is what the recipe has.
+        let tried = fitting.candidates(collider, own.unwrap(), &times).unwrap();
+        let places = places_of(real.iter().map(Vec::as_slice));
+        let distances = starts::choose(&tried, &places, 0).distances;
+        assert_eq!(distances[0], distances[1]);
+        assert!(distances[0].is_finite(), "{distances:?}");
+    }
 }

@@ -179,10 +179,16 @@ fn count_pointers(file: &mut (impl BufRead + Seek)) -> std::io::Result<usize> {
     let count = match TiffOrder::of(&header) {
         // Pixels that are not compressed may look like any number of them.
         Some(order) => order.count_pointers(file, order.number(&header[4..]))?,
+        // The reader knows no BigTIFF.
+        None if is_big_tiff(&header) => 0,
         None => count_likely_pointers(file)?,
     };
     file.rewind()?;
     Ok(count)
+}
+
+fn is_big_tiff(header: &[u8]) -> bool {
+    header.starts_with(b"II+\0") || header.starts_with(b"MM\0+")
 }
 
 /// So many bytes at a place in a file, or those up to its end.
@@ -202,7 +208,8 @@ enum TiffOrder {
 
 /// What a directory of a TIFF points to.
 struct TiffDirectory {
-    /// Directories of the camera, of its position, or of what it shares with others.
+    /// Directories of the camera, of its position, or of what it shares with others, up to one
+    /// more than there may be.
     children: Vec<u64>,
     /// That of the next picture; 0 for none.
     next: u64,
@@ -226,17 +233,21 @@ impl TiffOrder {
         }
     }
 
-    /// Those that the reader follows: from pictures, and from what they point to.
+    /// Those that the reader follows, from pictures and from what they point to, up to where they
+    /// are too many.
     fn count_pointers(self, file: &mut (impl Read + Seek), first: u64) -> std::io::Result<usize> {
         let (mut next, mut count) = (first, 0);
         for _ in 0..MOST_PICTURES {
             let picture = self.read_directory(file, next)?;
             count += picture.children.len();
             if count > MOST_POINTERS {
-                break;
+                return Ok(count);
             }
             for child in picture.children {
                 count += self.read_directory(file, child)?.children.len();
+                if count > MOST_POINTERS {
+                    return Ok(count);
+                }
             }
             next = picture.next;
             if next == 0 {
@@ -254,12 +265,13 @@ impl TiffOrder {
         let length = ENTRY_BYTES * self.number(&read_at(file, place, 2)?);
         let entries = read_at(file, place + 2, length)?;
         let next = self.number(&read_at(file, place + 2 + length, 4)?);
+        let starts = (place + 2..).step_by(ENTRY_BYTES as usize);
+        let starts = starts.zip(entries.chunks_exact(ENTRY_BYTES as usize));
+        let pointers = starts.filter_map(|(start, entry)| self.pointer_in(entry, start));
         let mut children = Vec::new();
-        for (i, entry) in (0..).zip(entries.chunks_exact(ENTRY_BYTES as usize)) {
-            let start = place + 2 + ENTRY_BYTES * i;
-            if let Some((place, size)) = self.pointer_in(entry, start) {
-                children.push(self.number(&read_at(file, place, size)?));
-            }
+        // Each is read by itself, and one more than there may be is too many.
+        for (place, size) in pointers.take(MOST_POINTERS + 1) {
+            children.push(self.number(&read_at(file, place, size)?));
         }
         Ok(TiffDirectory { children, next })
     }
@@ -487,6 +499,15 @@ mod tests {
         );
     }
 
+    #[test]
+    fn pixels_of_a_bigtiff_are_no_unreadable_notes() {
+        for header in [b"II+\0\x08\0\0\0", b"MM\0+\0\x08\0\0"] {
+            let mut file = header.to_vec();
+            file.extend(b"\x87\x69\0\x04".repeat(1000));
+            assert_eq!(CameraNotes::read(Cursor::new(file)), CameraNotes::default());
+        }
+    }
+
     /// A directory behind the first one, from which a thousand pointers lead on.
     #[test]
     fn pointers_of_a_directory_that_is_pointed_to_count() {
@@ -496,6 +517,20 @@ mod tests {
         file.extend(b"\xa0\x05\0\x04\0\0\0\x01\0\0\0\x1a".repeat(1000));
         file.extend([0; 4]);
         assert!(CameraNotes::read(Cursor::new(file)).unreadable);
+    }
+
+    /// Each would be read eight times over.
+    #[test]
+    fn pointers_are_counted_up_to_where_they_are_too_many() {
+        let mut file = b"MM\0*\0\0\0\x08\0\x08".to_vec();
+        file.extend(b"\x87\x69\0\x04\0\0\0\x01\0\0\0\x6e".repeat(8));
+        file.extend([0; 4]);
+        file.extend(u16::MAX.to_be_bytes());
+        file.extend(b"\xa0\x05\0\x04\0\0\0\x01\0\0\0\x6e".repeat(usize::from(u16::MAX)));
+        file.extend([0; 4]);
+        let counted = count_pointers(&mut Cursor::new(&file)).unwrap();
+        assert_eq!(counted, 8 + MOST_POINTERS + 1);
+        assert!(CameraNotes::read(Cursor::new(&file)).unreadable);
     }
 
     fn notes(fields: &[(Tag, Value)]) -> CameraNotes {

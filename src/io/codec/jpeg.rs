@@ -45,7 +45,7 @@ pub(crate) fn read_before_scan(file: &mut impl Read, limits: &Limits) -> Result<
             "bytes in front of the picture",
             "metadata_bytes",
         )?;
-        check_kind(marker, bytes.get(at + 4))?;
+        check_kind(marker, bytes.get(at + 4..).unwrap_or_default())?;
         if marker == SOS {
             return Ok(bytes);
         }
@@ -91,9 +91,10 @@ fn append(bytes: &mut Vec<u8>, file: &mut impl Read, count: usize) -> Result<(),
 }
 
 /// Refuses kinds of JPEG that our decoder does not know, by their frame's marker (ISO/IEC 10918-1,
-/// table B.1) and bits.
-fn check_kind(marker: u8, bits: Option<&u8>) -> Result<(), Refusal> {
-    let kind = match (marker, bits) {
+/// table B.1) and what stands in its segment (B.2.2).
+fn check_kind(marker: u8, frame: &[u8]) -> Result<(), Refusal> {
+    let kind: String = match (marker, frame.first()) {
+        (0xc0..=0xc2, Some(8)) if has_thirds(frame) => "sampling factors of 3".into(),
         (0xc0..=0xc2, Some(8)) => return Ok(()),
         (0xc0..=0xc2, Some(bits)) => format!("{bits} bits a sample, expected 8"),
         (0xc3, _) => "lossless".into(),
@@ -102,6 +103,15 @@ fn check_kind(marker: u8, bits: Option<&u8>) -> Result<(), Refusal> {
         _ => return Ok(()),
     };
     Err(Refusal::Unsupported(format!("unsupported JPEG: {kind}")))
+}
+
+/// A component has three samples to a unit, across or down. Bits, lines, columns and the number of
+/// components stand in front of them, and each has three bytes.
+fn has_thirds(frame: &[u8]) -> bool {
+    let components = frame.get(6..).unwrap_or_default().chunks_exact(3);
+    components
+        .map(|component| component[1])
+        .any(|factors| factors >> 4 == 3 || factors & 0xf == 3)
 }
 
 fn open<'a>(
@@ -338,7 +348,11 @@ mod tests {
 
     /// The start of a picture of one pixel, with a frame of any kind.
     fn frame(marker: u8, bits: u8) -> Result<Vec<u8>, Refusal> {
-        let frame = [marker, 0, 11, bits, 0, 1, 0, 1, 1, 1, 0x11, 0];
+        sampled_frame(marker, bits, 0x11)
+    }
+
+    fn sampled_frame(marker: u8, bits: u8, factors: u8) -> Result<Vec<u8>, Refusal> {
+        let frame = [marker, 0, 11, bits, 0, 1, 0, 1, 1, 1, factors, 0];
         let file = [b"\xff\xd8\xff".as_slice(), &frame, b"\xff\xda\0\x02"];
         read_before_scan(&mut file.concat().as_slice(), &Limits::default())
     }
@@ -357,6 +371,21 @@ mod tests {
                 Err(Refusal::Unsupported(e)) => assert_eq!(e, format!("unsupported JPEG: {kind}")),
                 other => panic!("{marker:x}: {other:?}"),
             }
+        }
+    }
+
+    #[test]
+    fn three_samples_to_a_unit_are_left_to_another_decoder() {
+        for factors in [0x31, 0x13, 0x33] {
+            match sampled_frame(0xc0, 8, factors) {
+                Err(Refusal::Unsupported(e)) => {
+                    assert_eq!(e, "unsupported JPEG: sampling factors of 3");
+                }
+                other => panic!("{factors:x}: {other:?}"),
+            }
+        }
+        for factors in [0x11, 0x12, 0x21, 0x22, 0x41] {
+            assert!(sampled_frame(0xc2, 8, factors).is_ok(), "{factors:x}");
         }
     }
 

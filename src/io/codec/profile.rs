@@ -2,12 +2,17 @@
 //! PNG names, and a camera's word in EXIF.
 //!
 //! Profiles of three primaries and three curves (sRGB, Display P3, Adobe RGB, ProPhoto, ...) and of
-//! one grey curve are applied; others are named in a warning and the codes treated as sRGB.
+//! one grey curve are applied, with a warning where they have a table of colours beside them; others
+//! are named in a warning and the codes treated as sRGB.
 //!
 //! # Method
 //! ICC.1:2022: curves to linear light (10.6, 10.18), the matrix of the colorant columns to XYZ
-//! under D50 (F.3), Bradford to D65 (E.3), and from there to Rec. 709. Evaluated here, not by the
-//! crate that parses the profile, so that the bits are the same on every machine.
+//! under D50 (F.3), Bradford to D65 (E.3), and from there to Rec. 709. A grey curve in CIELab gives
+//! lightness, and CIE 15:2018, 8.2.1, light from that. Evaluated here, not by the crate that parses
+//! the profile, so that the bits are the same on every machine.
+//!
+//! A table has precedence over primaries and curves (8.10), and is not applied: what stands beside
+//! it is meant for programs that know no tables, and closer to it than sRGB.
 
 use crate::color::{ColorMatrix, RgbSpace, bradford, rgb_from_rgb, rgb_from_xyz, srgb_to_linear};
 use moxcms::{ColorProfile, DataColorSpace, ToneReprCurve};
@@ -72,6 +77,8 @@ pub(crate) struct DisplayProfile {
     /// Linear light of each 16-bit code, for red, green and blue.
     curves: [Vec<f32>; 3],
     to_rec709: ColorMatrix,
+    /// There is a table of colours, too, which is more exact.
+    pub(crate) lacks_table: bool,
 }
 
 impl DisplayProfile {
@@ -127,23 +134,38 @@ impl DisplayProfile {
         Self {
             curves: std::array::from_fn(|_| curve.to_vec()),
             to_rec709: Matrix3::identity().into(),
+            lacks_table: false,
         }
     }
 
     fn from_icc(bytes: &[u8]) -> Result<Option<Self>, String> {
         let icc = ColorProfile::new_from_slice(bytes).map_err(|_| "a damaged colour profile")?;
+        Self::from_parsed(&icc)
+    }
+
+    fn from_parsed(icc: &ColorProfile) -> Result<Option<Self>, String> {
         let profile = match icc.color_space {
-            DataColorSpace::Rgb => Self::from_primaries(&icc),
-            DataColorSpace::Gray => {
-                trc_table(&icc.gray_trc).map(|curve| Self::from_grey_curve(&curve))
-            }
+            DataColorSpace::Rgb => Self::from_primaries(icc),
+            DataColorSpace::Gray => Self::from_grey(icc),
             other => {
                 let space = format!("{other:?}").to_uppercase();
                 return Err(format!("a colour profile for {space}"));
             }
         };
         let profile = profile.ok_or("a colour profile without primaries and curves")?;
-        Ok((!profile.is_srgb()).then_some(profile))
+        Ok((!profile.is_srgb()).then(|| Self {
+            lacks_table: has_table(icc),
+            ..profile
+        }))
+    }
+
+    fn from_grey(icc: &ColorProfile) -> Option<Self> {
+        let curve = icc.gray_trc.as_ref()?;
+        let light = curve_table(|x| match icc.pcs {
+            DataColorSpace::Lab => light_of_lightness(100.0 * evaluate(curve, x)),
+            _ => evaluate(curve, x),
+        });
+        light.map(|light| Self::from_grey_curve(&light))
     }
 
     fn from_primaries(icc: &ColorProfile) -> Option<Self> {
@@ -156,6 +178,7 @@ impl DisplayProfile {
         matrix.iter().all(|v| v.is_finite()).then(|| Self {
             curves,
             to_rec709: matrix.into(),
+            lacks_table: false,
         })
     }
 
@@ -174,6 +197,20 @@ impl DisplayProfile {
         let light = [0, 1, 2].map(|c: usize| self.curves[c][nearest_code(display[c])]);
         self.to_rec709.apply(light)
     }
+}
+
+fn has_table(icc: &ColorProfile) -> bool {
+    icc.lut_a_to_b_perceptual.is_some() || icc.lut_a_to_b_colorimetric.is_some()
+}
+
+/// Light, as a share of white's, of a lightness of 0 to 100 (CIE 15:2018, 8.2.1: L*).
+fn light_of_lightness(lightness: f64) -> f64 {
+    const LINEAR_UP_TO: f64 = 8.0;
+    if lightness <= LINEAR_UP_TO {
+        return lightness * 27.0 / 24_389.0;
+    }
+    let root = (lightness + 16.0) / 116.0;
+    root * root * root
 }
 
 /// Number of the code that is nearest to a display value.
@@ -312,6 +349,7 @@ fn gamut_area(space: &RgbSpace) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use moxcms::{LutDataType, LutStore, LutType, LutWarehouse};
 
     fn parsed(icc: &ColorProfile) -> Option<DisplayProfile> {
         DisplayProfile::from_icc(&icc.encode().unwrap()).unwrap()
@@ -361,6 +399,64 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    /// An empty table of 8 bits, of two nodes a side.
+    fn table() -> LutWarehouse {
+        let store = |count| LutStore::Store8(vec![0; count]);
+        LutWarehouse::Lut(LutDataType {
+            num_input_channels: 3,
+            num_output_channels: 3,
+            num_clut_grid_points: 2,
+            matrix: moxcms::Matrix3d::IDENTITY,
+            num_input_table_entries: 256,
+            num_output_table_entries: 256,
+            input_table: store(3 * 256),
+            clut_table: store(3 * 8),
+            output_table: store(3 * 256),
+            lut_type: LutType::Lut8,
+        })
+    }
+
+    #[test]
+    fn a_table_beside_primaries_is_missed() {
+        let plain = ColorProfile::new_display_p3();
+        let without = DisplayProfile::from_parsed(&plain).unwrap().unwrap();
+        assert!(!without.lacks_table);
+        let [mut perceptual, mut colorimetric] = [plain.clone(), plain];
+        perceptual.lut_a_to_b_perceptual = Some(table());
+        colorimetric.lut_a_to_b_colorimetric = Some(table());
+        for icc in [perceptual, colorimetric] {
+            let with = DisplayProfile::from_parsed(&icc).unwrap().unwrap();
+            assert!(with.lacks_table);
+            assert_eq!(with.light([0.8, 0.1, 0.3]), without.light([0.8, 0.1, 0.3]));
+        }
+        let mut srgb = ColorProfile::new_srgb();
+        srgb.lut_a_to_b_perceptual = Some(table());
+        assert_eq!(DisplayProfile::from_parsed(&srgb), Ok(None));
+    }
+
+    #[test]
+    fn a_grey_curve_of_lightness_gives_light() {
+        let mut icc = ColorProfile::new_gray_with_gamma(1.0);
+        icc.pcs = DataColorSpace::Xyz;
+        let by_light = DisplayProfile::from_parsed(&icc).unwrap().unwrap();
+        icc.pcs = DataColorSpace::Lab;
+        let by_lightness = DisplayProfile::from_parsed(&icc).unwrap().unwrap();
+        // CIE 15:2018, 8.2.1.
+        for (code, expected) in [
+            (0.0_f32, 0.0_f32),
+            (0.05, 0.005_535),
+            (0.5, 0.184_187),
+            (1.0, 1.0),
+        ] {
+            assert!((by_light.light([code; 3])[1] - code).abs() < 1e-4);
+            let light = by_lightness.light([code; 3]);
+            assert!(
+                light.iter().all(|&v| (v - expected).abs() < 1e-4),
+                "{code}: {light:?}"
+            );
         }
     }
 

@@ -11,6 +11,7 @@ use crate::io::foreign::{DEVELOP, RAW};
 use crate::io::format::Format;
 use crate::io::header::{Header, lines_of_notes, notes_of_lines};
 use crate::io::limits::{Demand, Limits};
+use std::collections::BTreeMap;
 use std::io::{BufRead, Cursor, Read, Seek, SeekFrom};
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::encoder::colortype::{self, Gray8, Gray16, Gray32Float, RGB8, RGB16, RGB32Float};
@@ -33,6 +34,9 @@ const PALETTE_COLOR: u16 = 3;
 const CIE_LAB: u16 = 8;
 const ICC_LAB: u16 = 9;
 const ITU_LAB: u16 = 10;
+/// TIFF/EP and DNG 1.7, the same: what a sensor saw, through a mosaic of filters or not.
+const FILTER_MOSAIC: u16 = 32_803;
+const LINEAR_RAW: u16 = 34_892;
 /// TIFF 6.0, `NewSubfileType`: a smaller version of another picture. Nikon's and Sony's raw files
 /// begin with one.
 const REDUCED_RESOLUTION: u32 = 1;
@@ -140,18 +144,32 @@ fn is_alpha(extra: &[u16]) -> bool {
 fn first_picture<R: Read + Seek>(mut file: R) -> Result<Decoder<R>, Refusal> {
     let tags = first_tags(&mut file).unwrap_or_default();
     file.rewind().map_err(TiffError::from)?;
+    // The decoder does not know what a sensor saw, and OpenImageIO takes it for grey.
+    if is_undeveloped(&tags) {
+        return Err(raw_file());
+    }
     let mut of_both = [Tag::TileWidth, Tag::StripOffsets].iter();
-    if of_both.all(|tag| tags.contains(&tag.to_u16())) {
+    if of_both.all(|tag| tags.contains_key(&tag.to_u16())) {
         return Err(unsupported(&"tiles under the tags of strips"));
     }
     let mut decoder = Decoder::new(file)?;
-    if tags.contains(&DNG_VERSION) || is_reduced(&mut decoder) {
-        return Err(format!("is {RAW}, of which the first picture is no photo: {DEVELOP}").into());
+    if is_reduced(&mut decoder) {
+        return Err(raw_file());
     }
     if decoder.find_tag_unsigned(Tag::FillOrder)? == Some(LOWEST_BIT_FIRST) {
         return Err(unsupported(&"pixels from the lowest bit up"));
     }
     Ok(decoder)
+}
+
+fn raw_file() -> Refusal {
+    format!("is {RAW}, of which the first picture is no photo: {DEVELOP}").into()
+}
+
+/// By its tags the file is a DNG, or its first picture is what a sensor saw.
+fn is_undeveloped(tags: &BTreeMap<u16, u16>) -> bool {
+    let kind = tags.get(&Tag::PhotometricInterpretation.to_u16());
+    tags.contains_key(&DNG_VERSION) || matches!(kind, Some(&(FILTER_MOSAIC | LINEAR_RAW)))
 }
 
 /// The picture is a small one of another in the same file; not where that tag cannot be read.
@@ -160,14 +178,15 @@ fn is_reduced(decoder: &mut Decoder<impl Read + Seek>) -> bool {
     kind.is_ok_and(|kind| kind.is_some_and(|kind| kind & REDUCED_RESOLUTION != 0))
 }
 
-/// The numbers of the first directory's tags, of a file of either byte order, classic or BigTIFF.
-fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<u16>> {
+/// The first directory's tags, of a file of either byte order, classic or BigTIFF, with the value
+/// of those that are one number of 16 bits.
+fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<BTreeMap<u16, u16>> {
     let mut start = [0; 4];
     file.read_exact(&mut start)?;
     let (little, big) = (start.starts_with(b"II"), start.contains(&43));
-    // Bytes of an offset, of a count and of an entry; BigTIFF states how long its offsets are,
-    // which is 8.
-    let (offset, count, entry) = if big { (8, 8, 20) } else { (4, 2, 12) };
+    // Bytes of an offset, of the number of entries, and in an entry between its tag and its value;
+    // BigTIFF states how long its offsets are, which is 8.
+    let (offset, count, between) = if big { (8, 8, 10) } else { (4, 2, 6) };
     if big {
         read_integer(file, 4, little)?;
     }
@@ -175,15 +194,24 @@ fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<u16>> {
     file.seek(SeekFrom::Start(directory))?;
     let entries = read_integer(file, count, little)?.min(u64::from(u16::MAX));
     (0..entries)
-        .map(|_| read_tag(file, entry, little))
+        .map(|_| read_tag(file, between, little))
         .collect()
 }
 
-/// The tag of an entry of this many bytes; the file is then behind the entry.
-fn read_tag(file: &mut (impl Read + Seek), bytes: i64, little: bool) -> std::io::Result<u16> {
+/// The tag of an entry, and the first 16 bits of its value, which so many bytes are between; the
+/// file is then behind the entry.
+fn read_tag(
+    file: &mut (impl Read + Seek),
+    between: i64,
+    little: bool,
+) -> std::io::Result<(u16, u16)> {
+    // Of the kind of the value, of 2 bytes, and of their number, as long as the value itself.
+    const KIND: i64 = 2;
     let tag = read_integer(file, 2, little)? as u16;
-    file.seek_relative(bytes - 2)?;
-    Ok(tag)
+    file.seek_relative(between)?;
+    let value = read_integer(file, 2, little)? as u16;
+    file.seek_relative(between - KIND - 2)?;
+    Ok((tag, value))
 }
 
 /// An integer of at most 8 bytes.
@@ -245,12 +273,12 @@ pub(crate) fn camera_notes(mut file: impl BufRead + Seek) -> CameraNotes {
     }
 }
 
-/// How many samples of a pixel are neither colour nor said to be alpha.
-pub(crate) fn unspecified_samples(bytes: &[u8]) -> usize {
+/// A pixel has samples beside its colours, the first of which is not said to be alpha.
+pub(crate) fn has_unspecified_sample(bytes: &[u8]) -> bool {
     let decoder = Decoder::new(Cursor::new(bytes)).ok();
     let extra = decoder.and_then(|mut decoder| extra_samples(&mut decoder).ok());
     let extra = extra.unwrap_or_default();
-    extra.iter().filter(|kind| !is_alpha(&[**kind])).count()
+    extra.first().is_some_and(|&kind| !is_alpha(&[kind]))
 }
 
 /// Colours are multiplied by alpha, also in kinds of TIFF that the decoder cannot read.
@@ -322,7 +350,7 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
 /// The file says how many bits a sample has; where it does not, it is one.
 fn states_bits(bytes: &[u8]) -> bool {
     let tags = first_tags(&mut Cursor::new(bytes)).unwrap_or_default();
-    tags.contains(&Tag::BitsPerSample.to_u16())
+    tags.contains_key(&Tag::BitsPerSample.to_u16())
 }
 
 fn decode_known(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
@@ -702,18 +730,50 @@ mod tests {
     }
 
     #[test]
+    fn what_a_sensor_saw_is_no_photo() {
+        let kind = Tag::PhotometricInterpretation;
+        // A mosaic of 2 x 2 pixels that is a DNG, too, in the other byte order.
+        let mut mosaic = b"MM\0*\0\0\0\x08\0\x04".to_vec();
+        mosaic.extend(b"\x01\0\0\x03\0\0\0\x01\0\x02\0\0");
+        mosaic.extend(b"\x01\x01\0\x03\0\0\0\x01\0\x02\0\0");
+        mosaic.extend(b"\x01\x06\0\x03\0\0\0\x01\x80\x23\0\0");
+        mosaic.extend(b"\xc6\x12\0\x01\0\0\0\x04\x01\x04\0\0");
+        mosaic.extend([0; 4]);
+        let without_version = {
+            let mut file = mosaic.clone();
+            file[46] = 0;
+            file
+        };
+        for raw in [
+            mosaic,
+            without_version,
+            with_tag(kind, FILTER_MOSAIC),
+            with_tag(kind, LINEAR_RAW),
+        ] {
+            match decode(&raw, &Limits::default()) {
+                Err(Refusal::Broken(told)) => assert!(told.contains(DEVELOP), "{told}"),
+                other => panic!("{:?}", other.map(|_| "read")),
+            }
+        }
+    }
+
+    #[test]
     fn a_fourth_sample_is_alpha_only_where_it_is_called_so() {
-        for (kind, unspecified, names) in [
-            (ExtraSamples::Unspecified, 1, "R G B"),
-            (ExtraSamples::UnassociatedAlpha, 0, "R G B A"),
+        let [unspecified, alpha] = [ExtraSamples::Unspecified, ExtraSamples::UnassociatedAlpha];
+        for (kinds, is_unspecified, names) in [
+            (&[unspecified][..], true, "R G B"),
+            (&[unspecified, alpha], true, "R G B"),
+            (&[alpha], false, "R G B A"),
         ] {
             let mut file = Cursor::new(Vec::new());
             let mut encoder = TiffEncoder::new(&mut file).unwrap();
             let mut image = encoder.new_image::<RGB8>(2, 1).unwrap();
-            image.extra_samples(&[kind]).unwrap();
-            image.write_data(&[1, 2, 3, 0, 4, 5, 6, 0]).unwrap();
+            image.extra_samples(kinds).unwrap();
+            let extra = vec![0_u8; kinds.len()];
+            let samples = [&[1, 2, 3][..], &extra, &[4, 5, 6], &extra].concat();
+            image.write_data(&samples).unwrap();
             let file = file.into_inner();
-            assert_eq!(unspecified_samples(&file), unspecified);
+            assert_eq!(has_unspecified_sample(&file), is_unspecified);
             let read = decode(&file, &Limits::default()).unwrap();
             assert_eq!(read.names.join(" "), names);
             assert!(read.names.len() == 4 || read.samples == Samples::U8(vec![1, 2, 3, 4, 5, 6]));

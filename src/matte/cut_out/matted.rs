@@ -10,6 +10,7 @@ use crate::matte::film::{ColorUncertainty, FilmInput, FilmMatte, is_bare_screen,
 use crate::matte::key::{Keying, Screen};
 use crate::matte::prepared::Prepared;
 use crate::matte::screen::{is_keyable, strongest_channel};
+use crate::matte::segment::PixelGroups;
 use crate::matte::stroke::unclaimed;
 use crate::pixel::{Coverage, Film, LinearRgb, PremulRgba};
 
@@ -41,13 +42,16 @@ impl Matted {
     }
 
     fn outline(screen: &CleanScreen, region: &ObjectRegion) -> Self {
-        let cutout = region
-            .photo
-            .zip_map(&region.cut, |p, m| p.opaque().masked(m));
-        let share = bare_share(screen, region);
-        let bare = (share > MAX_BARE_SHARE).then(|| bare_within(share));
+        let bare = bare_screen(screen, region);
+        let open = open_pockets(&bare, region);
+        let cut = region
+            .cut
+            .zip_map(&open, |c, open| if open { Coverage(0.0) } else { c });
+        let cutout = region.photo.zip_map(&cut, |p, m| p.opaque().masked(m));
+        let share = share_inside(&bare, &well_inside(&cut));
+        let enclosed = (share > MAX_BARE_SHARE).then(|| bare_within(share));
         Self {
-            diagnostics: bare.into_iter().collect(),
+            diagnostics: enclosed.into_iter().collect(),
             ..Self::grey(MatteMethod::Outline, cutout, 0.0)
         }
     }
@@ -121,20 +125,55 @@ const RIM_PX: f64 = 2.0;
 /// A larger share of bare screen within an outline is worth a warning.
 const MAX_BARE_SHARE: f64 = 0.05;
 
-/// The share of what an outline encloses that is bare screen, as between the turns of a wire; 0
-/// where the screen has no colour to tell it from clear plastic.
-fn bare_share(screen: &CleanScreen, region: &ObjectRegion) -> f64 {
+/// Where more of an outline would be left out, it is the object that has the screen's colour.
+const MAX_OPEN_SHARE: f64 = 0.5;
+/// Bare screen reaches so far beyond the pixels without anything else around them.
+const EDGE_PX: f64 = 1.5;
+
+/// Bare screen, as between the turns of a wire; none where the screen has no colour to tell it from
+/// clear plastic.
+fn bare_screen(screen: &CleanScreen, region: &ObjectRegion) -> Mask {
+    let (w, h) = region.photo.size();
     if !is_keyable(screen.color) {
-        return 0.0;
+        return Image::new(w, h);
     }
-    let inside = filter::erode(&region.cut.map(|c| c.0 > 0.5), RIM_PX);
     let plate = screen.plate.crop(region.around).image;
     let key = strongest_channel(screen.color);
-    let bare = region.photo.zip3_map(&plate, &inside, |p, k, inside| {
-        inside && is_bare_screen(p.into(), k.into(), key)
-    });
-    let bare = unclaimed(bare, region.claims.as_ref());
-    bare.count() as f64 / inside.count().max(1) as f64
+    let smooth = filter::box_blur(&region.photo, 1);
+    let bare = smooth.zip_map(&plate, |p, k| is_bare_screen(p.into(), k.into(), key));
+    unclaimed(bare, region.claims.as_ref())
+}
+
+/// Bare screen within an outline that was searched, and not drawn, which hangs together with what
+/// is outside: that of a corner that the outline cuts off.
+fn open_pockets(bare: &Mask, region: &ObjectRegion) -> Mask {
+    let drawn = region.drawn.as_ref();
+    let outside = region.cut.map(|c| c.0 <= 0.5);
+    let bare = unclaimed(bare.clone(), drawn);
+    let groups = PixelGroups::new(&outside.zip_map(&bare, |outside, bare| outside || bare));
+    let reached = groups.sizes(&outside);
+    let open = groups.only(|group| reached[group] > 0);
+    let inside = well_inside(&region.cut);
+    if share_inside(&open, &inside) > MAX_OPEN_SHARE {
+        let (w, h) = open.size();
+        return Image::new(w, h);
+    }
+    // What lies along the rim alone is the outline's error.
+    let pockets = open.zip_map(&inside, |open, inside| open && inside);
+    let near = filter::dilate(&pockets, RIM_PX + 1.0);
+    let whole = open.zip_map(&near, |open, near| open && near);
+    unclaimed(filter::dilate(&whole, EDGE_PX), drawn)
+}
+
+/// What an outline encloses, without its rim.
+fn well_inside(cut: &Image<Coverage>) -> Mask {
+    filter::erode(&cut.map(|c| c.0 > 0.5), RIM_PX)
+}
+
+/// The share of a set of pixels that another one has.
+fn share_inside(part: &Mask, inside: &Mask) -> f64 {
+    let shared = part.zip_map(inside, |part, inside| part && inside);
+    shared.count() as f64 / inside.count().max(1) as f64
 }
 
 fn bare_within(share: f64) -> Diagnostic {
@@ -158,5 +197,95 @@ fn mean_matte(matte: &Image<Coverage>, set: &Mask) -> f32 {
         0.0
     } else {
         (sum / count as f64) as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Roi;
+    use crate::matte::plate::ScreenPlate;
+
+    const SIZE: (usize, usize) = (120, 100);
+    const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
+    const RED: LinearRgb = LinearRgb::new(0.5, 0.05, 0.05);
+
+    fn in_box(x: usize, y: usize) -> bool {
+        (20..100).contains(&x) && (20..80).contains(&y)
+    }
+
+    /// Two bars at a right angle.
+    fn is_angle(x: usize, y: usize) -> bool {
+        in_box(x, y) && (x < 40 || y >= 60)
+    }
+
+    /// The region of a red object on green, by an outline.
+    fn region(
+        is_object: impl Fn(usize, usize) -> bool + Sync,
+        is_within: impl Fn(usize, usize) -> bool + Sync,
+    ) -> ObjectRegion {
+        let (width, height) = SIZE;
+        let whole = Roi {
+            x: 0,
+            y: 0,
+            width,
+            height,
+        };
+        let paint = |x: usize, y: usize| if is_object(x, y) { RED } else { GREEN };
+        ObjectRegion {
+            around: whole,
+            kept: whole,
+            photo: Image::from_fn(width, height, paint),
+            cut: Image::from_fn(width, height, is_within).to_coverage(),
+            claims: None,
+            drawn: None,
+        }
+    }
+
+    fn by_outline(region: &ObjectRegion) -> Matted {
+        let screen = CleanScreen {
+            background: Image::new(SIZE.0, SIZE.1),
+            plate: ScreenPlate::even(GREEN, SIZE),
+            color: GREEN,
+        };
+        Matted::outline(&screen, region)
+    }
+
+    fn is_opaque(matted: &Matted, at: (usize, usize)) -> bool {
+        matted.film[at].to_rgba().a > 0.5
+    }
+
+    /// An outline from the end of one bar straight to that of the other.
+    #[test]
+    fn the_screen_in_a_corner_that_the_outline_cuts_off_is_left_out() {
+        let is_hull = |x, y| in_box(x, y) && 3 * (y - 20) + 80 >= 2 * x;
+        let mut region = region(is_angle, is_hull);
+        let searched = by_outline(&region);
+        assert!(searched.diagnostics.is_empty());
+        let opaque = Image::from_fn(SIZE.0, SIZE.1, |x, y| is_opaque(&searched, (x, y)));
+        let angle = Image::from_fn(SIZE.0, SIZE.1, is_angle);
+        // All of the object, and of the 1200 pixels of screen those in the tips of the corner.
+        assert_eq!(share_inside(&opaque, &angle), 1.0);
+        assert!(opaque.count() < angle.count() + 40, "{}", opaque.count());
+        // What a person drew is the outline.
+        region.drawn = Some(Image::filled(SIZE.0, SIZE.1, Some(true)));
+        let drawn = by_outline(&region);
+        assert!(is_opaque(&drawn, (44, 56)) && !is_opaque(&searched, (44, 56)));
+        assert_eq!(drawn.diagnostics.len(), 1);
+    }
+
+    #[test]
+    fn the_screen_that_an_object_encloses_is_kept_and_warned_of() {
+        let is_frame = |x, y| in_box(x, y) && !((30..90).contains(&x) && (30..70).contains(&y));
+        let matted = by_outline(&region(is_frame, in_box));
+        assert!(is_opaque(&matted, (60, 50)) && !is_opaque(&matted, (10, 50)));
+        assert_eq!(matted.diagnostics.len(), 1);
+    }
+
+    #[test]
+    fn an_object_of_the_screen_s_colour_is_no_screen() {
+        let matted = by_outline(&region(|_, _| false, in_box));
+        assert!(is_opaque(&matted, (60, 50)) && is_opaque(&matted, (21, 21)));
+        assert_eq!(matted.diagnostics.len(), 1);
     }
 }

@@ -71,7 +71,8 @@ pub enum MatteMethod {
     /// From the screen's colour, as Blender's Keying node does: see-through plastic is see-through.
     Key,
     /// From the object's outline alone: nothing is see-through, and what shines through is part of
-    /// the object.
+    /// the object. Screen that the outline takes along at its rim is left out where its colour
+    /// tells it.
     Outline,
 }
 

@@ -288,6 +288,33 @@ fn an_object_that_moved_far_is_refused() {
     assert!(far.contains("did it move?"), "{far}");
 }
 
+#[test]
+fn photos_that_are_unlike_may_be_of_a_dyed_object_which_is_let_through_on_request() {
+    let first = photo(GREEN, [0.0; 2], 0.0, 1);
+    let told = |agreement: f64, least_agreement: f64| {
+        let options = TriangulateOptions {
+            least_agreement,
+            ..TriangulateOptions::default()
+        };
+        let aligner = Aligner {
+            first: &first,
+            near: inside().map(|c| c.0 > 0.0),
+            options: &options,
+        };
+        aligner.too_unlike(&Registered {
+            shift_px: [0.0; 2],
+            sigma_px: 0.1,
+            agreement,
+        })
+    };
+    let refusal = told(0.2, 0.5).unwrap();
+    assert!(
+        refusal.ends_with("is it dyed? a dyed one is let through by --set film.least_agreement=0"),
+        "{refusal}"
+    );
+    assert_eq!([told(0.6, 0.5), told(-0.4, 0.0)], [None, None]);
+}
+
 /// The object on a screen, turned around its middle.
 fn turned(screen: LinearRgb, degrees: f64) -> Image<LinearRgb> {
     let (sin, cos) = (

@@ -4,6 +4,7 @@ use super::{Balance, Updates, batches_per_epoch};
 use crate::dataset::{YoloSet, yaml_names};
 use crate::error::{Error, Result};
 use crate::io;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Equation 2 for PyTorch.
@@ -89,11 +90,13 @@ const VARIANTS: [Variant; 5] = [
 ///
 /// # Errors
 /// Those of [`YoloSet::open`] and [`Balance::weights`]; [`Error::Value`] when the two datasets name
-/// other classes; [`Error::File`] for an image, or a folder for the kit, whose name is not UTF-8.
+/// other classes or share an image to learn from; [`Error::File`] for an image, or a folder for the
+/// kit, whose name is not UTF-8.
 pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     let real = YoloSet::open(&whole_folder(&options.real)?)?;
     let synthetic = open_for_training(&whole_folder(&options.synthetic)?)?;
-    check_classes([&real, &synthetic], [&options.real, &options.synthetic])?;
+    check_sets([&real, &synthetic], [&options.real, &options.synthetic])?;
+    warn_of_known_validation(&real, &options.real);
     let counts = [real.train.len() as u64, synthetic.train.len() as u64];
     let balance = balance_document(&options.balance, counts)?;
     let (variants, left_out) = VARIANTS
@@ -153,12 +156,24 @@ fn lists_of(real: &YoloSet, synthetic: &YoloSet) -> Result<Vec<(&'static str, St
         .collect()
 }
 
-/// Fails where two datasets that are trained on together, in these folders, name other classes.
+/// Fails where two datasets in these folders cannot be trained on together: they name other
+/// classes, or share an image to learn from.
 ///
 /// # Errors
-/// [`Error::Value`] that tells both lists of classes.
+/// [`Error::Value`] that tells both lists of classes, or the image.
 #[doc(hidden)]
-pub fn check_classes([real, synthetic]: [&YoloSet; 2], folders: [&Path; 2]) -> Result<()> {
+pub fn check_sets(sets: [&YoloSet; 2], folders: [&Path; 2]) -> Result<()> {
+    check_classes(sets, folders)?;
+    let [real, synthetic] = sets.map(|set| &set.train);
+    let Some(image) = shared_images(real, synthetic).next() else {
+        return Ok(());
+    };
+    let (image, real_folder) = (image.display(), folders[0].display());
+    let what = format!("{image} is also a real image, expected other images than in {real_folder}");
+    Err(Error::value("synthetic", what))
+}
+
+fn check_classes([real, synthetic]: [&YoloSet; 2], folders: [&Path; 2]) -> Result<()> {
     if real.classes == synthetic.classes {
         return Ok(());
     }
@@ -166,6 +181,34 @@ pub fn check_classes([real, synthetic]: [&YoloSet; 2], folders: [&Path; 2]) -> R
     let (found, expected) = (&synthetic.classes, &real.classes);
     let what = format!("{found:?} in {folder}, expected {expected:?} as in {real_folder}");
     Err(Error::value("classes", what))
+}
+
+/// Warns of images that the best epoch is chosen by although they are trained on.
+fn warn_of_known_validation(set: &YoloSet, folder: &Path) {
+    let known = shared_images(&set.train, &set.val).count();
+    if known > 0 {
+        log::warn!(
+            "{}: {known} of {} images for validation are also trained on; see `dataset split`",
+            folder.display(),
+            set.val.len()
+        );
+    }
+}
+
+/// The images of a list that are in another one too, under whatever names.
+fn shared_images<'a>(
+    others: &[PathBuf],
+    images: &'a [PathBuf],
+) -> impl Iterator<Item = &'a PathBuf> + use<'a> {
+    let known: BTreeSet<PathBuf> = others.iter().map(|image| real_path(image)).collect();
+    images
+        .iter()
+        .filter(move |image| known.contains(&real_path(image)))
+}
+
+/// One path for every name of an image that is there.
+fn real_path(image: &Path) -> PathBuf {
+    image.canonicalize().unwrap_or_else(|_| image.to_owned())
 }
 
 fn list_of(images: &[PathBuf]) -> Result<String> {
@@ -404,5 +447,27 @@ mod tests {
             said.starts_with("classes: [\"cap\", \"label\"] in "),
             "{said}"
         );
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn an_image_that_both_sets_train_on_is_refused() {
+        let root = tempfile::tempdir().unwrap();
+        let [real, made] = ["real", "made"].map(|name| dataset(root.path(), name, [2, 1], "[cap]"));
+        let (kit, list) = (root.path().join("kit"), "images/train/0.png\nagain/1.png\n");
+        io::write_text(made.join("some.txt"), list).unwrap();
+        let yaml = "train: some.txt\nval: images/val\nnames: [cap]\n";
+        io::write_text(made.join("data.yaml"), yaml).unwrap();
+        // The same image under another name.
+        std::os::unix::fs::symlink(real.join("images/train"), made.join("again")).unwrap();
+        let said = |real: &Path, made: &Path| {
+            let refused = write(&kit, &KitOptions::new(real, made));
+            refused.unwrap_err().to_string()
+        };
+        let [told, twice] = [said(&real, &made), said(&real, &real)];
+        assert!(told.starts_with("synthetic: "), "{told}");
+        assert!(told.contains("made/again/1.png is also"), "{told}");
+        assert!(twice.contains("real/images/train/0.png is also"), "{twice}");
+        assert!(!kit.exists());
     }
 }

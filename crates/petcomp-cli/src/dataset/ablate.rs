@@ -7,8 +7,9 @@ use crate::global::GlobalArgs;
 use crate::interruption::interruption;
 use crate::output::folder_parser;
 use crate::print;
+use anyhow::Context;
 use petcomp::Error;
-use petcomp::dataset::{DatasetConfig, Pipeline};
+use petcomp::dataset::{DatasetConfig, Pipeline, Plan};
 use petcomp::io::{self, Override};
 use petcomp::scene::Draws;
 use std::collections::BTreeMap;
@@ -43,12 +44,14 @@ pub(crate) fn run(args: &AblateArgs, global: &GlobalArgs) -> anyhow::Result<()> 
     for (name, config) in &datasets {
         write_recipe(&args.output.join(name), config)?;
     }
-    for (name, _) in &datasets {
-        let folder = args.output.join(name);
-        let recipe = recipe_in(&folder);
-        print::line(recipe.display());
-        if args.count > 0 {
-            args.generate(&recipe, &dataset_in(&folder), global)?;
+    // All are opened before any is made: a switch that cannot work is told at once.
+    let runs = datasets.iter().map(|(name, _)| args.opened(name));
+    let runs: Vec<Option<(Pipeline, Plan)>> = runs.collect::<anyhow::Result<_>>()?;
+    for ((name, _), run) in datasets.iter().zip(runs) {
+        print::line(recipe_in(&args.output.join(name)).display());
+        if let Some((pipeline, plan)) = run {
+            let counts = generate_supervised(&pipeline, &plan, &args.consent, global)?;
+            print_counts(&counts);
         }
     }
     Ok(())
@@ -101,13 +104,17 @@ impl AblateArgs {
             .collect()
     }
 
-    fn generate(&self, recipe: &Path, folder: &Path, global: &GlobalArgs) -> anyhow::Result<()> {
-        let config = DatasetConfig::read(recipe, &[])?;
+    /// What makes the dataset of this name; none where only recipes are written.
+    fn opened(&self, name: &str) -> anyhow::Result<Option<(Pipeline, Plan)>> {
+        let planned = (self.count > 0).then(|| self.planned(&self.output.join(name)));
+        planned.transpose().with_context(|| name.to_owned())
+    }
+
+    fn planned(&self, folder: &Path) -> petcomp::Result<(Pipeline, Plan)> {
+        let config = DatasetConfig::read(recipe_in(folder), &[])?;
         let pipeline = Pipeline::open(config)?.stopped_by(interruption());
-        let plan = pipeline.plan(self.count, self.seed, folder)?;
-        let counts = generate_supervised(&pipeline, &plan, &self.consent, global)?;
-        print_counts(&counts);
-        Ok(())
+        let plan = pipeline.plan(self.count, self.seed, dataset_in(folder))?;
+        Ok((pipeline, plan))
     }
 }
 

@@ -138,7 +138,7 @@ impl MixedSets {
     fn open(args: &MixedSetArgs) -> petcomp::Result<Self> {
         let real = train::kit::open_for_training(&args.real)?;
         let synthetic = train::kit::open_for_training(&args.synthetic)?;
-        train::kit::check_classes([&real, &synthetic], [&args.real, &args.synthetic])?;
+        train::kit::check_sets([&real, &synthetic], [&args.real, &args.synthetic])?;
         let counts = [&real, &synthetic].map(|set| set.train.len() as u64);
         Ok(Self {
             weights: args.balance().weights(counts[0], counts[1])?,

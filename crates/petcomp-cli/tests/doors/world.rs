@@ -76,8 +76,8 @@ impl World {
         }
     }
 
-    /// A dataset in all formats, the shards of another, and a scene of it for the reference
-    /// renderer.
+    /// A dataset in all formats, another to train on beside it, the shards of a third, and a scene
+    /// of it for the reference renderer.
     fn dataset(&self) {
         let formats = "labels.formats=[\"yolo\", \"coco\"]".parse().unwrap();
         let setup = DatasetConfig::read(self.path("recipe.toml"), &[formats]).unwrap();
@@ -94,6 +94,7 @@ impl World {
             .unwrap();
         };
         make("dataset", SampleRange::All);
+        make("made", SampleRange::All);
         for index in [1, 2] {
             make(
                 &format!("shard-{index}"),

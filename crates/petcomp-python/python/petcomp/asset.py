@@ -48,9 +48,9 @@ def build(
     """Cuts out all photos of a list (TOML or CSV, or a folder with one) into an asset folder.
 
     ``resume`` keeps the cut-outs that are there already of the same photo, entry, options and version of
-    petcomp. A contact sheet that the program drew of other cut-outs goes. ``progress`` is called with the photos done and their number, in the calling thread. What it
-    raises ends the run, as Ctrl-C does: the photos in hand may still be written, and the manifest with
-    them, but no others.
+    petcomp. A contact sheet that the program drew of other cut-outs goes. ``progress`` is called with the
+    photos done and their number, in the calling thread. What it raises ends the run, as Ctrl-C does: the
+    photos in hand may still be written, and the manifest with them, but no others.
     """
     paths = path_of("list", list), folder_of("folder", folder)
     report = _petcomp.build_assets(*paths, progress, resume)

@@ -24,6 +24,8 @@ Numbers = Sequence[float] | npt.NDArray[np.floating[Any]]
 
 #: A number for each coordinate of each pixel of the largest picture.
 _MOST_COORDINATES = 3 * 2**27
+#: Pixels of a picture's side.
+_MOST_PIXELS = 2**31
 
 
 def _floats(name: str, value: Any, shape: tuple[int, ...]) -> list[Any]:
@@ -37,7 +39,11 @@ def _array(name: str, value: Any, shape: tuple[int, ...]) -> npt.NDArray[np.floa
     """The same as an array whose rows follow each other."""
     check_array(name, value, _MOST_COORDINATES)
     try:
-        array = np.require(value, np.float64, ["C", "A"])
+        given = np.asarray(value)
+        # NumPy reads numbers out of texts.
+        if given.dtype.kind in "SU":
+            raise TypeError
+        array = np.require(given, np.float64, ["C", "A"])
     except (TypeError, ValueError):
         raise InvalidValueError(f"{name}: {value!r}, expected numbers of shape {shape}") from None
     fits = array.ndim == len(shape) and all(want in (-1, got) for want, got in zip(shape, array.shape))
@@ -51,9 +57,9 @@ def _array(name: str, value: Any, shape: tuple[int, ...]) -> npt.NDArray[np.floa
 def _pixels(name: str, value: Any) -> list[int]:
     """Width and height of a picture."""
     numbers = _floats(name, value, (2,))
-    if all(1 <= n <= 2**31 and n == int(n) for n in numbers):
+    if all(1 <= n <= _MOST_PIXELS and n == int(n) for n in numbers):
         return [int(n) for n in numbers]
-    raise InvalidValueError(f"{name}: {value!r}, expected two whole numbers above 0")
+    raise InvalidValueError(f"{name}: {value!r}, expected two whole numbers from 1 to {_MOST_PIXELS}")
 
 
 class Camera:

@@ -14,7 +14,6 @@ use petcomp::color::encode_srgb8;
 use petcomp::dataset::{DatasetConfig, Pipeline, Sample};
 use petcomp::label::overlay;
 use petcomp::render::RenderOptions;
-use petcomp::scene::{Blur, PostProcessRanges, Range};
 use petcomp::{Image, Quality, Srgb8};
 use serde::Deserialize;
 use std::path::Path;
@@ -171,24 +170,9 @@ fn small(mut config: DatasetConfig, side: u32) -> DatasetConfig {
     let side = side.clamp(*SIDES_PX.start(), *SIDES_PX.end());
     let longer = config.scene.image[0].max(config.scene.image[1]);
     let factor = (f64::from(side) / f64::from(longer)).min(1.0);
-    config.scene.image = config
-        .scene
-        .image
-        .map(|side| (f64::from(side) * factor).round() as u32);
+    let image = config.scene.image;
+    config = config.with_image(image.map(|side| (f64::from(side) * factor).round() as u32));
     config.render = RenderOptions::from(Quality::Draft);
     config.scene.settle.most_work = config.scene.settle.most_work.min(MOST_WORK);
-    shrink(&mut config.scene.finish, factor);
     config
-}
-
-fn shrink(finish: &mut PostProcessRanges, factor: f64) {
-    finish.camera_blur_px = scaled(finish.camera_blur_px, factor);
-    finish.chromatic_px = scaled(finish.chromatic_px, factor);
-    if let Blur::Known(px) = finish.blur_px {
-        finish.blur_px = Blur::Known(scaled(px, factor));
-    }
-}
-
-fn scaled(range: Range, factor: f64) -> Range {
-    Range::new(range.min * factor, range.max * factor)
 }

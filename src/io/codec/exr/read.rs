@@ -406,7 +406,9 @@ pub(crate) fn decode(
             .iter()
             .map(|name| wanted.is_one_where_empty(name))
             .collect();
-        fill_empty(&mut samples, &ones, width, &stored);
+        if ones.contains(&true) {
+            fill_empty(&mut samples, &ones, width, &stored);
+        }
         if let Some(extended) = wanted.with_alpha(&names) {
             limits.check_memory(width, height, extended.len())?;
             affordable((width * height * extended.len()) as u64 * FLOAT_BYTES)?;
