@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 use solve::{Factor, Solver};
 use std::borrow::Cow;
 use std::ops::RangeInclusive;
-use tint::{DARKEST_SHARE, Tint, TintSamples};
+use tint::{DARKEST_SHARE, Tint, TintSamples, bare_shade};
 
 /// How film is solved for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -295,7 +295,7 @@ impl<'a> FilmSolution<'a> {
         match self.options.flat {
             Some(flat) => Tint::certain(flat.into()),
             None if self.is_keyable => self.tint_samples(DARKEST_SHARE).fit(),
-            None => Tint::certain(self.tint_samples(1.0).fit().flat),
+            None => Tint::certain(self.tint_samples(1.0).fit_plastic()),
         }
     }
 
@@ -314,13 +314,19 @@ impl<'a> FilmSolution<'a> {
         } else {
             Solver::guess
         };
+        let bare = |pixel, screen| {
+            let shade = self
+                .is_keyable
+                .then(|| bare_shade(pixel, screen, flat, self.key));
+            shade.flatten()
+        };
         let factors = self
             .calm
             .zip3_map(&plate.image, inside, |pixel, screen, inside| {
                 if inside.0 > 0.0 {
                     let [pixel, screen] = [pixel, screen].map(LinearRgb::into);
                     Factor {
-                        is_bare: self.is_keyable && is_bare_screen(pixel, screen, self.key),
+                        bare_shade: bare(pixel, screen),
                         ..factor(&solver, pixel, screen)
                     }
                 } else {
@@ -340,7 +346,7 @@ impl<'a> FilmSolution<'a> {
             (claim == Some(true)).then(|| solver.see_through(pixel.into(), screen.into()))
         });
         factors = factors.zip_map(&plastic, |factor, plastic| Factor {
-            is_bare: factor.is_bare,
+            bare_shade: factor.bare_shade,
             ..plastic.unwrap_or(factor)
         });
         claimed::make_opaque(&mut factors, Some(claims));
@@ -402,7 +408,8 @@ impl<'a> FilmSolution<'a> {
         let inside = self.object.inside;
         let plastic = factors.map(|f| f.transmittance(flat));
         let transmittance = plastic.zip_map(inside, covered);
-        let lit = claimed::without_shadow(&plastic, flat, self.object.claims);
+        let lit = factors.map(|f| f.lit_transmittance(flat));
+        let lit = claimed::without_shadow(&lit, flat, self.object.claims);
         let seen = view(&lit, flat, inside);
         let reflected = self.reflected(&transmittance);
         // What T leaves of the photo is the light of as much of the pixel as the object covers.
@@ -423,7 +430,7 @@ impl<'a> FilmSolution<'a> {
 
 /// Expected error of the largest channel of the transmittance.
 fn uncertainty_of(factors: &Image<Factor>, inside: &Image<Coverage>, most: f32) -> Image<f32> {
-    factors.zip_map(inside, |f, c| match f.is_bare {
+    factors.zip_map(inside, |f, c| match f.is_bare() {
         true => 0.0,
         false => (c.0 * f.sigma * most).min(1.0),
     })

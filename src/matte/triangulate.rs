@@ -129,7 +129,7 @@ pub fn triangulate(
     let solved = lines.map(|line| inferred.complete(&line));
     let shift_px: Vec<[f64; 2]> = aligned.iter().map(|photo| photo.shift_px).collect();
     // Drift shows as tint, too.
-    let doubt = exposure_drift(&aligned, &solved, inside)
+    let doubt = exposure_drift(&aligned, &solved, inside, determined)
         .or_else(|| uncertain_tint(inferred.largest_spread()));
     let mut diagnostics = diagnostics(&shift_px, determined, doubt);
     diagnostics.extend(clipped_screens(shots, inside));
@@ -194,11 +194,12 @@ fn exposure_drift(
     photos: &[AlignedPhoto],
     solved: &Image<PixelFilm>,
     inside: &Image<Coverage>,
+    determined: [bool; 3],
 ) -> Option<Diagnostic> {
     let shares = photos
         .iter()
         .map(|aligned| drift::unexplained_share([&aligned.photo, &aligned.screen], solved, inside));
-    drift::warning(&shares.collect::<Vec<_>>())
+    drift::warning(&shares.collect::<Vec<_>>(), determined)
 }
 
 fn uncertain_tint(spread: f32) -> Option<Diagnostic> {

@@ -32,7 +32,7 @@ pub(super) fn make_opaque(
     claims: Option<&Claims>,
 ) -> f32 {
     let bright = brighter_than_screen(factors, photo, plate);
-    let painted = factors.zip_map(&bright, |f, bright| bright || f.coloured && !f.is_bare);
+    let painted = factors.zip_map(&bright, |f, bright| bright || f.coloured && !f.is_bare());
     if !painted.pixels().contains(&true) {
         return 0.0;
     }
@@ -123,13 +123,17 @@ fn fill_hidden(factors: &mut Image<Factor>, hidden: &Image<f32>, around: &Image<
 }
 
 /// Weight (`r`) and weighted factor (`g`) of what is not hidden around each pixel, at half the
-/// size, which is enough for what is smooth. Both ride in one picture: one blur for both.
+/// size, which is enough for what is smooth. Both ride in one picture: one blur for both. Screen
+/// that is brighter than through plastic has no weight: beside white bars it lies in holes.
 fn surroundings(
     factors: &Image<Factor>,
     hidden: &Image<f32>,
     inside: &Image<Coverage>,
 ) -> Image<LinearRgb> {
-    let weights = hidden.zip_map(inside, |hidden, c| (1.0 - hidden) * c.0);
+    let weights = hidden.zip3_map(inside, factors, |hidden, c, f| match f.is_plastic() {
+        true => (1.0 - hidden) * c.0,
+        false => 0.0,
+    });
     let weighted = weights.zip_map(factors, |w, f| LinearRgb::new(w, w * f.value, 0.0));
     let reach_px = (FILL_REACH * side_px(inside)).max(MIN_FILL_REACH_PX);
     filter::gaussian_blur(&filter::halve(&weighted), reach_px / 2.0)

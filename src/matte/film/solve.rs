@@ -1,7 +1,7 @@
 //! One pixel of film: by which factor it is the plastic of its photo.
 
 use super::FilmOptions;
-use super::tint::{CLEAR_TRANSMITTANCE, scattered_tint};
+use super::tint::{CLEAR_TRANSMITTANCE, MAX_THICKNESS_FACTOR, scattered_tint};
 use crate::matte::arrays::largest;
 use crate::pixel::LinearRgb;
 use std::ops::RangeInclusive;
@@ -19,8 +19,8 @@ pub(super) struct Factor {
     pub(super) reflected: f32,
     /// Whether that light has a colour that this plastic cannot have.
     pub(super) coloured: bool,
-    /// Nothing lies on the screen there, as in a hole.
-    pub(super) is_bare: bool,
+    /// Nothing lies on the screen there, as in a hole: its shade, 1 as its plate.
+    pub(super) bare_shade: Option<f32>,
 }
 
 impl Factor {
@@ -31,15 +31,30 @@ impl Factor {
         unbounded: 0.0,
         reflected: 0.0,
         coloured: false,
-        is_bare: false,
+        bare_shade: None,
     };
 
-    /// By what flat plastic passes; of bare screen all, whatever the dye is.
+    pub(super) fn is_bare(&self) -> bool {
+        self.bare_shade.is_some()
+    }
+
+    /// No more see-through than plastic can be.
+    pub(super) fn is_plastic(&self) -> bool {
+        !self.is_bare() && self.value <= MAX_THICKNESS_FACTOR
+    }
+
+    /// By what flat plastic passes; of bare screen its shade, whatever the dye is.
     pub(super) fn transmittance(self, flat: LinearRgb) -> LinearRgb {
-        match self.is_bare {
-            true => LinearRgb::WHITE,
-            false => flat.map(|t| (self.value * t).clamp(0.0, 1.0)),
+        match self.bare_shade {
+            Some(shade) => LinearRgb::grey(shade),
+            None => flat.map(|t| (self.value * t).clamp(0.0, 1.0)),
         }
+    }
+
+    /// The same where bare screen lies in no shadow.
+    pub(super) fn lit_transmittance(self, flat: LinearRgb) -> LinearRgb {
+        let bare_shade = self.bare_shade.map(|_| 1.0);
+        Self { bare_shade, ..self }.transmittance(flat)
     }
 
     /// As something that is plastic, whatever it looks like.
@@ -187,7 +202,7 @@ impl Solver {
             unbounded,
             reflected: (0.5 * (a + b)).max(0.0),
             coloured: self.is_coloured(a, b),
-            is_bare: false,
+            bare_shade: None,
         }
     }
 

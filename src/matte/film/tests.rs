@@ -1,3 +1,4 @@
+use super::tint::CLEAR_TRANSMITTANCE;
 use super::*;
 use crate::matte::plate::PlateOptions;
 use crate::matte::{KeyOptions, Keying, Screen, screen_color};
@@ -605,6 +606,112 @@ fn a_print_of_the_screens_hue_on_something_opaque_is_told() {
         assert!(is_told(screen.map(|c| shade * c)), "{shade}");
     }
     assert!(!is_told([0.5, 0.05, 0.05]) && !is_told([0.02; 3]) && !is_told([0.8; 3]));
+}
+
+/// A lattice of opaque bars whose holes are too small for the outline, with the screen in its
+/// shadow.
+struct Lattice {
+    bars: LinearRgb,
+    screen: LinearRgb,
+    /// What the shadow leaves of the screen's light in the holes.
+    shade: f32,
+}
+
+impl Lattice {
+    fn is_hole(x: usize, y: usize) -> bool {
+        is_inside(x, y) && x % 15 < 7 && y % 15 < 7
+    }
+
+    fn solved(&self) -> FilmMatte {
+        let photo = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+            let shading = 1.0 + 0.15 * libm::sinf(0.11 * x as f32 - 0.07 * y as f32);
+            match (Self::is_hole(x, y), is_inside(x, y)) {
+                (true, _) => self.screen.scale(self.shade),
+                (_, true) => self.bars.scale(shading) + self.screen.scale(0.01),
+                _ => self.screen,
+            }
+        });
+        let plate = ScreenPlate::even(self.screen, SIZE);
+        film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap()
+    }
+
+    /// Mean opacity of the bars, and of the holes.
+    fn opacities(found: &FilmMatte) -> [f32; 2] {
+        [false, true].map(|hole| {
+            let covered = (0..SIZE.0 * SIZE.1).map(|i| (i % SIZE.0, i / SIZE.0));
+            let part = covered.filter(|&(x, y)| is_inside(x, y) && Self::is_hole(x, y) == hole);
+            let opacities: Vec<f32> = part
+                .map(|at| found.film[at].opacity.channels().iter().sum::<f32>() / 3.0)
+                .collect();
+            opacities.iter().sum::<f32>() / opacities.len() as f32
+        })
+    }
+}
+
+#[test]
+fn coloured_bars_are_no_dyed_plastic_and_their_holes_no_paint() {
+    for screen in [GREEN, BLUE] {
+        for bars in [
+            [0.18, 0.09, 0.045],
+            [0.45, 0.3, 0.22],
+            [0.08, 0.012, 0.012],
+            [0.75, 0.75, 0.73],
+        ] {
+            let lattice = Lattice {
+                bars: bars.into(),
+                screen,
+                shade: 0.8,
+            };
+            let found = lattice.solved();
+            let [bar, hole] = Lattice::opacities(&found);
+            assert!(bar > 0.9 && hole < 0.35, "{bars:?}: {bar} {hole}");
+            assert_eq!(found.flat, LinearRgb::grey(CLEAR_TRANSMITTANCE));
+        }
+    }
+}
+
+#[test]
+fn dark_paint_that_may_be_dark_plastic_is_told() {
+    for screen in [GREEN, BLUE] {
+        for bars in [[0.032, 0.02, 0.012], [0.06, 0.036, 0.022]] {
+            let found = Lattice {
+                bars: bars.into(),
+                screen,
+                shade: 0.8,
+            }
+            .solved();
+            let [bar, hole] = Lattice::opacities(&found);
+            let is_told = found
+                .diagnostics
+                .iter()
+                .any(|d| d.code == Code::TintUncertain && d.needs_review());
+            assert!(bar > 0.9 || is_told, "{bars:?}: {bar}");
+            assert!(hole < 0.35, "{bars:?}: {hole}");
+        }
+    }
+}
+
+#[test]
+fn the_screen_in_the_shadow_of_dark_plastic_is_see_through() {
+    let (flat, shade) = (LinearRgb::new(0.17, 0.05, 0.015), 0.6);
+    let world = World {
+        flat,
+        uneven: 0.0,
+        noise: 0.0,
+        ..World::default()
+    };
+    let mut photo = world.photo();
+    let hole = (40..50).flat_map(|x| (55..65).map(move |y| (x, y)));
+    hole.for_each(|at| photo[at] = GREEN.scale(shade));
+    let plate = ScreenPlate::even(GREEN, SIZE);
+    let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
+    let (film, t) = (found.film[(45, 60)], found.transmittance[(45, 60)]);
+    assert!(film.opacity.max_channel() < 0.05, "{film:?}");
+    assert!(
+        (t.g - shade).abs() < 0.02 && (t.r - shade).abs() < 0.02,
+        "{t:?}"
+    );
+    assert!(film.color.max_channel() < 0.01, "{film:?}");
 }
 
 mod world;

@@ -22,7 +22,8 @@ pub struct ColorUncertainty {
     /// Transmittance that is not measured in the photo but is the prior of plastic, mean over the
     /// object.
     pub guessed: f32,
-    /// How far other tints that explain the photo as well differ in what they let through.
+    /// How far other tints, or opaque paint, that explain the photo as well differ in what they let
+    /// through.
     pub tint: f32,
 }
 
@@ -95,12 +96,12 @@ impl ColorUncertainty {
         )
     }
 
-    /// Tints that explain the photo as well let through `off` more or less.
+    /// What explains the photo as well lets through `off` more or less.
     fn tint_uncertain(off: f32) -> Diagnostic {
         Diagnostic::warning(
             Code::TintUncertain,
             format_args!(
-                "the plastic may have the screen's hue: its tint is uncertain by +- {off:.2}; photograph it on another screen colour"
+                "the plastic may have the screen's hue, or be opaque: its tint is uncertain by +- {off:.2}; photograph it on another screen colour"
             ),
         )
     }
@@ -156,7 +157,7 @@ pub(super) fn keyed_away(
     flat: f32,
     longer_side: usize,
 ) -> f32 {
-    let passed = factors.map(|f| if f.is_bare { 1.0 } else { f.value * flat });
+    let passed = factors.map(|f| if f.is_bare() { 1.0 } else { f.value * flat });
     let limit = match is_mostly_opaque(&passed, inside) {
         true => OPAQUE_TRANSMITTANCE,
         false => BARE_TRANSMITTANCE,
@@ -184,7 +185,7 @@ fn is_in_its_hue(pixel: LinearRgb, screen: LinearRgb) -> bool {
 /// How much of a pixel's standard deviation is the prior's, 0 to 1.
 #[inline]
 fn prior_share(factor: &Factor, spread: f32) -> f64 {
-    if factor.coloured || factor.is_bare {
+    if factor.coloured || factor.is_bare() {
         0.0
     } else {
         f64::from((factor.sigma / spread).min(1.0))

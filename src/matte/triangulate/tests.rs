@@ -147,6 +147,26 @@ fn exposure_that_differs_between_the_photos_is_told_instead_of_tint() {
 }
 
 #[test]
+fn an_exposure_that_differs_by_7_percent_is_told_and_by_2_is_not() {
+    let label = LinearRgb::new(0.5, 0.4, 0.4);
+    let is_told = |gain: f32| {
+        let photos = [(GREEN, 1.0), (BLUE, gain)].map(|(screen, gain)| {
+            let mut photo = photo(screen, [0.0; 2], 0.002, 3);
+            let at_label = (70..90).flat_map(|x| (35..65).map(move |y| (x, y)));
+            at_label.for_each(|at| photo[at] = label);
+            let plate = ScreenPlate::even(screen.scale(gain), SIZE);
+            (photo.map(|p| p.scale(gain)), plate)
+        });
+        let shots = photos.each_ref().map(|(photo, plate)| (photo, plate));
+        let found = triangulate(&shots, &inside(), &TriangulateOptions::default()).unwrap();
+        let mut diagnostics = found.diagnostics.into_iter();
+        diagnostics.any(|d| d.code == Code::MatteExposureDrift && d.needs_review())
+    };
+    assert!(is_told(1.07) && is_told(0.93));
+    assert!(!is_told(1.0) && !is_told(1.02) && !is_told(0.98));
+}
+
+#[test]
 fn three_screens_determine_every_channel() {
     let found = solved(&[GREEN, BLUE, RED], [0.0; 2], 0.003).unwrap();
     assert_eq!(found.determined, [true; 3]);
