@@ -81,8 +81,20 @@ pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, So
         options,
     };
     let estimate = solver.without_wrong_exif()?;
+    let agreed = estimate
+        .as_ref()
+        .is_some_and(|estimate| !estimate.is_contradictory(measured));
     // Photos that stay alone keep the options as they are: one photo cannot tell distortion.
-    Ok(Joint::new(photos.clone(), measured, estimate))
+    let mut joint = Joint {
+        outliers: misfit_outliers(if agreed { measured } else { &photos }),
+        photos,
+    };
+    match estimate {
+        Some(estimate) if agreed => joint.apply(estimate),
+        Some(contradictory) => joint.warn(&contradictory),
+        None => {}
+    }
+    Ok(joint)
 }
 
 /// The options for photos that share a distortion.
@@ -128,25 +140,6 @@ fn refuse_none(photos: &[Result<Solution, SolveError>]) -> Result<(), SolveError
 }
 
 impl Joint {
-    /// What the photos give alone, and those that agree together; `measured` is what each gives
-    /// with the options of all together.
-    fn new(
-        alone: Vec<Result<Solution, SolveError>>,
-        measured: &[Result<Solution, SolveError>],
-        together: Option<JointEstimate>,
-    ) -> Self {
-        let mut joint = Self {
-            outliers: misfit_outliers(measured),
-            photos: alone,
-        };
-        match together {
-            Some(estimate) if estimate.is_contradictory(measured) => joint.warn(&estimate),
-            Some(estimate) => joint.apply(estimate),
-            None => {}
-        }
-        joint
-    }
-
     /// Keeps what each photo gives alone, with a warning about all that were solved together.
     fn warn(&mut self, contradictory: &JointEstimate) {
         let left_out = contradictory.outliers.iter().map(|outlier| outlier.photo);

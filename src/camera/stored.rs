@@ -73,7 +73,9 @@ pub(crate) fn photo_camera(
         with_stored_size(label, read_camera_file(label).ok().flatten().as_ref())
     };
     let known: Vec<LabelledPhoto> = labels.iter().map(sized).collect();
-    let known = known.iter().map(|l| (l.name.as_str(), &l.label)).collect();
+    // Of a label without sides nobody knows what it was solved with.
+    let known = known.iter().filter(|l| l.label.surface.has_side());
+    let known = known.map(|l| (l.name.as_str(), &l.label)).collect();
     let labelled = with_stored_size(labelled, file.as_ref());
     PhotoCamera::new(&labelled, file.as_ref(), &known, force)
 }

@@ -37,7 +37,7 @@ pub(crate) struct BackgroundPhoto {
     pub(crate) photo: PathBuf,
     /// The part of it that is seen.
     pub(crate) kept: Roi,
-    /// What a person should know of it, warn_of_cameras where it was solved and in the report.
+    /// What a person should know of it, warned of where it was solved and in the report.
     pub(crate) notes: Vec<String>,
     taken: [u32; 2],
     image: [u32; 2],

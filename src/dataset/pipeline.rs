@@ -113,7 +113,7 @@ impl Pipeline {
     #[doc(hidden)]
     pub fn with_config(&self, config: DatasetConfig, whole: [u32; 2]) -> Result<Self> {
         // What was opened by absolute paths is known by those.
-        let config = match self.config.assets.is_absolute() {
+        let config = match self.config.folder.is_absolute() {
             true => config.with_absolute_paths()?,
             false => config,
         };

@@ -62,6 +62,7 @@ impl DatasetConfig {
     /// Settings that no recipe can have, or that only decide how scenes are drawn.
     pub fn from_settings(settings: &SceneSettings, overrides: &[io::Override]) -> Result<Self> {
         overrides.iter().try_for_each(check_override)?;
+        overrides.iter().try_for_each(check_counts)?;
         Self::from_scene_table(settings.to_table(), overrides).map_err(|e| e.within("settings"))
     }
 
@@ -165,6 +166,15 @@ fn check_scene_table(settings: &Table) -> Result<()> {
     match keys.find(|key| *key != "settle") {
         Some(key) => Err(only_drawn(&format!("scene.{key}"))),
         None => Ok(()),
+    }
+}
+
+/// Fails for a key of a recipe that does nothing in a scene.
+fn check_counts(given: &io::Override) -> Result<()> {
+    let path = given.path();
+    match path.split('.').next() {
+        Some("split" | "preset" | "assets" | "backgrounds") => Err(of_no_scene(path)),
+        _ => Ok(()),
     }
 }
 
@@ -371,7 +381,7 @@ mod tests {
         assert!(whole.starts_with("scene: decides"), "{whole}");
         let idle = given("split.val_percent=5").unwrap_err();
         assert!(
-            idle.starts_with("settings.split: does nothing in a scene"),
+            idle.starts_with("split.val_percent: does nothing in a scene"),
             "{idle}"
         );
         for counts in ["scene.settle.attempts=3", "pictures.jpeg_quality=5"] {

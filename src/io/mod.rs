@@ -115,6 +115,7 @@ pub use document::{read_document, write_document};
 #[doc(hidden)]
 pub use format::Format;
 #[doc(hidden)]
+pub(crate) use fs::real_path;
 pub use fs::{
     Checksum, absolute, below, check_distinct, check_folder_of, copy, create_folder, inside,
     path_text, relative, relative_on_disk,

@@ -170,9 +170,12 @@ fn usable_profile(
         log::warn!("{path}: has a colour profile, but float samples; treated as linear Rec. 709");
         return None;
     }
-    if profile.as_ref().is_some_and(|profile| profile.lacks_table) {
+    if profile
+        .as_ref()
+        .is_some_and(|profile| profile.has_unapplied_table)
+    {
         log::warn!(
-            "{path}: has a colour profile with a table, which is not applied; its primaries and curves are"
+            "{path}: has a colour profile with a lookup table, which is not applied; its primaries and curves are"
         );
     }
     profile

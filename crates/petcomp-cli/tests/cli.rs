@@ -1846,7 +1846,7 @@ const DENTED_LABEL: &str = r#"{
   "format": "plane-label", "version": 1,
   "image": { "file": "other.jpg", "width": 1280, "height": 960 },
   "surface": {
-    "width_m": 0.56, "height_m": 0.37,
+    "id": "tray", "width_m": 0.56, "height_m": 0.37,
     "corners_px": [[235.8, 239.2], [1019.7, 215.7], [500.0, 400.0], [275.6, 738.8]]
   }
 }"#;

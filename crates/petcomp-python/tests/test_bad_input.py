@@ -232,6 +232,8 @@ def test_a_number_out_of_range_is_an_error_of_petcomp():
     for size, expected in (
         ((2**40, 48), "two whole numbers from 1 to 2147483648"),
         (("640", "480"), "numbers of shape"),
+        (np.array(["640", "480"], dtype=object), "numbers of shape"),
+        ((10**400, 48), "numbers of shape"),
     ):
         with pytest.raises(errors.InvalidValueError, match=f"^size: .*, expected {expected}"):
             petcomp.evaluate("none.json", "none", size=size)

@@ -192,7 +192,9 @@ impl Fitting<'_> {
     fn expected_steps(&self) -> u64 {
         let row = (OBJECT_COUNTS.len() / 2 + 2) * self.options.falls;
         let tried: usize = LEVERS.iter().map(|lever| lever.values.len()).sum();
-        (row * (1 + MORE_FALLS as usize + tried)) as u64 + 3 * self.options.pictures
+        // Falls of the recipe, and of what two levers may be fitted to.
+        let fitted = 1 + 2;
+        (row * (fitted + MORE_FALLS as usize + tried)) as u64 + 3 * self.options.pictures
     }
 
     fn finish(self, plan: &FitPlan, page: Page) -> Result<Fit> {

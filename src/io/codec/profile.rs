@@ -78,7 +78,7 @@ pub(crate) struct DisplayProfile {
     curves: [Vec<f32>; 3],
     to_rec709: ColorMatrix,
     /// There is a table of colours, too, which is more exact.
-    pub(crate) lacks_table: bool,
+    pub(crate) has_unapplied_table: bool,
 }
 
 impl DisplayProfile {
@@ -134,7 +134,7 @@ impl DisplayProfile {
         Self {
             curves: std::array::from_fn(|_| curve.to_vec()),
             to_rec709: Matrix3::identity().into(),
-            lacks_table: false,
+            has_unapplied_table: false,
         }
     }
 
@@ -154,7 +154,7 @@ impl DisplayProfile {
         };
         let profile = profile.ok_or("a colour profile without primaries and curves")?;
         Ok((!profile.is_srgb()).then(|| Self {
-            lacks_table: has_table(icc),
+            has_unapplied_table: has_table(icc),
             ..profile
         }))
     }
@@ -162,7 +162,7 @@ impl DisplayProfile {
     fn from_grey(icc: &ColorProfile) -> Option<Self> {
         let curve = icc.gray_trc.as_ref()?;
         let light = curve_table(|x| match icc.pcs {
-            DataColorSpace::Lab => light_of_lightness(100.0 * evaluate(curve, x)),
+            DataColorSpace::Lab => luminance_of_lightness(100.0 * evaluate(curve, x)),
             _ => evaluate(curve, x),
         });
         light.map(|light| Self::from_grey_curve(&light))
@@ -178,7 +178,7 @@ impl DisplayProfile {
         matrix.iter().all(|v| v.is_finite()).then(|| Self {
             curves,
             to_rec709: matrix.into(),
-            lacks_table: false,
+            has_unapplied_table: false,
         })
     }
 
@@ -204,7 +204,7 @@ fn has_table(icc: &ColorProfile) -> bool {
 }
 
 /// Light, as a share of white's, of a lightness of 0 to 100 (CIE 15:2018, 8.2.1: L*).
-fn light_of_lightness(lightness: f64) -> f64 {
+fn luminance_of_lightness(lightness: f64) -> f64 {
     const LINEAR_UP_TO: f64 = 8.0;
     if lightness <= LINEAR_UP_TO {
         return lightness * 27.0 / 24_389.0;
@@ -423,13 +423,13 @@ mod tests {
     fn a_table_beside_primaries_is_missed() {
         let plain = ColorProfile::new_display_p3();
         let without = DisplayProfile::from_parsed(&plain).unwrap().unwrap();
-        assert!(!without.lacks_table);
+        assert!(!without.has_unapplied_table);
         let [mut perceptual, mut colorimetric] = [plain.clone(), plain];
         perceptual.lut_a_to_b_perceptual = Some(table());
         colorimetric.lut_a_to_b_colorimetric = Some(table());
         for icc in [perceptual, colorimetric] {
             let with = DisplayProfile::from_parsed(&icc).unwrap().unwrap();
-            assert!(with.lacks_table);
+            assert!(with.has_unapplied_table);
             assert_eq!(with.light([0.8, 0.1, 0.3]), without.light([0.8, 0.1, 0.3]));
         }
         let mut srgb = ColorProfile::new_srgb();

@@ -29,7 +29,7 @@ pub fn check_distinct(
 }
 
 /// One path for every name of a file that is there.
-fn real_path(path: &Path) -> PathBuf {
+pub(crate) fn real_path(path: &Path) -> PathBuf {
     let real = path.canonicalize().or_else(|_| std::path::absolute(path));
     real.unwrap_or_else(|_| path.to_owned())
 }

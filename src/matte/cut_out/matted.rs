@@ -48,10 +48,12 @@ impl Matted {
             .cut
             .zip_map(&open, |c, open| if open { Coverage(0.0) } else { c });
         let cutout = region.photo.zip_map(&cut, |p, m| p.opaque().masked(m));
-        let share = share_inside(&bare, &well_inside(&cut));
-        let enclosed = (share > MAX_BARE_SHARE).then(|| bare_within(share));
+        let enclosed = share_inside(&bare, &well_inside(&cut));
+        let enclosed = (enclosed > MAX_BARE_SHARE).then(|| bare_within(enclosed));
+        let left_out = share_inside(&open, &well_inside(&region.cut));
+        let left_out = (left_out > MAX_BARE_SHARE).then(|| bare_left_out(left_out));
         Self {
-            diagnostics: enclosed.into_iter().collect(),
+            diagnostics: enclosed.into_iter().chain(left_out).collect(),
             ..Self::grey(MatteMethod::Outline, cutout, 0.0)
         }
     }
@@ -162,7 +164,8 @@ fn open_pockets(bare: &Mask, region: &ObjectRegion) -> Mask {
     let pockets = open.zip_map(&inside, |open, inside| open && inside);
     let near = filter::dilate(&pockets, RIM_PX + 1.0);
     let whole = open.zip_map(&near, |open, near| open && near);
-    unclaimed(filter::dilate(&whole, EDGE_PX), drawn)
+    let whole = unclaimed(filter::dilate(&whole, EDGE_PX), drawn);
+    unclaimed(whole, region.claims.as_ref())
 }
 
 /// What an outline encloses, without its rim.
@@ -181,6 +184,16 @@ fn bare_within(share: f64) -> Diagnostic {
         Code::ScreenLikeParts,
         format_args!(
             "{:.0} % of what the outline encloses looks like bare screen, and is cut out as if it were the object; with the method \"physical\" it is see-through",
+            100.0 * share
+        ),
+    )
+}
+
+fn bare_left_out(share: f64) -> Diagnostic {
+    Diagnostic::warning(
+        Code::ScreenLikeParts,
+        format_args!(
+            "{:.0} % of what the outline encloses looks like bare screen up to its rim, and is left out; draw the outline there if it is the object",
             100.0 * share
         ),
     )
@@ -261,7 +274,7 @@ mod tests {
         let is_hull = |x, y| in_box(x, y) && 3 * (y - 20) + 80 >= 2 * x;
         let mut region = region(is_angle, is_hull);
         let searched = by_outline(&region);
-        assert!(searched.diagnostics.is_empty());
+        assert!(searched.diagnostics[0].message.contains("is left out"));
         let opaque = Image::from_fn(SIZE.0, SIZE.1, |x, y| is_opaque(&searched, (x, y)));
         let angle = Image::from_fn(SIZE.0, SIZE.1, is_angle);
         // All of the object, and of the 1200 pixels of screen those in the tips of the corner.

@@ -72,7 +72,7 @@ pub enum MatteMethod {
     Key,
     /// From the object's outline alone: nothing is see-through, and what shines through is part of
     /// the object. Screen that the outline takes along at its rim is left out where its colour
-    /// tells it.
+    /// tells it, and with it film so clear that it dims the screen by less than a tenth.
     Outline,
 }
 

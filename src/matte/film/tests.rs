@@ -693,16 +693,16 @@ fn dark_paint_that_may_be_dark_plastic_is_told() {
 
 #[test]
 fn the_screen_in_the_shadow_of_dark_plastic_is_see_through() {
-    let (flat, shade) = (LinearRgb::new(0.17, 0.05, 0.015), 0.6);
-    let world = World {
-        flat,
-        uneven: 0.0,
-        noise: 0.0,
-        ..World::default()
-    };
-    let mut photo = world.photo();
-    let hole = (40..50).flat_map(|x| (55..65).map(move |y| (x, y)));
-    hole.for_each(|at| photo[at] = GREEN.scale(shade));
+    let (flat, shade) = ([0.17, 0.05, 0.015], 0.6);
+    let haze = LinearRgb::from(tint::scattered_tint(flat)).scale(0.01);
+    let photo = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let thickness = 0.9 + 0.2 * x as f32 / SIZE.0 as f32;
+        match (40..50).contains(&x) && (55..65).contains(&y) {
+            true => GREEN.scale(shade),
+            false if is_inside(x, y) => haze + LinearRgb::from(flat).scale(thickness) * GREEN,
+            false => GREEN,
+        }
+    });
     let plate = ScreenPlate::even(GREEN, SIZE);
     let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
     let (film, t) = (found.film[(45, 60)], found.transmittance[(45, 60)]);
@@ -712,6 +712,41 @@ fn the_screen_in_the_shadow_of_dark_plastic_is_see_through() {
         "{t:?}"
     );
     assert!(film.color.max_channel() < 0.01, "{film:?}");
+}
+
+/// Plastic of a dye that scatters some light, on a screen.
+fn dyed(flat: [f32; 3], scattered: f32, screen: LinearRgb) -> FilmMatte {
+    let haze = LinearRgb::from(tint::scattered_tint(flat)).scale(scattered);
+    let photo = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let thickness = 0.8 + 0.4 * x as f32 / SIZE.0 as f32;
+        match is_inside(x, y) {
+            true => haze + LinearRgb::from(flat).scale(thickness) * screen,
+            false => screen,
+        }
+    });
+    let plate = ScreenPlate::even(screen, SIZE);
+    film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap()
+}
+
+/// On a dark screen plastic reflects as much of it as paint.
+#[test]
+fn dyed_plastic_is_not_taken_for_paint_without_a_word() {
+    let is_told = |found: &FilmMatte| {
+        let mut diagnostics = found.diagnostics.iter();
+        diagnostics.any(|d| d.code == Code::TintUncertain && d.needs_review())
+    };
+    let is_clear = |found: &FilmMatte| found.flat == LinearRgb::grey(CLEAR_TRANSMITTANCE);
+    for flat in [[0.2, 0.41, 0.54], [0.38, 0.21, 0.15]] {
+        for screen in [GREEN, BLUE] {
+            let ordinary = dyed(flat, 0.02, screen);
+            assert!(!is_clear(&ordinary), "{flat:?} on {screen:?}");
+            let dark = dyed(flat, 0.04, screen.scale(0.35));
+            assert!(
+                !is_clear(&dark) || is_told(&dark),
+                "{flat:?} on dark {screen:?}"
+            );
+        }
+    }
 }
 
 mod world;

@@ -87,17 +87,22 @@ const EQUAL_MISFIT: f32 = 0.1;
 // dyed bottles and simulations of 30 others have, and what simulations of 60 opaque things have, all
 // of these on a green and a blue screen. 50 other opaque things and 24 bottles were not used.
 
-/// Light that the darkest of dyed plastic scatters, were it clear, over the screen's: at most 0.17.
-/// Paint that is not almost black has 0.26 and more.
+/// Light that the darkest of dyed plastic scatters, were it clear, over the screen's: at most 0.17
+/// on screens of 0.34 to 0.5, more on darker ones. Paint that is not almost black has 0.26 and more.
 const MAX_SCATTERED: f32 = 0.2;
 /// Misfit of a dye in plastic that has it: 2.3 at most.
 const MAX_DYE_MISFIT: f32 = 3.0;
+/// Misfit of a dye beyond which it is none that is tried.
+const MAX_OTHER_DYE_MISFIT: f32 = 12.0;
 /// Thickness factor of the darkest of dyed plastic: in rendered bottles 0.37 and more. What is
 /// thinner hardly shows the screen, and counts as opaque.
 const MIN_DYE_THICKNESS: f32 = 0.3;
 /// Misfit up to which paint explains a pixel: what noise alone leaves of three channels after one
 /// factor, the median of a chi-squared distribution with two degrees of freedom.
 const MAX_PAINT_MISFIT: f32 = 1.4;
+/// Misfit from which on paint does not explain it: opaque things that pass for dyed have 1.8 at
+/// most, blue and brown plastic on dark cloth 4.9 and more.
+const MIN_NO_PAINT_MISFIT: f32 = 3.0;
 
 /// Nothing lies on the screen there: plastic passes less of its strongest channel, `key`.
 pub(in crate::matte) fn is_bare_screen(pixel: [f32; 3], screen: [f32; 3], key: usize) -> bool {
@@ -266,19 +271,28 @@ fn thinned<T>(items: Vec<T>, count: usize) -> impl Iterator<Item = T> {
 /// How likely it is that what looks like a dye is opaque paint.
 enum Opacity {
     None,
-    /// Either explains the photo.
+    /// Either explains the photo, or on a dark screen both reflect as much.
     Possible,
-    /// Either does, and the screen is hardly seen.
+    /// Either does, and the screen is hardly seen; or the dye is none of those tried.
     Likely,
     Sure,
 }
 
 impl TintHypothesis {
     fn opacity(&self, tried: &[Self]) -> Opacity {
+        let no_paint = tried.iter().all(Self::is_unlike_paint);
         if self.flat == [CLEAR_TRANSMITTANCE; 3] {
             Opacity::None
-        } else if self.seen.scattered > MAX_SCATTERED || self.seen.misfit > MAX_DYE_MISFIT {
-            Opacity::Sure
+        } else if self.seen.misfit > MAX_DYE_MISFIT {
+            match no_paint && self.seen.misfit < MAX_OTHER_DYE_MISFIT {
+                true => Opacity::Likely,
+                false => Opacity::Sure,
+            }
+        } else if self.seen.scattered > MAX_SCATTERED {
+            match no_paint {
+                true => Opacity::Possible,
+                false => Opacity::Sure,
+            }
         } else if self.seen.thickness < MIN_DYE_THICKNESS {
             Opacity::Likely
         } else if tried.iter().any(Self::is_like_paint) {
@@ -291,6 +305,11 @@ impl TintHypothesis {
     /// Paint that reflects as this plastic scatters explains the pixels.
     fn is_like_paint(&self) -> bool {
         self.seen.paint_misfit <= MAX_PAINT_MISFIT
+    }
+
+    /// No paint that reflects as this plastic scatters does.
+    fn is_unlike_paint(&self) -> bool {
+        self.seen.paint_misfit > MIN_NO_PAINT_MISFIT
     }
 
     /// This tint, as certain as those allow that explain the pixels as well.

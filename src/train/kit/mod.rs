@@ -96,7 +96,7 @@ pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     let real = YoloSet::open(&whole_folder(&options.real)?)?;
     let synthetic = open_for_training(&whole_folder(&options.synthetic)?)?;
     check_sets([&real, &synthetic], [&options.real, &options.synthetic])?;
-    warn_of_known_validation(&real, &options.real);
+    warn_of_known_validation([&real, &synthetic], &options.real);
     let counts = [real.train.len() as u64, synthetic.train.len() as u64];
     let balance = balance_document(&options.balance, counts)?;
     let (variants, left_out) = VARIANTS
@@ -183,14 +183,15 @@ fn check_classes([real, synthetic]: [&YoloSet; 2], folders: [&Path; 2]) -> Resul
     Err(Error::value("classes", what))
 }
 
-/// Warns of images that the best epoch is chosen by although they are trained on.
-fn warn_of_known_validation(set: &YoloSet, folder: &Path) {
-    let known = shared_images(&set.train, &set.val).count();
+/// Warns of real images that the best epoch is chosen by although some variant is trained on them.
+fn warn_of_known_validation([real, synthetic]: [&YoloSet; 2], folder: &Path) {
+    let trained = [&real.train[..], &synthetic.train[..]].concat();
+    let known = shared_images(&trained, &real.val).count();
     if known > 0 {
         log::warn!(
             "{}: {known} of {} images for validation are also trained on; see `dataset split`",
             folder.display(),
-            set.val.len()
+            real.val.len()
         );
     }
 }
@@ -200,15 +201,10 @@ fn shared_images<'a>(
     others: &[PathBuf],
     images: &'a [PathBuf],
 ) -> impl Iterator<Item = &'a PathBuf> + use<'a> {
-    let known: BTreeSet<PathBuf> = others.iter().map(|image| real_path(image)).collect();
+    let known: BTreeSet<PathBuf> = others.iter().map(|image| io::real_path(image)).collect();
     images
         .iter()
-        .filter(move |image| known.contains(&real_path(image)))
-}
-
-/// One path for every name of an image that is there.
-fn real_path(image: &Path) -> PathBuf {
-    image.canonicalize().unwrap_or_else(|_| image.to_owned())
+        .filter(move |image| known.contains(&io::real_path(image)))
 }
 
 fn list_of(images: &[PathBuf]) -> Result<String> {

@@ -40,11 +40,12 @@ def _array(name: str, value: Any, shape: tuple[int, ...]) -> npt.NDArray[np.floa
     check_array(name, value, _MOST_COORDINATES)
     try:
         given = np.asarray(value)
-        # NumPy reads numbers out of texts.
-        if given.dtype.kind in "SU":
+        # NumPy reads numbers out of texts and dates, and leaves out imaginary parts.
+        texts = given.dtype == object and any(isinstance(one, (str, bytes)) for one in given.flat)
+        if texts or given.dtype.kind not in "biufO":
             raise TypeError
         array = np.require(given, np.float64, ["C", "A"])
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidValueError(f"{name}: {value!r}, expected numbers of shape {shape}") from None
     fits = array.ndim == len(shape) and all(want in (-1, got) for want, got in zip(shape, array.shape))
     if not fits:
