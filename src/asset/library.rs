@@ -158,7 +158,7 @@ fn open(folder: &Path, record: &PhotoRecord, at: &str, files: &Arc<CutOutFiles>)
         flow: flow.map(|found| found.crc32),
     };
     if record.crc32.is_none() || flow.is_some() {
-        files.read(record, checksums)?;
+        files.pixels(record, checksums)?;
     }
     let source = Source::Files(Arc::clone(files), checksums);
     Ok(Photo::from_source(source, size, record.clone()))

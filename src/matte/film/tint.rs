@@ -90,10 +90,16 @@ const EQUAL_MISFIT: f32 = 0.1;
 /// Light that the darkest of dyed plastic scatters, were it clear, over the screen's: at most 0.17
 /// on screens of 0.34 to 0.5, more on darker ones. Paint that is not almost black has 0.26 and more.
 const MAX_SCATTERED: f32 = 0.2;
+/// The same on a screen so dark that plastic reflects as much as it.
+const MAX_SCATTERED_ON_DARK: f32 = 0.5;
 /// Misfit of a dye in plastic that has it: 2.3 at most.
 const MAX_DYE_MISFIT: f32 = 3.0;
-/// Misfit of a dye beyond which it is none that is tried.
-const MAX_OTHER_DYE_MISFIT: f32 = 12.0;
+/// Misfit of plastic whose dye is none of those tried, or on a dark screen: yellow PET and rendered
+/// bottles have 3.2 to 4.1 there.
+const MAX_OTHER_DYE_MISFIT: f32 = 5.0;
+/// Paint explains such plastic so many times worse, at least; and paint as well as the dye that it
+/// is taken for.
+const MIN_PAINT_MISFIT_RATIO: f32 = 4.0;
 /// Thickness factor of the darkest of dyed plastic: in rendered bottles 0.37 and more. What is
 /// thinner hardly shows the screen, and counts as opaque.
 const MIN_DYE_THICKNESS: f32 = 0.3;
@@ -280,16 +286,16 @@ enum Opacity {
 
 impl TintHypothesis {
     fn opacity(&self, tried: &[Self]) -> Opacity {
-        let no_paint = tried.iter().all(Self::is_unlike_paint);
         if self.flat == [CLEAR_TRANSMITTANCE; 3] {
             Opacity::None
         } else if self.seen.misfit > MAX_DYE_MISFIT {
-            match no_paint && self.seen.misfit < MAX_OTHER_DYE_MISFIT {
+            match self.is_other_dye() {
                 true => Opacity::Likely,
                 false => Opacity::Sure,
             }
         } else if self.seen.scattered > MAX_SCATTERED {
-            match no_paint {
+            let is_on_dark = self.seen.scattered < MAX_SCATTERED_ON_DARK;
+            match is_on_dark && tried.iter().all(Self::is_unlike_paint) {
                 true => Opacity::Possible,
                 false => Opacity::Sure,
             }
@@ -305,6 +311,12 @@ impl TintHypothesis {
     /// Paint that reflects as this plastic scatters explains the pixels.
     fn is_like_paint(&self) -> bool {
         self.seen.paint_misfit <= MAX_PAINT_MISFIT
+    }
+
+    /// Plastic explains the pixels, though not of this dye, and paint does not.
+    fn is_other_dye(&self) -> bool {
+        self.seen.misfit < MAX_OTHER_DYE_MISFIT
+            && self.seen.paint_misfit > MIN_PAINT_MISFIT_RATIO * self.seen.misfit
     }
 
     /// No paint that reflects as this plastic scatters does.

@@ -44,12 +44,14 @@ pub(crate) fn run(args: &AblateArgs, global: &GlobalArgs) -> anyhow::Result<()> 
     for (name, config) in &datasets {
         write_recipe(&args.output.join(name), config)?;
     }
-    // All are opened before any is made: a switch that cannot work is told at once.
-    let runs = datasets.iter().map(|(name, _)| args.opened(name));
-    let runs: Vec<Option<(Pipeline, Plan)>> = runs.collect::<anyhow::Result<_>>()?;
-    for ((name, _), run) in datasets.iter().zip(runs) {
+    // All are opened before any is made: a switch that cannot work is told at once. One at a time,
+    // as each may keep a quarter of the memory.
+    for (name, _) in &datasets {
+        args.opened(name)?;
+    }
+    for (name, _) in &datasets {
         print::line(recipe_in(&args.output.join(name)).display());
-        if let Some((pipeline, plan)) = run {
+        if let Some((pipeline, plan)) = args.opened(name)? {
             let counts = generate_supervised(&pipeline, &plan, &args.consent, global)?;
             print_counts(&counts);
         }
