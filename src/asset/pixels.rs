@@ -138,8 +138,7 @@ impl CutOutFiles {
     /// Without a working folder.
     pub(super) fn in_folder(folder: &Path) -> Result<Self> {
         Ok(Self {
-            // An empty path is the working folder, too.
-            folder: io::absolute(&Path::new(".").join(folder))?,
+            folder: io::absolute_folder(folder)?,
             kept: LruCache::of_bytes(most_bytes()),
         })
     }

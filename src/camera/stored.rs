@@ -43,12 +43,8 @@ type LabelsByName<'a> = BTreeMap<&'a str, &'a Label>;
 /// A label with an impossible value, or that no camera can have seen, or that none fits; a camera
 /// file that cannot be right.
 pub(crate) fn photo_cameras(labels: &[LabelledPhoto], force: bool) -> Result<Vec<PhotoCamera>> {
-    let mut found = Vec::with_capacity(labels.len());
-    for labelled in labels {
-        check_label(&labelled.label).map_err(|error| in_label(error, labelled))?;
-        let file = read_camera_file(labelled)?;
-        found.push((with_stored_size(labelled, file.as_ref()), file));
-    }
+    let found = labels.iter().map(with_camera_file);
+    let found: Vec<(LabelledPhoto, Option<CameraFile>)> = found.collect::<Result<_>>()?;
     let known = found.iter().map(|(labelled, _)| labelled);
     let known = known.map(|l| (l.name.as_str(), &l.label)).collect();
     found
@@ -67,8 +63,7 @@ pub(crate) fn photo_camera(
     labels: &[LabelledPhoto],
     force: bool,
 ) -> Result<PhotoCamera> {
-    check_label(&labelled.label).map_err(|error| in_label(error, labelled))?;
-    let file = read_camera_file(labelled)?;
+    let (labelled, file) = with_camera_file(labelled)?;
     let sized = |label: &LabelledPhoto| {
         with_stored_size(label, read_camera_file(label).ok().flatten().as_ref())
     };
@@ -76,8 +71,14 @@ pub(crate) fn photo_camera(
     // Of a label without sides nobody knows what it was solved with.
     let known = known.iter().filter(|l| l.label.surface.has_side());
     let known = known.map(|l| (l.name.as_str(), &l.label)).collect();
-    let labelled = with_stored_size(labelled, file.as_ref());
     PhotoCamera::new(&labelled, file.as_ref(), &known, force)
+}
+
+/// A label that may be right, with the size that its camera was solved with, and that camera's file.
+fn with_camera_file(labelled: &LabelledPhoto) -> Result<(LabelledPhoto, Option<CameraFile>)> {
+    check_label(&labelled.label).map_err(|error| in_label(error, labelled))?;
+    let file = read_camera_file(labelled)?;
+    Ok((with_stored_size(labelled, file.as_ref()), file))
 }
 
 impl PhotoCamera {

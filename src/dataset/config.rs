@@ -114,8 +114,7 @@ impl DatasetConfig {
     /// Without a working folder.
     pub(super) fn with_absolute_paths(mut self) -> Result<Self> {
         for path in [&mut self.folder, &mut self.assets, &mut self.backgrounds] {
-            // An empty path is the working folder, too.
-            *path = io::absolute(&Path::new(".").join(path.as_path()))?;
+            *path = io::absolute_folder(path)?;
         }
         Ok(self)
     }

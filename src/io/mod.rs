@@ -115,14 +115,13 @@ pub use document::{read_document, write_document};
 #[doc(hidden)]
 pub use format::Format;
 #[doc(hidden)]
-pub(crate) use fs::real_path;
 pub use fs::{
     Checksum, absolute, below, check_distinct, check_folder_of, copy, create_folder, inside,
     path_text, relative, relative_on_disk,
 };
 pub(crate) use fs::{
-    files_below, is_apple_double, natural_key, refuse_links, stem_text, with_last_step,
-    write_through,
+    absolute_folder, files_below, is_apple_double, natural_key, real_path, refuse_links, stem_text,
+    with_last_step, write_through,
 };
 pub use header::Header;
 #[doc(hidden)]

@@ -94,7 +94,7 @@ fn append(bytes: &mut Vec<u8>, file: &mut impl Read, count: usize) -> Result<(),
 /// table B.1) and what stands in its segment (B.2.2).
 fn check_kind(marker: u8, frame: &[u8]) -> Result<(), Refusal> {
     let kind: String = match (marker, frame.first()) {
-        (0xc0..=0xc2, Some(8)) if has_thirds(frame) => "sampling factors of 3".into(),
+        (0xc0..=0xc2, Some(8)) if has_sampling_factor_3(frame) => "sampling factors of 3".into(),
         (0xc0..=0xc2, Some(8)) => return Ok(()),
         (0xc0..=0xc2, Some(bits)) => format!("{bits} bits a sample, expected 8"),
         (0xc3, _) => "lossless".into(),
@@ -105,9 +105,9 @@ fn check_kind(marker: u8, frame: &[u8]) -> Result<(), Refusal> {
     Err(Refusal::Unsupported(format!("unsupported JPEG: {kind}")))
 }
 
-/// A component has three samples to a unit, across or down. Bits, lines, columns and the number of
-/// components stand in front of them, and each has three bytes.
-fn has_thirds(frame: &[u8]) -> bool {
+/// A component has a horizontal or vertical sampling factor of 3. Bits, lines, columns and the
+/// number of components stand in front of them, and each has three bytes.
+fn has_sampling_factor_3(frame: &[u8]) -> bool {
     let components = frame.get(6..).unwrap_or_default().chunks_exact(3);
     components
         .map(|component| component[1])
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn three_samples_to_a_unit_are_left_to_another_decoder() {
+    fn sampling_factors_of_3_are_left_to_another_decoder() {
         for factors in [0x31, 0x13, 0x33] {
             match sampled_frame(0xc0, 8, factors) {
                 Err(Refusal::Unsupported(e)) => {

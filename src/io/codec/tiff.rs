@@ -34,8 +34,8 @@ const PALETTE_COLOR: u16 = 3;
 const CIE_LAB: u16 = 8;
 const ICC_LAB: u16 = 9;
 const ITU_LAB: u16 = 10;
-/// TIFF/EP and DNG 1.7, the same: what a sensor saw, through a mosaic of filters or not.
-const FILTER_MOSAIC: u16 = 32_803;
+/// TIFF/EP and DNG 1.7, the same: raw data of a sensor, behind an array of colour filters or not.
+const CFA: u16 = 32_803;
 const LINEAR_RAW: u16 = 34_892;
 /// TIFF 6.0, `NewSubfileType`: a smaller version of another picture. Nikon's and Sony's raw files
 /// begin with one.
@@ -144,7 +144,7 @@ fn is_alpha(extra: &[u16]) -> bool {
 fn first_picture<R: Read + Seek>(mut file: R) -> Result<Decoder<R>, Refusal> {
     let tags = first_tags(&mut file).unwrap_or_default();
     file.rewind().map_err(TiffError::from)?;
-    // The decoder does not know what a sensor saw, and OpenImageIO takes it for grey.
+    // The decoder does not know raw data of a sensor, and OpenImageIO takes them for grey.
     if is_undeveloped(&tags) {
         return Err(raw_file());
     }
@@ -166,10 +166,10 @@ fn raw_file() -> Refusal {
     format!("is {RAW}, of which the first picture is no photo: {DEVELOP}").into()
 }
 
-/// By its tags the file is a DNG, or its first picture is what a sensor saw.
+/// By its tags the file is a DNG, or its first picture is raw data of a sensor.
 fn is_undeveloped(tags: &BTreeMap<u16, u16>) -> bool {
     let kind = tags.get(&Tag::PhotometricInterpretation.to_u16());
-    tags.contains_key(&DNG_VERSION) || matches!(kind, Some(&(FILTER_MOSAIC | LINEAR_RAW)))
+    tags.contains_key(&DNG_VERSION) || matches!(kind, Some(&(CFA | LINEAR_RAW)))
 }
 
 /// The picture is a small one of another in the same file; not where that tag cannot be read.
@@ -730,7 +730,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_sensor_saw_is_no_photo() {
+    fn raw_data_of_a_sensor_are_no_photo() {
         let kind = Tag::PhotometricInterpretation;
         // A mosaic of 2 x 2 pixels that is a DNG, too, in the other byte order.
         let mut mosaic = b"MM\0*\0\0\0\x08\0\x04".to_vec();
@@ -747,7 +747,7 @@ mod tests {
         for raw in [
             mosaic,
             without_version,
-            with_tag(kind, FILTER_MOSAIC),
+            with_tag(kind, CFA),
             with_tag(kind, LINEAR_RAW),
         ] {
             match decode(&raw, &Limits::default()) {

@@ -208,12 +208,20 @@ fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
-/// A path from the root, as it is named: links and `..` stay.
+/// An absolute path, as it is named: links and `..` stay.
 ///
 /// # Errors
 /// [`Error::File`] for an empty path, and where the working folder is gone.
 pub fn absolute(path: &Path) -> Result<PathBuf> {
     std::path::absolute(path).map_err(|e| Error::file(path, e))
+}
+
+/// The same of a folder, of which an empty path is the working folder.
+///
+/// # Errors
+/// Without a working folder.
+pub(crate) fn absolute_folder(path: &Path) -> Result<PathBuf> {
+    absolute(&Path::new(".").join(path))
 }
 
 /// The relative path from a folder to a file or folder, both absolute; `.` to the folder itself.

@@ -11,6 +11,7 @@ mod own_file;
 mod sanitize_path;
 mod text_name;
 
+pub(crate) use atomic::absolute_folder;
 pub use atomic::{absolute, check_folder_of, create_folder, relative, relative_on_disk};
 pub use checksum::{Checksum, copy};
 pub use distinct::check_distinct;

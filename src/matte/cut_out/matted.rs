@@ -43,15 +43,14 @@ impl Matted {
 
     fn outline(screen: &CleanScreen, region: &ObjectRegion) -> Self {
         let bare = bare_screen(screen, region);
-        let open = open_pockets(&bare, region);
+        let inside = well_inside(&region.cut);
+        let open = open_pockets(&bare, &inside, region);
         let cut = region
             .cut
             .zip_map(&open, |c, open| if open { Coverage(0.0) } else { c });
         let cutout = region.photo.zip_map(&cut, |p, m| p.opaque().masked(m));
-        let enclosed = share_inside(&bare, &well_inside(&cut));
-        let enclosed = (enclosed > MAX_BARE_SHARE).then(|| bare_within(enclosed));
-        let left_out = share_inside(&open, &well_inside(&region.cut));
-        let left_out = (left_out > MAX_BARE_SHARE).then(|| bare_left_out(left_out));
+        let enclosed = warning_of_bare(share_inside(&bare, &well_inside(&cut)), ENCLOSED);
+        let left_out = warning_of_bare(share_inside(&open, &inside), LEFT_OUT);
         Self {
             diagnostics: enclosed.into_iter().chain(left_out).collect(),
             ..Self::grey(MatteMethod::Outline, cutout, 0.0)
@@ -126,6 +125,12 @@ impl From<FilmMatte> for Matted {
 const RIM_PX: f64 = 2.0;
 /// A larger share of bare screen within an outline is worth a warning.
 const MAX_BARE_SHARE: f64 = 0.05;
+/// What becomes of it where the object encloses it.
+const ENCLOSED: &str =
+    ", and is cut out as if it were the object; with the method \"physical\" it is see-through";
+/// What becomes of it where it reaches the rim.
+const LEFT_OUT: &str =
+    " up to its rim, and is left out; draw the outline there if it is the object";
 
 /// Where more of an outline would be left out, it is the object that has the screen's colour.
 const MAX_OPEN_SHARE: f64 = 0.5;
@@ -148,20 +153,19 @@ fn bare_screen(screen: &CleanScreen, region: &ObjectRegion) -> Mask {
 
 /// Bare screen within an outline that was searched, and not drawn, which hangs together with what
 /// is outside: that of a corner that the outline cuts off.
-fn open_pockets(bare: &Mask, region: &ObjectRegion) -> Mask {
+fn open_pockets(bare: &Mask, inside: &Mask, region: &ObjectRegion) -> Mask {
     let drawn = region.drawn.as_ref();
     let outside = region.cut.map(|c| c.0 <= 0.5);
     let bare = unclaimed(bare.clone(), drawn);
     let groups = PixelGroups::new(&outside.zip_map(&bare, |outside, bare| outside || bare));
     let reached = groups.sizes(&outside);
     let open = groups.only(|group| reached[group] > 0);
-    let inside = well_inside(&region.cut);
-    if share_inside(&open, &inside) > MAX_OPEN_SHARE {
+    if share_inside(&open, inside) > MAX_OPEN_SHARE {
         let (w, h) = open.size();
         return Image::new(w, h);
     }
     // What lies along the rim alone is the outline's error.
-    let pockets = open.zip_map(&inside, |open, inside| open && inside);
+    let pockets = open.zip_map(inside, |open, inside| open && inside);
     let near = filter::dilate(&pockets, RIM_PX + 1.0);
     let whole = open.zip_map(&near, |open, near| open && near);
     let whole = unclaimed(filter::dilate(&whole, EDGE_PX), drawn);
@@ -179,24 +183,14 @@ fn share_inside(part: &Mask, inside: &Mask) -> f64 {
     shared.count() as f64 / inside.count().max(1) as f64
 }
 
-fn bare_within(share: f64) -> Diagnostic {
-    Diagnostic::warning(
-        Code::ScreenLikeParts,
-        format_args!(
-            "{:.0} % of what the outline encloses looks like bare screen, and is cut out as if it were the object; with the method \"physical\" it is see-through",
-            100.0 * share
-        ),
-    )
-}
-
-fn bare_left_out(share: f64) -> Diagnostic {
-    Diagnostic::warning(
-        Code::ScreenLikeParts,
-        format_args!(
-            "{:.0} % of what the outline encloses looks like bare screen up to its rim, and is left out; draw the outline there if it is the object",
-            100.0 * share
-        ),
-    )
+/// The warning about a share of bare screen within an outline, with what became of it.
+fn warning_of_bare(share: f64, what: &str) -> Option<Diagnostic> {
+    (share > MAX_BARE_SHARE).then(|| {
+        let share = 100.0 * share;
+        let message =
+            format!("{share:.0} % of what the outline encloses looks like bare screen{what}");
+        Diagnostic::warning(Code::ScreenLikeParts, message)
+    })
 }
 
 /// Mean of a matte where a mask is set; 0 where it is empty.

@@ -670,6 +670,12 @@ fn coloured_bars_are_no_dyed_plastic_and_their_holes_no_paint() {
     }
 }
 
+/// A person should look at the tint.
+fn is_tint_told(found: &FilmMatte) -> bool {
+    let mut diagnostics = found.diagnostics.iter();
+    diagnostics.any(|d| d.code == Code::TintUncertain && d.needs_review())
+}
+
 #[test]
 fn dark_paint_that_may_be_dark_plastic_is_told() {
     for screen in [GREEN, BLUE] {
@@ -681,11 +687,7 @@ fn dark_paint_that_may_be_dark_plastic_is_told() {
             }
             .solved();
             let [bar, hole] = Lattice::opacities(&found);
-            let is_told = found
-                .diagnostics
-                .iter()
-                .any(|d| d.code == Code::TintUncertain && d.needs_review());
-            assert!(bar > 0.9 || is_told, "{bars:?}: {bar}");
+            assert!(bar > 0.9 || is_tint_told(&found), "{bars:?}: {bar}");
             assert!(hole < 0.35, "{bars:?}: {hole}");
         }
     }
@@ -731,10 +733,6 @@ fn dyed(flat: [f32; 3], scattered: f32, screen: LinearRgb) -> FilmMatte {
 /// On a dark screen plastic reflects as much of it as paint.
 #[test]
 fn dyed_plastic_is_not_taken_for_paint_without_a_word() {
-    let is_told = |found: &FilmMatte| {
-        let mut diagnostics = found.diagnostics.iter();
-        diagnostics.any(|d| d.code == Code::TintUncertain && d.needs_review())
-    };
     let is_clear = |found: &FilmMatte| found.flat == LinearRgb::grey(CLEAR_TRANSMITTANCE);
     let [blue, brown] = [[0.2, 0.41, 0.54], [0.38, 0.21, 0.15]];
     for (flat, screen) in [(blue, GREEN), (brown, GREEN), (brown, BLUE)] {
@@ -742,7 +740,7 @@ fn dyed_plastic_is_not_taken_for_paint_without_a_word() {
         assert!(!is_clear(&ordinary), "{flat:?} on {screen:?}");
         let dark = dyed(flat, 0.04, screen.scale(0.35));
         assert!(
-            !is_clear(&dark) && is_told(&dark),
+            !is_clear(&dark) && is_tint_told(&dark),
             "{flat:?} on dark {screen:?}"
         );
     }

@@ -214,17 +214,17 @@ impl TintSamples {
     /// # Method
     /// Each hypothesis, clear or a dye of some amount, is compared with every pixel: how far it is
     /// from `u * flat * screen + f * scattered` with the best thickness factor u and reflection
-    /// f that are not negative. The lowest median wins. What surely is paint (see [`Opacity`]) has
+    /// f that are not negative. The lowest median wins. What surely is paint (see [`PaintLikelihood`]) has
     /// no dye; where paint of some colour explains the pixels as well, the tint is uncertain by all
     /// that it lets through.
     pub(super) fn fit(&self) -> Tint {
         let tried = self.hypotheses();
         let best = lowest_cost(&tried);
-        match best.opacity(&tried) {
-            Opacity::Sure => Tint::certain([CLEAR_TRANSMITTANCE; 3]),
-            Opacity::Likely => best.or_paint(&tried, [CLEAR_TRANSMITTANCE; 3]),
-            Opacity::Possible => best.or_paint(&tried, best.flat),
-            Opacity::None => best.tint(&tried),
+        match best.paint_likelihood(&tried) {
+            PaintLikelihood::Sure => Tint::certain([CLEAR_TRANSMITTANCE; 3]),
+            PaintLikelihood::Likely => best.or_paint(&tried, [CLEAR_TRANSMITTANCE; 3]),
+            PaintLikelihood::Possible => best.or_paint(&tried, best.flat),
+            PaintLikelihood::None => best.tint(&tried),
         }
     }
 
@@ -275,7 +275,7 @@ fn thinned<T>(items: Vec<T>, count: usize) -> impl Iterator<Item = T> {
 }
 
 /// How likely it is that what looks like a dye is opaque paint.
-enum Opacity {
+enum PaintLikelihood {
     None,
     /// Either explains the photo, or on a dark screen both reflect as much.
     Possible,
@@ -285,26 +285,26 @@ enum Opacity {
 }
 
 impl TintHypothesis {
-    fn opacity(&self, tried: &[Self]) -> Opacity {
+    fn paint_likelihood(&self, tried: &[Self]) -> PaintLikelihood {
         if self.flat == [CLEAR_TRANSMITTANCE; 3] {
-            Opacity::None
+            PaintLikelihood::None
         } else if self.seen.misfit > MAX_DYE_MISFIT {
             match self.is_other_dye() {
-                true => Opacity::Likely,
-                false => Opacity::Sure,
+                true => PaintLikelihood::Likely,
+                false => PaintLikelihood::Sure,
             }
         } else if self.seen.scattered > MAX_SCATTERED {
             let is_on_dark = self.seen.scattered < MAX_SCATTERED_ON_DARK;
             match is_on_dark && tried.iter().all(Self::is_unlike_paint) {
-                true => Opacity::Possible,
-                false => Opacity::Sure,
+                true => PaintLikelihood::Possible,
+                false => PaintLikelihood::Sure,
             }
         } else if self.seen.thickness < MIN_DYE_THICKNESS {
-            Opacity::Likely
+            PaintLikelihood::Likely
         } else if tried.iter().any(Self::is_like_paint) {
-            Opacity::Possible
+            PaintLikelihood::Possible
         } else {
-            Opacity::None
+            PaintLikelihood::None
         }
     }
 
