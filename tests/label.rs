@@ -7,8 +7,8 @@ use geo::Contains;
 use petcomp::camera::Camera;
 use petcomp::geom::{BBox, Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{
-    AmodalBox, DepthRange, LabelOptions, Labels, ObjectLabel, ObstructionRule, cyclic_overlaps,
-    label,
+    AmodalBox, DepthRange, LabelOptions, Labels, ObjectLabel, ObstructionRule, OutlineKind,
+    cyclic_overlaps, label,
 };
 use petcomp::scene::{Card, View};
 use petcomp::{DeepImage, DeepSample};
@@ -529,6 +529,66 @@ fn a_card_that_reaches_behind_the_camera_is_clipped_to_the_picture() {
     assert!(counted > 100.0, "the strip crosses the picture");
     assert!(off(&found.objects[0].amodal_box, &around) <= 1.0);
     assert!((area(&found.objects[0].outline_px) - counted).abs() < 0.02 * counted);
+}
+
+/// A square with a square hole of half its side, by a slit.
+const RING: [[f64; 2]; 10] = [
+    [0.0, 0.0],
+    [1.0, 0.0],
+    [1.0, 1.0],
+    [0.0, 1.0],
+    [0.0, 0.25],
+    [0.25, 0.25],
+    [0.25, 0.75],
+    [0.75, 0.75],
+    [0.75, 0.25],
+    [0.0, 0.25],
+];
+
+#[test]
+fn by_masks_nothing_in_the_hole_of_a_ring_is_under_it() {
+    // 40 pixels on the surface; the small card lies in the hole, the bar across the ring.
+    let cards = |ring: &[[f64; 2]]| {
+        shot([
+            card(1, [0.0; 3], [0.0; 3], [0.4; 2], ring),
+            card(2, [0.0, 0.0, -0.1], [0.0; 3], [0.1; 2], &WHOLE),
+            card(3, [0.0, 0.17, 0.1], [0.0; 3], [0.45, 0.02], &WHOLE),
+        ])
+    };
+    let (deep, hulls) = (cast(&cards(&RING)), cards(&WHOLE));
+    let labelled = |outline| {
+        let options = LabelOptions {
+            outline,
+            obstruction: ObstructionRule::Visibility { min_visible: 0.97 },
+            ..LabelOptions::default()
+        };
+        label(&deep, &hulls, &options).objects
+    };
+    let by_hulls = labelled(OutlineKind::Hull);
+    assert_eq!(by_hulls[1].covered_by, [ObjectId(1)]);
+    assert_eq!(by_hulls[1].uncovered_fraction, Some(0.0));
+    assert!((area(&by_hulls[0].outline_px) - 1600.0).abs() < 1e-6);
+    let by_masks = labelled(OutlineKind::Mask);
+    assert!(by_masks[1].covered_by.is_empty() && by_masks[1].is_topmost());
+    assert_eq!(by_masks[1].uncovered_fraction, Some(1.0));
+    assert_eq!(by_masks[0].covered_by, [ObjectId(3)]);
+    assert_eq!(area(&by_masks[0].outline_px), 1200.0);
+    // The bar is 2.2 pixels high there, in three rows of pixels.
+    let free = by_masks[0].uncovered_fraction.unwrap();
+    assert!((free - (1.0 - 3.0 * 40.0 / 1200.0)).abs() < 1e-9, "{free}");
+}
+
+#[test]
+fn by_masks_an_outline_cut_by_the_picture_s_edge_is_truncated_by_its_hull() {
+    let scene = shot([card(1, [0.48, 0.0, 0.0], [0.0; 3], [0.4; 2], &WHOLE)]);
+    let options = LabelOptions {
+        outline: OutlineKind::Mask,
+        max_truncation: Some(0.4),
+        ..LabelOptions::default()
+    };
+    let object = labels(&scene, &options).objects.remove(0);
+    assert_eq!(area(&object.outline_px), 800.0);
+    assert!(object.is_too_truncated(), "{:?}", object.truncation);
 }
 
 #[test]

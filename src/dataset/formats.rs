@@ -7,7 +7,9 @@ use crate::dataset::{
 };
 use crate::error::{Error, Result};
 use crate::geom::BBox;
-use crate::label::{AmodalBox, LabelOptions, ObjectLabel, ObstructionRule, RleMask};
+use crate::label::{
+    AmodalBox, LabelOptions, ObjectLabel, ObstructionRule, OutlineKind, RleMask,
+};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -29,6 +31,9 @@ pub struct LabelConfig {
     pub alpha_threshold: f32,
     /// What an amodal box is drawn around: `mask` or `outline`. Default: `mask`.
     pub amodal: AmodalBox,
+    /// What is taken for the outline of an object: `hull` or `mask`. Default: `hull`, as in the
+    /// paper.
+    pub outline: OutlineKind,
     /// How far polygons (YOLO's `segment`, COCO's `polygon`) may be from the border of a mask,
     /// pixels: fewer corners. Default: 0, along the edges of pixels.
     pub simplify: f64,
@@ -101,6 +106,7 @@ impl Default for LabelConfig {
     fn default() -> Self {
         let LabelOptions {
             amodal,
+            outline,
             alpha_threshold,
             max_truncation,
             obstruction,
@@ -111,6 +117,7 @@ impl Default for LabelConfig {
             max_truncation,
             alpha_threshold,
             amodal,
+            outline,
             simplify: 0.0,
             formats: vec![Format::Yolo],
             yolo: Yolo::default(),
@@ -142,6 +149,7 @@ impl LabelConfig {
     pub fn options(&self) -> LabelOptions {
         LabelOptions {
             amodal: self.amodal,
+            outline: self.outline,
             alpha_threshold: self.alpha_threshold,
             max_truncation: self.max_truncation,
             obstruction: self.obstruction,

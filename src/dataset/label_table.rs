@@ -1,7 +1,7 @@
 //! The table `[labels]` as files have it: one rule, of which each variant has a key of its own.
 
 use crate::dataset::{Coco, Format, LabelConfig, Layers, Mot, Obstructed, Voc, WebDataset, Yolo};
-use crate::label::{AmodalBox, ObstructionRule, RuleInFile};
+use crate::label::{AmodalBox, ObstructionRule, OutlineKind, RuleInFile};
 use serde::{Deserialize, Serialize};
 
 /// A [`LabelConfig`] by the keys of a file.
@@ -17,6 +17,8 @@ pub(super) struct LabelTable {
     max_truncation: Option<f64>,
     alpha_threshold: f32,
     amodal: AmodalBox,
+    #[serde(skip_serializing_if = "OutlineKind::is_hull")]
+    outline: OutlineKind,
     simplify: f64,
     formats: Vec<Format>,
     yolo: Yolo,
@@ -54,6 +56,7 @@ impl From<LabelConfig> for LabelTable {
             max_truncation: config.max_truncation,
             alpha_threshold: config.alpha_threshold,
             amodal: config.amodal,
+            outline: config.outline,
             simplify: config.simplify,
             formats: config.formats,
             yolo: config.yolo,
@@ -76,6 +79,7 @@ impl TryFrom<LabelTable> for LabelConfig {
             max_truncation: table.max_truncation,
             alpha_threshold: table.alpha_threshold,
             amodal: table.amodal,
+            outline: table.outline,
             simplify: table.simplify,
             formats: table.formats,
             yolo: table.yolo,

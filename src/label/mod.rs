@@ -2,7 +2,8 @@
 //!
 //! Masks, boxes and visibility are folds over the deep samples, so a label cannot disagree with its
 //! picture. Outlines and what lies over what are geometry: the cards' outlines as the camera sees
-//! them. An [`ObstructionRule`] says which of the two decides what is topmost.
+//! them, or the borders of their masks ([`OutlineKind`]). An [`ObstructionRule`] says which of the
+//! two decides what is topmost.
 //!
 //! ```
 //! use petcomp::geom::{Pose, Quad};
@@ -63,6 +64,10 @@ use geo::MultiPolygon;
 use serde::{Deserialize, Serialize};
 use visibility::ObjectVisibility;
 
+/// How far the outline that is written may be from the border of a mask, pixels: the stairs of a
+/// slanting border become a line.
+const MASK_OUTLINE_TOLERANCE_PX: f64 = 0.5;
+
 /// Everything known of the objects in one picture.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Labels {
@@ -90,8 +95,8 @@ pub struct ObjectLabel {
     pub id: ObjectId,
     /// Index into the class list.
     pub class: u32,
-    /// Outline projected into the picture and clipped to it, pixels: one ring per part that the
-    /// clipping leaves (a convex outline leaves one), none for a card seen edge-on.
+    /// Outline in the picture, pixels, by [`LabelOptions::outline`]: one ring per part (the clipping
+    /// leaves one of a convex outline), none for a card seen edge-on.
     pub outline_px: Vec<Vec<Point2<f64>>>,
     /// Box around the whole object.
     pub amodal_box: BBox,
@@ -145,6 +150,9 @@ impl ObjectLabel {
 pub struct LabelOptions {
     /// What the amodal box is drawn around. Default: `mask`.
     pub amodal: AmodalBox,
+    /// What is taken for the outline of an object. Default: `hull`.
+    #[serde(skip_serializing_if = "OutlineKind::is_hull")]
+    pub outline: OutlineKind,
     /// A pixel belongs to an object when more than this share of it is covered, 0 to less than 1;
     /// counts for masks, not for sums of coverage. Default: 0.1, under which thin film and the noise
     /// of a matte look alike.
@@ -162,6 +170,7 @@ impl Default for LabelOptions {
     fn default() -> Self {
         Self {
             amodal: AmodalBox::Mask,
+            outline: OutlineKind::Hull,
             alpha_threshold: 0.1,
             max_truncation: None,
             obstruction: ObstructionRule::default(),
@@ -176,8 +185,29 @@ pub enum AmodalBox {
     /// The pixels that the object covers, as if alone.
     #[default]
     Mask,
-    /// The projected outline, which may be wider than what can be seen of a transparent object.
+    /// The outline, which may be wider than what can be seen of a transparent object.
     Outline,
+}
+
+/// What is taken for the outline of an object: what lies over it, how much of it is free, and
+/// where it is drawn go by that.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OutlineKind {
+    /// The card's own outline, projected: of an asset its convex hull, as in the paper.
+    #[default]
+    Hull,
+    /// The border of the pixels that it covers, as if alone: without the hole of a ring and the
+    /// angle of an L, and, where film is clearer than
+    /// [`alpha_threshold`](LabelOptions::alpha_threshold), without that film.
+    Mask,
+}
+
+impl OutlineKind {
+    /// Whether it is the default, which no file has to tell.
+    pub(crate) fn is_hull(&self) -> bool {
+        *self == Self::Hull
+    }
 }
 
 /// The outline of a card as the camera sees it, clipped to the picture: one ring per part, pixels.
@@ -190,7 +220,9 @@ pub fn outline_of(card: &Card, camera: &Camera) -> Vec<Vec<Point2<f64>>> {
 /// A card as the camera sees it.
 struct Silhouette<'a> {
     card: &'a Card,
+    /// What lies inside of its outline.
     region: MultiPolygon<f64>,
+    outline_px: Vec<Vec<Point2<f64>>>,
     visibility: ObjectVisibility,
     truncation: Option<Truncation>,
 }
@@ -296,6 +328,17 @@ fn check_size(deep: &DeepImage, [width, height]: [u32; 2]) {
     );
 }
 
+fn with_rings(region: MultiPolygon<f64>) -> (MultiPolygon<f64>, Vec<Vec<Point2<f64>>>) {
+    let rings = outline::rings(&region);
+    (region, rings)
+}
+
+/// What a mask covers, to the pixel, and its border with fewer corners.
+fn mask_outline(mask: &RleMask) -> (MultiPolygon<f64>, Vec<Vec<Point2<f64>>>) {
+    let region = outline::inside(&trace::polygons(mask, 0.0));
+    (region, trace::polygons(mask, MASK_OUTLINE_TOLERANCE_PX))
+}
+
 /// All cards of a shot as its camera sees them, in order of id.
 fn silhouettes<'a>(
     deep: &DeepImage,
@@ -307,8 +350,7 @@ fn silhouettes<'a>(
     let visibilities = visibility::fold_samples(deep, &ids, options);
     let pairs = cards.into_iter().zip(visibilities);
     pairs
-        .map(|(card, visibility)| Silhouette::new(card, shot, visibility))
-        .map(|silhouette| silhouette.measured(shot, options.max_truncation))
+        .map(|(card, visibility)| Silhouette::new(card, shot, visibility, options))
         .collect()
 }
 
@@ -319,21 +361,26 @@ fn cards_by_id(shot: &Shot) -> Vec<&Card> {
 }
 
 impl<'a> Silhouette<'a> {
-    fn new(card: &'a Card, shot: &Shot, visibility: ObjectVisibility) -> Self {
+    fn new(
+        card: &'a Card,
+        shot: &Shot,
+        visibility: ObjectVisibility,
+        options: &LabelOptions,
+    ) -> Self {
+        let hull = outline::region(card, &shot.camera, &shot.distortion());
+        let truncation = options
+            .max_truncation
+            .map(|max| Truncation::new(card, shot, &hull, max));
+        let (region, outline_px) = match options.outline {
+            OutlineKind::Hull => with_rings(hull),
+            OutlineKind::Mask => mask_outline(&visibility.amodal),
+        };
         Self {
             card,
-            region: outline::region(card, &shot.camera, &shot.distortion()),
+            region,
+            outline_px,
             visibility,
-            truncation: None,
-        }
-    }
-
-    /// The same with its truncation, where there is a most.
-    fn measured(self, shot: &Shot, max_truncation: Option<f64>) -> Self {
-        Self {
-            truncation: max_truncation
-                .map(|max| Truncation::new(self.card, shot, &self.region, max)),
-            ..self
+            truncation,
         }
     }
 
@@ -351,7 +398,7 @@ impl<'a> Silhouette<'a> {
         ObjectLabel {
             id: self.card.id,
             class,
-            outline_px: outline::rings(&self.region),
+            outline_px: self.outline_px,
             amodal_box,
             visible_box: seen.visible.bounds(),
             visible_fraction: seen.fraction,
@@ -368,7 +415,7 @@ impl<'a> Silhouette<'a> {
         let seen = self.visibility;
         Distractor {
             id: self.card.id,
-            outline_px: outline::rings(&self.region),
+            outline_px: self.outline_px,
             amodal_box,
             visible_box: seen.visible.bounds(),
             visible_fraction: seen.fraction,

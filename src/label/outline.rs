@@ -56,6 +56,14 @@ pub(crate) fn whole(card: &Card, camera: &Camera, lens: &RadialDistortion) -> Mu
     without_slivers(unwound(&px)).collect()
 }
 
+/// What lies inside of polygons that do not cross; slits of no width lead to holes.
+pub(crate) fn inside(polygons: &[Vec<Point2<f64>>]) -> MultiPolygon<f64> {
+    let coords = |ring: &Vec<Point2<f64>>| -> Vec<_> {
+        ring.iter().map(|p| Coord { x: p.x, y: p.y }).collect()
+    };
+    polygons.iter().flat_map(|p| unwound(&coords(p))).collect()
+}
+
 /// The outline of the part in view, pixels.
 fn projected(card: &Card, camera: &Camera, lens: &RadialDistortion) -> Vec<Coord<f64>> {
     let bounds = lens.undistorted_bounds();

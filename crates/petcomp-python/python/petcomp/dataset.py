@@ -87,7 +87,7 @@ def generate(
     from several threads, in no fixed order, and must depend on nothing but ``k``; ``classes`` are then
     needed, beginning with those of its samples, and ``labels``, ``pictures`` and ``split`` are the tables of
     a recipe, but for what acts when labels are made: ``overlap_iou``, ``min_visible``, ``max_truncation``,
-    ``amodal`` and, but for layers, ``alpha_threshold`` belong to the recipe or the ``Shot`` of the samples.
+    ``amodal``, ``outline`` and, but for layers, ``alpha_threshold`` belong to the recipe or the ``Shot`` of the samples.
 
     ``only`` makes image ``only`` alone, ``shard=(i, n)`` every ``n``-th from the ``i``-th (1 to ``n``), in a
     folder of its own below. ``progress`` is called in the calling thread, at the start and after each
@@ -113,7 +113,7 @@ def generate(
 
 
 #: Keys of the table ``labels`` that act when labels are made.
-_OF_MAKING = ("overlap_iou", "min_visible", "max_truncation", "alpha_threshold", "amodal")
+_OF_MAKING = ("overlap_iou", "min_visible", "max_truncation", "alpha_threshold", "amodal", "outline")
 
 
 def _check_acts(set: Any, quality: Any, labels: Any) -> None:
