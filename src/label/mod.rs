@@ -66,7 +66,7 @@ use visibility::ObjectVisibility;
 
 /// How far the outline that is written may be from the border of a mask, pixels: the stairs of a
 /// slanting border become a line.
-const MASK_OUTLINE_TOLERANCE_PX: f64 = 0.5;
+const MASK_OUTLINE_TOLERANCE_PX: f64 = 1.0;
 
 /// Everything known of the objects in one picture.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
