@@ -52,13 +52,6 @@ TypeDesc of_bytes(int bytes) {
     }
 }
 
-// Alpha is handed over as the file has it: the library would multiply display-encoded values.
-ImageSpec as_it_is() {
-    ImageSpec config;
-    config.attribute("oiio:UnassociatedAlpha", 1);
-    return config;
-}
-
 size_t bytes_of(const ImageSpec &spec, TypeDesc type) {
     return size_t(spec.width) * size_t(spec.height) * size_t(spec.nchannels) * type.size();
 }
@@ -110,7 +103,9 @@ std::unique_ptr<Reader> open(rust::Str path, rust::Str format, rust::Slice<const
     if (!input)
         fail(OIIO::geterror(), "no reader for this format");
     input->threads(1);
-    ImageSpec config = as_it_is();
+    // Alpha is handed over as the file has it: the library would multiply display-encoded values.
+    ImageSpec config;
+    config.attribute("oiio:UnassociatedAlpha", 1);
     std::unique_ptr<IOMemReader> memory;
     if (input->supports("ioproxy")) {
         memory = std::make_unique<IOMemReader>(const_cast<uint8_t *>(bytes.data()), bytes.size());

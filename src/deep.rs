@@ -72,8 +72,6 @@ impl Mix for SeenBehind {
 /// have none and pay for none.
 #[derive(Clone, Debug, Default)]
 pub struct DeepImage {
-    width: usize,
-    height: usize,
     /// Squares of `1 << tile_bits` pixels a side, row by row; smaller ones at the picture's ends.
     tiles: Vec<DeepTile>,
     tile_bits: u32,
@@ -99,8 +97,6 @@ impl DeepImage {
             "one list of samples per pixel"
         );
         Self {
-            width,
-            height,
             tiles: vec![all],
             tile_bits: width.max(height).next_power_of_two().trailing_zeros(),
             shadow,
@@ -122,8 +118,6 @@ impl DeepImage {
             "one tile per square"
         );
         Self {
-            width,
-            height,
             tiles,
             tile_bits: side.trailing_zeros(),
             shadow,
@@ -148,8 +142,8 @@ impl DeepImage {
         }
         // Row by row is the order of each tile too.
         let mut tints = tints.into_iter();
-        for y in 0..self.height {
-            for x in 0..self.width {
+        for y in 0..self.height() {
+            for x in 0..self.width() {
                 let (tile, range) = self.place(x, y);
                 let own = tints.by_ref().take(range.len());
                 self.tiles[tile].tints.extend(own);
@@ -159,13 +153,14 @@ impl DeepImage {
     }
 
     /// Number of columns.
+    #[inline(always)]
     pub fn width(&self) -> usize {
-        self.width
+        self.shadow.width()
     }
 
     /// Number of rows.
     pub fn height(&self) -> usize {
-        self.height
+        self.shadow.height()
     }
 
     /// The samples of one pixel, front to back.
@@ -193,7 +188,7 @@ impl DeepImage {
     /// The same pixels: the tile of each, and where its samples are there.
     fn row_places(&self, y: usize) -> impl Iterator<Item = (usize, &DeepTile, Range<usize>)> {
         let side = 1 << self.tile_bits;
-        let across = self.width.div_ceil(side);
+        let across = self.width().div_ceil(side);
         let tiles = self.tiles.chunks(across).nth(y >> self.tile_bits);
         let tiles = tiles.unwrap_or_default().iter().enumerate();
         tiles.flat_map(move |(n, tile)| {
@@ -232,7 +227,7 @@ impl DeepImage {
     #[inline(always)]
     fn place(&self, x: usize, y: usize) -> (usize, Range<usize>) {
         let side = 1 << self.tile_bits;
-        let across = (self.width + side - 1) >> self.tile_bits;
+        let across = (self.width() + side - 1) >> self.tile_bits;
         let tile = (y >> self.tile_bits) * across + (x >> self.tile_bits);
         let inside = self.tiles[tile].range_at(x & (side - 1), y & (side - 1));
         (tile, inside)
@@ -243,7 +238,8 @@ impl DeepImage {
         self,
         f: impl Fn(usize, usize, LinearRgb) -> LinearRgb + Sync,
     ) -> Self {
-        let shadow = Image::from_fn(self.width, self.height, |x, y| f(x, y, self.shadow[(x, y)]));
+        let (width, height) = self.shadow.size();
+        let shadow = Image::from_fn(width, height, |x, y| f(x, y, self.shadow[(x, y)]));
         Self { shadow, ..self }
     }
 
@@ -257,10 +253,10 @@ impl DeepImage {
         let Some(holdout) = holdout else {
             return self;
         };
-        let size = (self.width, self.height);
+        let size = self.shadow.size();
         assert_eq!(holdout.size(), size, "holdout and picture differ in size");
-        for y in 0..self.height {
-            for x in 0..self.width {
+        for y in 0..self.height() {
+            for x in 0..self.width() {
                 self.hold_out_pixel(x, y, &holdout[(x, y)]);
             }
         }
@@ -319,8 +315,8 @@ impl DeepImage {
         plate: Option<&Image<LinearRgb>>,
         extra: impl Fn(ObjectId, usize, usize) -> Option<SeenBehind>,
     ) -> Self {
-        for y in 0..self.height {
-            for x in 0..self.width {
+        for y in 0..self.height() {
+            for x in 0..self.width() {
                 let changed = |s: &DeepSample| extra(s.object, x, y).is_some();
                 if self.at(x, y).iter().any(changed) {
                     self.add_from_behind([x, y], plate, |s| extra(s.object, x, y));
@@ -371,7 +367,8 @@ impl DeepImage {
         if !self.displaces() {
             return Cow::Borrowed(plate);
         }
-        Cow::Owned(Image::from_fn(self.width, self.height, |x, y| {
+        let (width, height) = self.shadow.size();
+        Cow::Owned(Image::from_fn(width, height, |x, y| {
             self.displaced_plate_at(x, y, plate)
         }))
     }

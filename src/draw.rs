@@ -175,43 +175,24 @@ impl Segment {
     }
 }
 
-/// Height of text.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum TextSize {
-    /// Lines of 16 pixels.
-    Small,
-    /// Lines of 24 pixels.
-    Large,
+/// Height of a line of text, pixels.
+pub(crate) const LINE_PX: usize = 16;
+const RASTER_HEIGHT: RasterHeight = RasterHeight::Size16;
+
+/// Width of a text, pixels.
+pub(crate) fn text_width(text: &str) -> usize {
+    text.chars().count() * get_raster_width(FontWeight::Regular, RASTER_HEIGHT)
 }
 
-impl TextSize {
-    fn raster(self) -> RasterHeight {
-        match self {
-            Self::Small => RasterHeight::Size16,
-            Self::Large => RasterHeight::Size24,
-        }
-    }
-
-    /// A letter of the font, which has those of European languages with Latin script.
-    fn glyph(self, letter: char) -> Option<RasterizedChar> {
-        get_raster(letter, FontWeight::Regular, self.raster())
-    }
-
-    /// Height of a line, pixels.
-    pub(crate) fn height(self) -> usize {
-        self.raster().val()
-    }
-
-    /// Width of a text, pixels.
-    pub(crate) fn width(self, text: &str) -> usize {
-        text.chars().count() * get_raster_width(FontWeight::Regular, self.raster())
-    }
+/// A letter of the font, which has those of European languages with Latin script.
+fn glyph(letter: char) -> Option<RasterizedChar> {
+    get_raster(letter, FontWeight::Regular, RASTER_HEIGHT)
 }
 
 /// The lines of a text that has room for `width` pixels, broken between words, and within those
 /// that are longer.
-pub(crate) fn wrapped(text: &str, width: usize, size: TextSize) -> Vec<String> {
-    let room = (width / size.width("m").max(1)).max(1);
+pub(crate) fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let room = (width / text_width("m").max(1)).max(1);
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {
         let letters: Vec<char> = word.chars().collect();
@@ -239,16 +220,10 @@ fn append_word(line: &mut String, word: &[char], room: usize) -> bool {
 }
 
 /// A line of text with its top left corner at a point; letters that are not Latin become `?`.
-pub(crate) fn text(
-    canvas: &mut Image<Srgb8>,
-    [x, y]: [isize; 2],
-    line: &str,
-    color: Srgb8,
-    size: TextSize,
-) {
-    let advance = get_raster_width(FontWeight::Regular, size.raster()) as isize;
+pub(crate) fn text(canvas: &mut Image<Srgb8>, [x, y]: [isize; 2], line: &str, color: Srgb8) {
+    let advance = text_width("m") as isize;
     for (i, letter) in line.chars().enumerate() {
-        let glyph = size.glyph(letter).or_else(|| size.glyph('?'));
+        let glyph = glyph(letter).or_else(|| glyph('?'));
         let left = x + i as isize * advance;
         for (v, row) in glyph.iter().flat_map(|glyph| glyph.rows().enumerate()) {
             for (u, &ink) in row.iter().enumerate().filter(|&(_, &ink)| ink > 0) {
@@ -263,13 +238,11 @@ pub(crate) fn text(
 mod tests {
     use super::*;
 
-    fn black(w: usize, h: usize) -> Image<Srgb8> {
-        Image::new(w, h)
-    }
+    const WHITE: Srgb8 = rgb(255, 255, 255);
 
     #[test]
     fn a_border_covers_its_outermost_pixels_and_nothing_inside() {
-        let mut canvas = black(12, 10);
+        let mut canvas = Image::new(12, 10);
         border(
             &mut canvas,
             &BBox {
@@ -294,7 +267,7 @@ mod tests {
 
     #[test]
     fn drawing_outside_the_canvas_draws_nothing() {
-        let mut canvas = black(8, 8);
+        let mut canvas = Image::new(8, 8);
         border(
             &mut canvas,
             &BBox {
@@ -309,20 +282,10 @@ mod tests {
         outline(
             &mut canvas,
             &[Point2::new(-1e9, -1e9), Point2::new(1e9, -1e9)],
-            rgb(255, 255, 255),
+            WHITE,
         );
-        text(
-            &mut canvas,
-            [-40, 100],
-            "out of sight",
-            rgb(255, 255, 255),
-            TextSize::Large,
-        );
-        paste(
-            &mut canvas,
-            [20, 20],
-            &Image::filled(4, 4, rgb(255, 255, 255)),
-        );
+        text(&mut canvas, [-40, 100], "out of sight", WHITE);
+        paste(&mut canvas, [20, 20], &Image::filled(4, 4, WHITE));
         assert!(canvas.pixels().iter().all(|p| p.r < 10));
     }
 
@@ -341,32 +304,26 @@ mod tests {
 
     #[test]
     fn text_stays_within_its_width() {
-        let width = TextSize::Small.width("0123456789");
-        let lines = |text| wrapped(text, width, TextSize::Small);
+        let width = text_width("0123456789");
+        let lines = |text| wrapped(text, width);
         assert_eq!(lines("two words or more"), ["two words", "or more"]);
         assert_eq!(lines("a 0123456789abc z"), ["a", "0123456789", "abc z"]);
         assert_eq!(
-            (lines(""), wrapped("ab", 0, TextSize::Large)),
+            (lines(""), wrapped("ab", 0)),
             (vec![String::new()], vec!["a".into(), "b".into()])
         );
         assert!(
             lines("none is longer than there is room for")
                 .iter()
-                .all(|l| TextSize::Small.width(l) <= width)
+                .all(|l| text_width(l) <= width)
         );
     }
 
     #[test]
     fn letters_beyond_ascii_take_a_place() {
-        let mut canvas = black(60, 20);
-        text(
-            &mut canvas,
-            [0, 0],
-            "öß",
-            rgb(255, 255, 255),
-            TextSize::Small,
-        );
+        let mut canvas = Image::new(60, 20);
+        text(&mut canvas, [0, 0], "öß", WHITE);
         assert!(canvas.pixels().iter().any(|p| p.r > 128));
-        assert_eq!(TextSize::Small.width("öß"), TextSize::Small.width("ab"));
+        assert_eq!(text_width("öß"), text_width("ab"));
     }
 }

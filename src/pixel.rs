@@ -258,12 +258,7 @@ impl LinearRgb {
     /// The colour as a fully covering pixel.
     #[inline(always)]
     pub fn opaque(self) -> PremulRgba {
-        PremulRgba {
-            r: self.r,
-            g: self.g,
-            b: self.b,
-            a: 1.0,
-        }
+        PremulRgba::new(self.r, self.g, self.b, 1.0)
     }
 }
 
@@ -298,12 +293,7 @@ impl From<LinearRgb> for [f32; 3] {
 
 impl PremulRgba {
     /// Nothing at all.
-    pub const TRANSPARENT: Self = Self {
-        r: 0.0,
-        g: 0.0,
-        b: 0.0,
-        a: 0.0,
-    };
+    pub const TRANSPARENT: Self = Self::new(0.0, 0.0, 0.0, 0.0);
 
     /// A pixel from colour that is already multiplied by `a`.
     #[inline(always)]
@@ -388,11 +378,7 @@ impl Film {
     #[inline(always)]
     pub fn to_rgba(self) -> PremulRgba {
         let LinearRgb { r, g, b } = self.opacity;
-        let a = if r == g && g == b {
-            r
-        } else {
-            (r + g + b) / 3.0
-        };
+        let a = if self.is_grey() { r } else { (r + g + b) / 3.0 };
         PremulRgba::new(self.color.r, self.color.g, self.color.b, a)
     }
 
@@ -415,10 +401,8 @@ impl Film {
     /// Every channel is finite and every opacity between 0 and 1: what a texture may hold.
     #[inline(always)]
     pub fn is_sound(self) -> bool {
-        self.color.is_finite()
-            && <[f32; 3]>::from(self.opacity)
-                .iter()
-                .all(|o| (0.0..=1.0).contains(o))
+        let mut opacities = self.opacity.channels().into_iter();
+        self.color.is_finite() && opacities.all(|o| (0.0..=1.0).contains(&o))
     }
 }
 

@@ -5,12 +5,6 @@
 //! (the prototype), with other random views; hence the slack.
 
 #![cfg(feature = "pipeline")]
-#![cfg(feature = "pipeline")]
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "helpers of tests are tests"
-)]
 
 use petcomp::Code;
 use petcomp::camera::simulate::{Scenario, View};
@@ -35,13 +29,14 @@ impl Spread {
         Self::of((0..VIEWS).map(|k| value(scenario.view(1, k))).collect())
     }
 
-    fn within(self, table: Self, what: &str) {
-        println!(
-            "{what}: {:.3} / {:.3}, table {} / {}",
-            self.0, self.1, table.0, table.1
-        );
+    fn within(self, table: [f64; 2], what: &str) {
+        self.within_times(SLACK, table, what);
+    }
+
+    fn within_times(self, slack: f64, table: [f64; 2], what: &str) {
+        println!("{what}: {:.3} / {:.3}, table {table:?}", self.0, self.1);
         assert!(
-            self.0 <= SLACK * table.0 && self.1 <= SLACK * table.1,
+            self.0 <= slack * table[0] && self.1 <= slack * table[1],
             "{what}: {self:?} exceeds {table:?}"
         );
     }
@@ -60,6 +55,10 @@ fn solve(view: &View, options: &SolveOptions) -> Solution {
 
 fn focal_percent(view: &View, solution: &Solution) -> f64 {
     100.0 * (solution.camera.focal_px.x / view.camera.focal_px.x - 1.0).abs()
+}
+
+fn ideal_focal_percent(view: View) -> f64 {
+    focal_percent(&view, &solve(&view, &ideal()))
 }
 
 /// The view with an EXIF value that is off by as much as they usually are.
@@ -85,103 +84,27 @@ fn with_stated_exif(view: View, scenario: &Scenario, k: u64) -> View {
 #[test]
 fn ideal_cameras_reach_the_table() {
     // Section 15.2: corner noise 0.1, 0.5, 1, 2 px.
+    let tilts = [2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 80.0];
     let table = [
-        (
-            2.0,
-            [
-                Spread(5.7, 17.0),
-                Spread(29.0, 84.0),
-                Spread(53.0, 102.0),
-                Spread(78.0, 187.0),
-            ],
-        ),
-        (
-            5.0,
-            [
-                Spread(0.92, 2.9),
-                Spread(4.7, 14.0),
-                Spread(9.1, 30.0),
-                Spread(18.0, 77.0),
-            ],
-        ),
-        (
-            10.0,
-            [
-                Spread(0.25, 0.80),
-                Spread(1.2, 3.9),
-                Spread(2.4, 7.5),
-                Spread(5.0, 15.0),
-            ],
-        ),
-        (
-            15.0,
-            [
-                Spread(0.12, 0.37),
-                Spread(0.57, 1.8),
-                Spread(1.1, 3.7),
-                Spread(2.2, 7.6),
-            ],
-        ),
-        (
-            20.0,
-            [
-                Spread(0.073, 0.23),
-                Spread(0.38, 1.2),
-                Spread(0.75, 2.4),
-                Spread(1.5, 4.6),
-            ],
-        ),
-        (
-            30.0,
-            [
-                Spread(0.042, 0.14),
-                Spread(0.21, 0.66),
-                Spread(0.39, 1.3),
-                Spread(0.80, 2.6),
-            ],
-        ),
-        (
-            45.0,
-            [
-                Spread(0.026, 0.086),
-                Spread(0.13, 0.45),
-                Spread(0.26, 0.92),
-                Spread(0.52, 1.8),
-            ],
-        ),
-        (
-            60.0,
-            [
-                Spread(0.022, 0.083),
-                Spread(0.11, 0.43),
-                Spread(0.22, 0.80),
-                Spread(0.46, 1.7),
-            ],
-        ),
-        (
-            80.0,
-            [
-                Spread(0.022, 0.087),
-                Spread(0.12, 0.50),
-                Spread(0.22, 1.0),
-                Spread(0.42, 1.7),
-            ],
-        ),
+        [[5.7, 17.0], [29.0, 84.0], [53.0, 102.0], [78.0, 187.0]],
+        [[0.92, 2.9], [4.7, 14.0], [9.1, 30.0], [18.0, 77.0]],
+        [[0.25, 0.80], [1.2, 3.9], [2.4, 7.5], [5.0, 15.0]],
+        [[0.12, 0.37], [0.57, 1.8], [1.1, 3.7], [2.2, 7.6]],
+        [[0.073, 0.23], [0.38, 1.2], [0.75, 2.4], [1.5, 4.6]],
+        [[0.042, 0.14], [0.21, 0.66], [0.39, 1.3], [0.80, 2.6]],
+        [[0.026, 0.086], [0.13, 0.45], [0.26, 0.92], [0.52, 1.8]],
+        [[0.022, 0.083], [0.11, 0.43], [0.22, 0.80], [0.46, 1.7]],
+        [[0.022, 0.087], [0.12, 0.50], [0.22, 1.0], [0.42, 1.7]],
     ];
-    for (tilt, row) in table {
+    for (tilt, row) in tilts.into_iter().zip(table) {
         for (corner_sigma_px, expected) in [0.1, 0.5, 1.0, 2.0].into_iter().zip(row) {
             let scenario = Scenario {
                 corner_sigma_px,
                 ..Scenario::default()
             }
             .tilted(tilt);
-            let found = Spread::over(&scenario, |view| {
-                focal_percent(&view, &solve(&view, &ideal()))
-            });
-            found.within(
-                expected,
-                &format!("focal %, ideal, {tilt} degrees, {corner_sigma_px} px"),
-            );
+            let what = format!("focal %, ideal, {tilt} degrees, {corner_sigma_px} px");
+            Spread::over(&scenario, ideal_focal_percent).within(expected, &what);
         }
     }
 }
@@ -217,81 +140,18 @@ fn realistic(tilt: f64, belief: &Belief) -> Vec<(Solution, View)> {
 #[test]
 fn realistic_cameras_reach_the_table() {
     // Section 15.3: beliefs ideal and default, without EXIF; the same with EXIF.
+    let tilts = [0.0, 5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0];
     let table = [
-        (
-            0.0,
-            [
-                Spread(25.0, 927.0),
-                Spread(25.0, 27.0),
-                Spread(3.6, 9.0),
-                Spread(3.7, 9.1),
-            ],
-        ),
-        (
-            5.0,
-            [
-                Spread(25.0, 62.0),
-                Spread(13.0, 41.0),
-                Spread(5.1, 16.0),
-                Spread(3.7, 11.0),
-            ],
-        ),
-        (
-            10.0,
-            [
-                Spread(7.9, 28.0),
-                Spread(6.0, 19.0),
-                Spread(5.5, 18.0),
-                Spread(2.6, 8.5),
-            ],
-        ),
-        (
-            15.0,
-            [
-                Spread(3.8, 14.0),
-                Spread(3.4, 12.0),
-                Spread(3.5, 12.0),
-                Spread(2.6, 6.9),
-            ],
-        ),
-        (
-            20.0,
-            [
-                Spread(2.6, 8.4),
-                Spread(2.4, 7.5),
-                Spread(2.5, 8.1),
-                Spread(1.9, 5.8),
-            ],
-        ),
-        (
-            30.0,
-            [
-                Spread(1.5, 4.8),
-                Spread(1.3, 4.7),
-                Spread(1.4, 4.7),
-                Spread(1.3, 4.5),
-            ],
-        ),
-        (
-            45.0,
-            [
-                Spread(0.9, 2.4),
-                Spread(0.9, 2.2),
-                Spread(0.9, 2.4),
-                Spread(0.8, 2.3),
-            ],
-        ),
-        (
-            60.0,
-            [
-                Spread(0.6, 2.1),
-                Spread(0.5, 1.8),
-                Spread(0.6, 2.1),
-                Spread(0.5, 1.7),
-            ],
-        ),
+        [[25.0, 927.0], [25.0, 27.0], [3.6, 9.0], [3.7, 9.1]],
+        [[25.0, 62.0], [13.0, 41.0], [5.1, 16.0], [3.7, 11.0]],
+        [[7.9, 28.0], [6.0, 19.0], [5.5, 18.0], [2.6, 8.5]],
+        [[3.8, 14.0], [3.4, 12.0], [3.5, 12.0], [2.6, 6.9]],
+        [[2.6, 8.4], [2.4, 7.5], [2.5, 8.1], [1.9, 5.8]],
+        [[1.5, 4.8], [1.3, 4.7], [1.4, 4.7], [1.3, 4.5]],
+        [[0.9, 2.4], [0.9, 2.2], [0.9, 2.4], [0.8, 2.3]],
+        [[0.6, 2.1], [0.5, 1.8], [0.6, 2.1], [0.5, 1.7]],
     ];
-    for (tilt, row) in table {
+    for (tilt, row) in tilts.into_iter().zip(table) {
         for ((exif, ideal), expected) in
             [(false, true), (false, false), (true, true), (true, false)]
                 .into_iter()
@@ -299,10 +159,8 @@ fn realistic_cameras_reach_the_table() {
         {
             let solved = realistic(tilt, &Belief { exif, ideal });
             let found = Spread::of(solved.iter().map(|(s, v)| focal_percent(v, s)).collect());
-            found.within(
-                expected,
-                &format!("focal %, realistic, {tilt} degrees, exif {exif}, ideal {ideal}"),
-            );
+            let what = format!("focal %, realistic, {tilt} degrees, exif {exif}, ideal {ideal}");
+            found.within(expected, &what);
         }
     }
 }
@@ -351,9 +209,9 @@ fn realistic_cameras_know_how_sure_they_are() {
 fn a_tilt_about_a_side_is_nothing_special() {
     // Section 15.5: one pair of sides stays parallel.
     for (tilt, expected) in [
-        (10.0, Spread(1.1, 3.7)),
-        (20.0, Spread(0.33, 1.1)),
-        (45.0, Spread(0.13, 0.37)),
+        (10.0, [1.1, 3.7]),
+        (20.0, [0.33, 1.1]),
+        (45.0, [0.13, 0.37]),
     ] {
         for azimuth in [0.0, std::f64::consts::FRAC_PI_2] {
             let scenario = Scenario {
@@ -362,13 +220,8 @@ fn a_tilt_about_a_side_is_nothing_special() {
                 ..Scenario::default()
             }
             .tilted(tilt);
-            let found = Spread::over(&scenario, |view| {
-                focal_percent(&view, &solve(&view, &ideal()))
-            });
-            found.within(
-                expected,
-                &format!("focal %, about a side ({azimuth:.2}), {tilt} degrees"),
-            );
+            let what = format!("focal %, about a side ({azimuth:.2}), {tilt} degrees");
+            Spread::over(&scenario, ideal_focal_percent).within(expected, &what);
         }
     }
 }
@@ -378,18 +231,17 @@ fn a_known_focal_length_gives_the_pose_of_the_table() {
     // Section 15.2, last paragraph: degrees of the normal, position in % of the distance, mm at the
     // surface, px at 50 mm.
     for (tilt, normal, position) in [
-        (0.0, Spread(0.15, 0.34), Spread(0.28, 0.64)),
-        (20.0, Spread(0.11, 0.26), Spread(0.22, 0.49)),
-        (60.0, Spread(0.05, 0.12), Spread(0.09, 0.22)),
+        (0.0, [0.15, 0.34], [0.28, 0.64]),
+        (20.0, [0.11, 0.26], [0.22, 0.49]),
+        (60.0, [0.05, 0.12], [0.09, 0.22]),
     ] {
         let scenario = Scenario {
             corner_sigma_px: 1.0,
             ..Scenario::default()
         }
         .tilted(tilt);
-        let known = |mut view: View| {
-            view.label.camera.focal_px = Some(view.camera.focal_px.x);
-            view.label.camera.focal_fixed = true;
+        let known = |view: View| {
+            let view = with_focal(view);
             (solve(&view, &ideal()).camera, view.camera)
         };
         let degrees = |view: View| {
@@ -424,9 +276,7 @@ fn a_known_focal_length_gives_the_surface_and_the_heights_of_the_table() {
         }
         .tilted(tilt);
         let errors = (0..VIEWS).map(|k| {
-            let mut view = scenario.view(1, k);
-            (view.label.camera.focal_px, view.label.camera.focal_fixed) =
-                (Some(view.camera.focal_px.x), true);
+            let view = with_focal(scenario.view(1, k));
             let solution = solve(&view, &ideal());
             (
                 surface_error_mm(&view, &solution),
@@ -468,16 +318,10 @@ fn an_unknown_side_comes_out_of_the_picture() {
     // Section 15.6, realistic camera, error of the ratio in %: focal length known, by EXIF, not
     // known.
     let table = [
-        (0.0, [Spread(0.1, 0.2), Spread(0.1, 0.2), Spread(0.1, 0.2)]),
-        (
-            10.0,
-            [Spread(0.14, 0.34), Spread(0.14, 0.4), Spread(0.2, 1.0)],
-        ),
-        (
-            20.0,
-            [Spread(0.23, 0.6), Spread(0.3, 0.8), Spread(0.4, 2.0)],
-        ),
-        (60.0, [Spread(0.4, 1.1), Spread(0.9, 3.3), Spread(1.0, 5.2)]),
+        (0.0, [[0.1, 0.2], [0.1, 0.2], [0.1, 0.2]]),
+        (10.0, [[0.14, 0.34], [0.14, 0.4], [0.2, 1.0]]),
+        (20.0, [[0.23, 0.6], [0.3, 0.8], [0.4, 2.0]]),
+        (60.0, [[0.4, 1.1], [0.9, 3.3], [1.0, 5.2]]),
     ];
     for (tilt, row) in table {
         let scenario = Scenario {
@@ -510,11 +354,8 @@ fn an_unknown_side_comes_out_of_the_picture() {
             } else {
                 1.0
             };
-            let expected = Spread(expected.0, expected.1 * tail);
-            found.within(
-                expected,
-                &format!("ratio %, {tilt} degrees, focal length {known}"),
-            );
+            let what = format!("ratio %, {tilt} degrees, focal length {known}");
+            found.within([expected[0], expected[1] * tail], &what);
         }
     }
 }
@@ -526,16 +367,25 @@ fn deviate(i: u64, k: u64) -> f64 {
     off / scenario.principal_sigma_px
 }
 
+/// What is told of a view, and of its number.
+type Hint = Box<dyn Fn(View, u64) -> View>;
+
 /// The height of the lens, measured with a relative error.
-fn with_height(mut view: View, sigma: f64, k: u64) -> View {
-    let height = view.camera.center().z;
-    view.label.camera.height_m = Some(height * (1.0 + sigma * deviate(0, k)));
-    view.label.camera.height_sigma_m = Some(sigma * height);
-    view
+fn height_to(sigma: f64) -> Hint {
+    Box::new(move |mut view: View, k| {
+        let height = view.camera.center().z;
+        view.label.camera.height_m = Some(height * (1.0 + sigma * deviate(0, k)));
+        view.label.camera.height_sigma_m = Some(sigma * height);
+        view
+    })
 }
 
 /// The corners of a rim above the rectangle, measured with the same tape as its sides and clicked
 /// as well as its corners.
+fn points_at(height: f64) -> Hint {
+    Box::new(move |view, k| with_rim(view, height, k))
+}
+
 fn with_rim(mut view: View, height: f64, k: u64) -> View {
     let [w, h] = [view.label.surface.width_m, view.label.surface.height_m].map(Option::unwrap);
     for (i, [x, y]) in [[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]]
@@ -562,52 +412,26 @@ fn with_rim(mut view: View, height: f64, k: u64) -> View {
 fn hints_from_straight_above_are_worth_what_the_table_says() {
     // Section 10: error of the focal length in %, and px at 50 mm (95 %).
     let scenario = Scenario::realistic();
-    type Hint = fn(View, u64) -> View;
-    let table: [(&str, Hint, Spread, f64); 9] = [
-        ("nothing", |v, _| v, Spread(25.0, 26.0), 16.0),
+    let table: [(&str, Hint, [f64; 2], f64); 9] = [
+        ("nothing", Box::new(|v, _| v), [25.0, 26.0], 16.0),
         (
             "EXIF to 5 %",
-            |v, k| with_exif(v, &Scenario::realistic(), k),
-            Spread(3.9, 11.0),
+            Box::new(|v, k| with_exif(v, &Scenario::realistic(), k)),
+            [3.9, 11.0],
             7.0,
         ),
+        ("height to 10 %", height_to(0.1), [5.5, 18.0], 11.0),
+        ("height to 3 %", height_to(0.03), [2.3, 5.5], 4.6),
+        ("height to 1 %", height_to(0.01), [0.7, 2.0], 4.2),
+        ("points at 20 mm", points_at(0.02), [2.0, 5.4], 4.0),
+        ("points at 50 mm", points_at(0.05), [0.7, 2.7], 3.3),
+        ("points at 100 mm", points_at(0.1), [0.4, 1.2], 3.2),
         (
-            "height to 10 %",
-            |v, k| with_height(v, 0.1, k),
-            Spread(5.5, 18.0),
-            11.0,
-        ),
-        (
-            "height to 3 %",
-            |v, k| with_height(v, 0.03, k),
-            Spread(2.3, 5.5),
-            4.6,
-        ),
-        (
-            "height to 1 %",
-            |v, k| with_height(v, 0.01, k),
-            Spread(0.7, 2.0),
+            "focal length",
+            Box::new(|v, _| with_focal(v)),
+            [0.0, 0.0],
             4.2,
         ),
-        (
-            "points at 20 mm",
-            |v, k| with_rim(v, 0.02, k),
-            Spread(2.0, 5.4),
-            4.0,
-        ),
-        (
-            "points at 50 mm",
-            |v, k| with_rim(v, 0.05, k),
-            Spread(0.7, 2.7),
-            3.3,
-        ),
-        (
-            "points at 100 mm",
-            |v, k| with_rim(v, 0.1, k),
-            Spread(0.4, 1.2),
-            3.2,
-        ),
-        ("focal length", |v, _| with_focal(v), Spread(0.0, 0.0), 4.2),
     ];
     for (what, hint, focal, height) in table {
         let errors = (0..VIEWS).map(|k| {
@@ -620,7 +444,7 @@ fn hints_from_straight_above_are_worth_what_the_table_says() {
         });
         let (found_focal, found_height): (Vec<f64>, Vec<f64>) = errors.unzip();
         // A known value comes back to the last bit but a few.
-        let expected = Spread(focal.0.max(1e-9), focal.1.max(1e-9));
+        let expected = focal.map(|percent| percent.max(1e-9));
         Spread::of(found_focal).within(expected, &format!("focal %, {what}"));
         let most = Spread::of(found_height).1;
         println!("px at 50 mm, {what}: {most:.2}, table {height}");
@@ -630,8 +454,8 @@ fn hints_from_straight_above_are_worth_what_the_table_says() {
 
 /// The focal length is known exactly.
 fn with_focal(mut view: View) -> View {
-    (view.label.camera.focal_px, view.label.camera.focal_fixed) =
-        (Some(view.camera.focal_px.x), true);
+    view.label.camera.focal_px = Some(view.camera.focal_px.x);
+    view.label.camera.focal_fixed = true;
     view
 }
 
@@ -792,63 +616,33 @@ fn photos_together_reach_the_table() {
     let table = [
         (
             [0.0, 3.0],
-            [
-                Spread(25.0, 41.0),
-                Spread(23.0, 55.0),
-                Spread(21.0, 49.0),
-                Spread(14.0, 45.0),
-                Spread(12.0, 34.0),
-            ],
+            [25.0, 23.0, 21.0, 14.0, 12.0],
+            [41.0, 55.0, 49.0, 45.0, 34.0],
         ),
         (
             [0.0, 5.0],
-            [
-                Spread(23.0, 57.0),
-                Spread(8.6, 41.0),
-                Spread(13.0, 33.0),
-                Spread(8.1, 24.0),
-                Spread(4.5, 12.0),
-            ],
+            [23.0, 8.6, 13.0, 8.1, 4.5],
+            [57.0, 41.0, 33.0, 24.0, 12.0],
         ),
         (
             [0.0, 10.0],
-            [
-                Spread(21.0, 51.0),
-                Spread(5.6, 17.0),
-                Spread(4.4, 15.0),
-                Spread(2.7, 5.6),
-                Spread(1.4, 4.3),
-            ],
+            [21.0, 5.6, 4.4, 2.7, 1.4],
+            [51.0, 17.0, 15.0, 5.6, 4.3],
         ),
         (
             [0.0, 20.0],
-            [
-                Spread(5.9, 33.0),
-                Spread(2.6, 17.0),
-                Spread(1.2, 4.8),
-                Spread(0.7, 2.3),
-                Spread(0.5, 1.6),
-            ],
+            [5.9, 2.6, 1.2, 0.7, 0.5],
+            [33.0, 17.0, 4.8, 2.3, 1.6],
         ),
         (
             [10.0, 30.0],
-            [
-                Spread(2.5, 7.9),
-                Spread(1.2, 4.8),
-                Spread(0.5, 2.0),
-                Spread(0.3, 1.1),
-                Spread(0.2, 0.5),
-            ],
+            [2.5, 1.2, 0.5, 0.3, 0.2],
+            [7.9, 4.8, 2.0, 1.1, 0.5],
         ),
         (
             [25.0, 40.0],
-            [
-                Spread(1.2, 3.6),
-                Spread(0.5, 1.9),
-                Spread(0.3, 0.7),
-                Spread(0.15, 0.4),
-                Spread(0.08, 0.3),
-            ],
+            [1.2, 0.5, 0.3, 0.15, 0.08],
+            [3.6, 1.9, 0.7, 0.4, 0.3],
         ),
     ];
     let options = SolveOptions {
@@ -858,31 +652,23 @@ fn photos_together_reach_the_table() {
         },
         ..Default::default()
     };
-    for (tilts, row) in table {
-        for (count, expected) in [1, 2, 4, 8, 16].into_iter().zip(row) {
+    for (tilts, medians, most) in table {
+        for ((count, median), most) in [1, 2, 4, 8, 16].into_iter().zip(medians).zip(most) {
             let error = |k: u64| {
                 let views = Scenario::realistic().views(7, k, count, tilts);
-                let labels: Vec<_> = views.iter().map(|v| v.label.clone()).collect();
-                let mut labels = labels;
+                let mut labels: Vec<_> = views.iter().map(|v| v.label.clone()).collect();
                 labels.iter_mut().for_each(|l| l.surface.id = "tray".into());
                 let joint = camera::solve_joint(&labels, &options).unwrap();
                 focal_percent(&views[0], joint.photos[0].as_ref().unwrap())
             };
             let found = Spread::of((0..120).map(error).collect());
             let what = format!("focal %, {count} photos of {tilts:?} degrees");
-            println!(
-                "{what}: {:.2} / {:.2}, table {} / {}",
-                found.0, found.1, expected.0, expected.1
-            );
             // Two photos from above are both so steep, once in twenty, that the belief's own 25 %
             // is the error, and the table's 60 trials happened to hold fewer (its row
             // of 0 to 5 degrees has a better median for two photos than for four).
             let from_above = count == 2 && tilts[1] <= 10.0;
             let slack = if from_above { 2.0 } else { 1.6 };
-            assert!(
-                found.0 <= slack * expected.0 && found.1 <= slack * expected.1,
-                "{what}: {found:?}"
-            );
+            found.within_times(slack, [median, most], &what);
         }
     }
 }

@@ -2,8 +2,6 @@
 //! stability`.
 
 #![cfg(feature = "pipeline")]
-#![cfg(feature = "pipeline")]
-#![expect(clippy::unwrap_used, reason = "helpers of tests are tests")]
 
 use petcomp::camera::simulate::{Scenario, View};
 use petcomp::camera::{self, FocalSource, Label, LabelPoint, MarkerMap, Priors, Solution};

@@ -7,11 +7,11 @@ use petcomp::DeepImage;
 use petcomp::camera::Camera;
 use petcomp::dataset::index::DatasetIndex;
 use petcomp::dataset::{
-    ArchiveStore, Coco, ContactSheetOptions, DatasetConfig, DatasetCounts, Group, LabelConfig,
-    NEAR_DUPLICATE_RMS, Obstructed, Part, Partition, PictureFormat, Pictures, Pipeline, Plan,
-    Progress, Provenance, Sample, SampleRange, SampleRecord, Shard, Sidecar, Split, SplitOrder,
-    Summary, WebDataset, Writer, Yolo, YoloSet, YoloTask, check, contact_sheet_of, generate, merge,
-    repair, repair_archives,
+    ArchiveStore, Coco, DatasetConfig, DatasetCounts, Group, LabelConfig, NEAR_DUPLICATE_RMS,
+    Obstructed, Part, Partition, PictureFormat, Pictures, Pipeline, Plan, Progress, Provenance,
+    Sample, SampleRange, SampleRecord, Shard, Sidecar, Split, SplitOrder, Summary, WebDataset,
+    Writer, Yolo, YoloSet, YoloTask, check, contact_sheet_of, generate, merge, repair,
+    repair_archives,
 };
 use petcomp::eval::read_yolo_truth_of;
 use petcomp::geom::BBox;
@@ -140,7 +140,19 @@ fn full_plan(folder: &Path, count: u64) -> Plan {
 }
 
 fn make(plan: &Plan) -> Result<DatasetCounts> {
+    make_of(plan, sample)
+}
+
+/// The same of other samples.
+fn make_of(plan: &Plan, sample: impl Fn(u64) -> Result<Sample> + Sync) -> Result<DatasetCounts> {
     generate(plan, sample, &|_| {}, &AtomicBool::new(false))
+}
+
+/// A folder with a dataset of so many samples.
+fn made(count: u64) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), count)).unwrap();
+    dir
 }
 
 fn threads<T: Send>(n: usize, f: impl FnOnce() -> T + Send) -> T {
@@ -260,13 +272,7 @@ fn a_stopped_run_goes_on_to_the_same_bytes() {
         made.fetch_add(1, Ordering::Relaxed);
         sample(k)
     };
-    let report = generate(
-        &full_plan(broken.path(), 30),
-        counted,
-        &|_| {},
-        &AtomicBool::new(false),
-    )
-    .unwrap();
+    let report = make_of(&full_plan(broken.path(), 30), counted).unwrap();
     assert_eq!(
         (report.made, made.into_inner()),
         (30 - finished as u64 + 2, 30 - finished as u64 + 2)
@@ -297,17 +303,10 @@ fn samples_are_put_on_the_disk_together() {
 
 #[test]
 fn a_finished_dataset_is_left_alone() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 5)).unwrap();
+    let dir = made(5);
     let before = bytes(dir.path());
     let never = |_| -> Result<Sample> { panic!("nothing is missing") };
-    let report = generate(
-        &plan(dir.path(), 5),
-        never,
-        &|_| {},
-        &AtomicBool::new(false),
-    )
-    .unwrap();
+    let report = make_of(&plan(dir.path(), 5), never).unwrap();
     assert_eq!((report.images, report.made), (5, 0));
     assert_eq!(before, bytes(dir.path()));
 }
@@ -349,8 +348,7 @@ fn what_joins_samples_is_of_all_of_them_or_not_there() {
 
 #[test]
 fn another_plan_in_the_same_folder_is_refused_by_name() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 3)).unwrap();
+    let dir = made(3);
     let before = bytes(dir.path());
     let refused = |change: &dyn Fn(&mut Plan)| {
         let mut plan = plan(dir.path(), 3);
@@ -429,15 +427,7 @@ fn a_failing_sample_ends_the_run_and_keeps_the_others() {
             sample(k)
         }
     };
-    let e = threads(1, || {
-        generate(
-            &plan(dir.path(), 20),
-            fails,
-            &|_| {},
-            &AtomicBool::new(false),
-        )
-    })
-    .unwrap_err();
+    let e = threads(1, || make_of(&plan(dir.path(), 20), fails)).unwrap_err();
     assert_eq!(e.to_string(), "objects: would not settle");
     assert_eq!(text(dir.path(), "index.jsonl").lines().count(), 6);
     assert_eq!(make(&plan(dir.path(), 20)).unwrap().made, 14);
@@ -448,14 +438,12 @@ fn what_a_writer_cannot_hold_is_an_error() {
     let dir = tempfile::tempdir().unwrap();
     let run = |change: &(dyn Fn(&mut Sample) + Sync)| {
         let made = |k| {
-            sample(k).inspect(|_| {}).map(|mut s| {
-                change(&mut s);
-                s
-            })
+            let mut made = sample(k)?;
+            change(&mut made);
+            Ok(made)
         };
-        generate(&plan(dir.path(), 1), made, &|_| {}, &AtomicBool::new(false))
-            .unwrap_err()
-            .to_string()
+        let refused = make_of(&plan(dir.path(), 1), made);
+        refused.unwrap_err().to_string()
     };
     let odd = run(&|s| s.labels.objects = vec![object(1, 3, [0.0; 2], &[])]);
     assert_eq!(odd, "labels.objects[0].class: 3, but there are 3 classes");
@@ -487,7 +475,7 @@ fn obstructed_objects_are_kept_on_request_and_twins_written_once() {
         ];
         Ok(s)
     };
-    let report = generate(&plan, twins, &|_| {}, &AtomicBool::new(false)).unwrap();
+    let report = make_of(&plan, twins).unwrap();
     assert_eq!(
         (report.objects, report.labelled, report.obstructed),
         (3, 3, 1)
@@ -516,7 +504,7 @@ fn what_has_no_mask_is_labelled_where_a_box_is_written_alone() {
         let dir = tempfile::tempdir().unwrap();
         let mut plan = plan(dir.path(), 1);
         plan.writers = vec![Arc::new(yolo), Arc::new(Coco::default())];
-        let report = generate(&plan, thin, &|_| {}, &AtomicBool::new(false)).unwrap();
+        let report = make_of(&plan, thin).unwrap();
         assert_eq!((report.objects, report.labelled), (2, count));
         let rows = text(dir.path(), "labels/val/000000.txt");
         assert_eq!(rows.lines().count() as u64, count);
@@ -536,13 +524,7 @@ fn objects_in_a_circle_are_counted_and_none_of_them_is_on_top() {
         s.labels.objects.push(object(4, 1, [40.0; 2], &[]));
         Ok(s)
     };
-    let report = generate(
-        &plan(dir.path(), 2),
-        circle,
-        &|_| {},
-        &AtomicBool::new(false),
-    )
-    .unwrap();
+    let report = make_of(&plan(dir.path(), 2), circle).unwrap();
     assert_eq!((report.knotted, report.objects, report.labelled), (6, 8, 2));
     let record: SampleRecord = io::read_json(dir.path().join("scenes/train/000001.json")).unwrap();
     assert_eq!(
@@ -601,8 +583,7 @@ fn segments_hold_borders_and_jpegs_are_accepted() {
 
 #[test]
 fn a_sidecar_reads_back_bit_by_bit() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 4)).unwrap();
+    let dir = made(4);
     let record: SampleRecord = io::read_json(dir.path().join("scenes/train/000003.json")).unwrap();
     let made = sample(3).unwrap();
     let provenance = made.provenance.unwrap();
@@ -618,8 +599,7 @@ fn a_sidecar_reads_back_bit_by_bit() {
 
 #[test]
 fn a_check_finds_every_fault_and_its_place() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 12)).unwrap();
+    let dir = made(12);
     let write = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
     let row = "0 0.5 0.5 0.1 0.1";
     write(
@@ -678,8 +658,7 @@ fn a_check_finds_every_fault_and_its_place() {
 
 #[test]
 fn images_in_folders_of_a_part_have_labels_in_folders() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 12)).unwrap();
+    let dir = made(12);
     let path = |name: &str| dir.path().join(name);
     std::fs::remove_file(path("index.jsonl")).unwrap();
     for (kind, file) in [("images", "000001.png"), ("labels", "000001.txt")] {
@@ -697,8 +676,7 @@ fn images_in_folders_of_a_part_have_labels_in_folders() {
 
 #[test]
 fn an_image_of_both_parts_is_a_leak() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 12)).unwrap();
+    let dir = made(12);
     let yaml = "train: images/train\nval: images/train\nnames: [a, b, c]\n";
     std::fs::write(dir.path().join("data.yaml"), yaml).unwrap();
     let found = faults(dir.path());
@@ -768,7 +746,7 @@ fn a_sample_without_a_scene_is_written_and_its_layers_are_refused() {
             writers,
             ..Plan::new(dir.path(), 4, classes)
         };
-        let made = generate(&plan, bare, &|_| (), &AtomicBool::new(false));
+        let made = make_of(&plan, bare);
         made.map(|counts| (counts.images, check(dir.path()).unwrap().findings))
     };
     let most = write(vec![
@@ -794,13 +772,7 @@ fn an_object_that_nothing_holds_up_is_a_fault_of_its_picture() {
             ..plan(dir.path(), 2)
         };
         let height = |k: u64| if k == 0 { 0.0135 } else { 0.27 };
-        generate(
-            &plan,
-            |k| Ok(with_a_card_up_at(k, height(k))),
-            &|_| {},
-            &AtomicBool::new(false),
-        )
-        .unwrap();
+        make_of(&plan, |k| Ok(with_a_card_up_at(k, height(k)))).unwrap();
         let found = faults(dir.path())
             .into_iter()
             .filter(|fault| fault.contains("nothing holds"));
@@ -897,8 +869,7 @@ fn whoever_reads_a_data_yaml_finds_the_same_images() {
 
 #[test]
 fn scenes_without_objects_are_groups_of_their_own() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 50)).unwrap();
+    let dir = made(50);
     let all = YoloSet::read(dir.path()).unwrap();
     let split = all.partitioned(Partition::Grouped(Group::Selection), 0.8, 0);
     let split = split.unwrap();
@@ -944,24 +915,18 @@ fn an_empty_folder_fails_the_check() {
 
 #[test]
 fn a_contact_sheet_shows_the_pictures_asked_for() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 12)).unwrap();
-    let options = ContactSheetOptions {
-        title: "twelve".into(),
-        columns: 3,
-        ..ContactSheetOptions::default()
-    };
-    let six = contact_sheet_of(dir.path(), 6, &options).unwrap();
-    let all = contact_sheet_of(dir.path(), 100, &options).unwrap();
-    assert_eq!(six.width(), all.width());
-    assert_eq!(all.height() - six.height(), 2 * (48 + 4 + 16 + 16));
+    let dir = made(12);
+    let six = contact_sheet_of(dir.path(), 6).unwrap();
+    let all = contact_sheet_of(dir.path(), 100).unwrap();
+    // Two columns of three, and three of four.
+    assert!(six.width() < all.width() && six.height() < all.height());
     let orange = petcomp::Srgb8 {
         r: 0xE6,
         g: 0x9F,
         b: 0x00,
     };
     assert!(all.pixels().contains(&orange));
-    assert!(contact_sheet_of(&dir.path().join("images"), 6, &options).is_err());
+    assert!(contact_sheet_of(&dir.path().join("images"), 6).is_err());
 }
 
 #[test]
@@ -1074,7 +1039,7 @@ fn archives_alone_leave_no_other_file_and_are_those_packed_from_files() {
     let archives = |folder: &Path| bytes(&folder.join("webdataset"));
     assert_eq!(archives(loose.path()), archives(streamed.path()));
     assert_eq!(archives(loose.path()).len(), 8 + 6);
-    let sheet = contact_sheet_of(streamed.path(), 4, &Default::default());
+    let sheet = contact_sheet_of(streamed.path(), 4);
     let summary = petcomp::dataset::Summary::read(streamed.path());
     for refused in [sheet.map(drop), summary.map(drop)] {
         let refused = refused.unwrap_err().to_string();
@@ -1423,6 +1388,11 @@ fn joined(shards: &[PathBuf], folder: &Path) -> Result<DatasetCounts> {
     merge(shards, folder, &|_| {}, &AtomicBool::new(false))
 }
 
+/// Why shards are not joined.
+fn refusal(shards: &[PathBuf], folder: &Path) -> String {
+    joined(shards, folder).unwrap_err().to_string()
+}
+
 #[test]
 fn merged_shards_are_the_bytes_of_one_run() {
     let (whole, dir) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
@@ -1467,11 +1437,7 @@ fn shards_with_settings_of_all_layouts_are_merged() {
 fn shards_that_do_not_make_a_whole_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let folders = shards(dir.path());
-    let refused = |folders: &[PathBuf]| {
-        joined(folders, &dir.path().join("merged"))
-            .unwrap_err()
-            .to_string()
-    };
+    let refused = |folders: &[PathBuf]| refusal(folders, &dir.path().join("merged"));
     assert_eq!(refused(&folders[..2]), "shards: shard 3/3 is missing");
     assert_eq!(refused(&[]), "shards: none, expected their folders");
     let twice = [folders.clone(), vec![folders[0].clone()]].concat();
@@ -1495,15 +1461,7 @@ fn shards_that_do_not_make_a_whole_are_refused() {
 
     let journal = folders[1].join("index.jsonl");
     let lines = std::fs::read_to_string(&journal).unwrap();
-    std::fs::write(
-        &journal,
-        lines
-            .lines()
-            .skip(1)
-            .map(|line| format!("{line}\n"))
-            .collect::<String>(),
-    )
-    .unwrap();
+    std::fs::write(&journal, lines.split_once('\n').unwrap().1).unwrap();
     assert!(refused(&folders).contains("shard-2: sample 1 is missing: finish this shard first"));
     std::fs::write(&journal, lines).unwrap();
 
@@ -1540,7 +1498,7 @@ fn a_merge_reads_and_writes_nothing_outside_its_folders() {
         let line = text(&folders[0], "index.jsonl");
         let more = format!(r#""files":[{{"path":"{path}","bytes":5,"crc32":{crc32}}},"#);
         edit_journal(&folders[0], "\"files\":[", &more, true);
-        let refused = joined(&folders, &out).unwrap_err().to_string();
+        let refused = refusal(&folders, &out);
         assert!(
             refused.contains("shard-1/index.jsonl: line 1: file: "),
             "{path}: {refused}"
@@ -1558,51 +1516,31 @@ fn a_merge_reads_regular_files_of_the_shard_alone() {
     let file = folders[0].join("labels/train/000003.txt");
     let whole = std::fs::read(&file).unwrap();
     std::fs::write(dir.path().join("secret"), &whole).unwrap();
-    let link = |to: &Path| std::os::unix::fs::symlink(to, &file).unwrap();
-    let pipe = || {
-        assert!(
-            std::process::Command::new("mkfifo")
-                .arg(&file)
-                .status()
-                .unwrap()
-                .success()
-        )
+    let pipe = |path: &Path| {
+        let made = std::process::Command::new("mkfifo").arg(path).status();
+        assert!(made.unwrap().success());
     };
-    let cases: [(&dyn Fn(), &str); 3] = [
-        (
-            &|| link(&dir.path().join("secret")),
-            "000003.txt: is a link out of",
-        ),
-        (
-            &|| link(Path::new("/dev/zero")),
-            "000003.txt: is a link out of",
-        ),
-        (&pipe, "000003.txt: not a regular file"),
-    ];
-    for (spoil, why) in cases {
+    let secret = dir.path().join("secret");
+    for (target, why) in [
+        (Some(secret.as_path()), "000003.txt: is a link out of"),
+        (Some(Path::new("/dev/zero")), "000003.txt: is a link out of"),
+        (None, "000003.txt: not a regular file"),
+    ] {
         std::fs::remove_file(&file).unwrap();
-        spoil();
-        let refused = joined(&folders, &dir.path().join("out"))
-            .unwrap_err()
-            .to_string();
+        match target {
+            Some(target) => std::os::unix::fs::symlink(target, &file).unwrap(),
+            None => pipe(&file),
+        }
+        let refused = refusal(&folders, &dir.path().join("out"));
         assert!(refused.contains(why), "{refused}");
     }
-    std::fs::remove_file(folders[1].join("index.jsonl")).unwrap();
-    let pipe = std::process::Command::new("mkfifo")
-        .arg(folders[1].join("index.jsonl"))
-        .status();
-    assert!(pipe.unwrap().success());
-    assert!(
-        joined(&folders, &dir.path().join("out"))
-            .unwrap_err()
-            .to_string()
-            .contains("index.jsonl: not a regular file")
-    );
-    assert!(
-        faults(&folders[1])
-            .join("\n")
-            .contains("index.jsonl: not a regular file")
-    );
+    let journal = folders[1].join("index.jsonl");
+    std::fs::remove_file(&journal).unwrap();
+    pipe(&journal);
+    let refused = refusal(&folders, &dir.path().join("out"));
+    for told in [refused, faults(&folders[1]).join("\n")] {
+        assert!(told.contains("index.jsonl: not a regular file"), "{told}");
+    }
 }
 
 #[test]
@@ -1618,9 +1556,7 @@ fn edited_lines_are_refused_by_a_merge_and_made_again_by_a_run() {
     ];
     for (from, to) in edits {
         edit_journal(&folders[1], from, to, false);
-        let refused = joined(&folders, &dir.path().join("out"))
-            .unwrap_err()
-            .to_string();
+        let refused = refusal(&folders, &dir.path().join("out"));
         assert!(
             refused.contains("shard-2/index.jsonl: line 1: ") && refused.ends_with("--resume"),
             "{refused}"
@@ -1648,7 +1584,7 @@ fn numbers_that_no_dataset_has_are_refused() {
         let before = std::fs::read_to_string(&path).unwrap();
         assert!(before.contains(from), "{before}");
         std::fs::write(&path, before.replace(from, to)).unwrap();
-        let refused = joined(&folders[..1], &out).unwrap_err().to_string();
+        let refused = refusal(&folders[..1], &out);
         std::fs::write(&path, before).unwrap();
         refused
     };
@@ -1662,12 +1598,7 @@ fn numbers_that_no_dataset_has_are_refused() {
             .contains("count: 18446744073709551615 samples")
     );
     edit_journal(&folders[0], "\"k\":0", "\"k\":1", true);
-    assert!(
-        joined(&folders, &out)
-            .unwrap_err()
-            .to_string()
-            .contains("line 1: sample 1 is none of shard 1/3 of 20")
-    );
+    assert!(refusal(&folders, &out).contains("line 1: sample 1 is none of shard 1/3 of 20"));
     let e = make(&plan(&out, 1_000_000_000_000))
         .unwrap_err()
         .to_string();
@@ -1718,8 +1649,7 @@ fn fewer_than_there_are_is_refused_and_nothing_is_lost() {
 
 #[test]
 fn a_dataset_of_an_older_program_is_read_and_not_continued() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 12)).unwrap();
+    let dir = made(12);
     let older = text(dir.path(), "dataset.json").replace("  \"format\": 2,\n", "");
     std::fs::write(dir.path().join("dataset.json"), older).unwrap();
     let unsealed = |line: &str| format!("{}}}\n", line.rsplit_once(",\"crc32\":").unwrap().0);
@@ -1734,7 +1664,7 @@ fn a_dataset_of_an_older_program_is_read_and_not_continued() {
     .unwrap();
     let before = bytes(dir.path());
     assert_eq!(faults(dir.path()), [""; 0]);
-    assert!(contact_sheet_of(dir.path(), 3, &ContactSheetOptions::default()).is_ok());
+    assert!(contact_sheet_of(dir.path(), 3).is_ok());
     for refused in [
         make(&plan(dir.path(), 12)).map(|_| ()),
         repair(dir.path()).map(|_| ()),
@@ -1782,8 +1712,7 @@ fn links_in_place_of_its_own_files_are_refused_by_name() {
 
 #[test]
 fn one_sample_is_made_again_alone_and_the_others_are_left() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 12)).unwrap();
+    let dir = made(12);
     let before = bytes(dir.path());
     std::fs::write(dir.path().join("labels/train/000007.txt"), b"").unwrap();
     let made = std::sync::Mutex::new(Vec::new());
@@ -1795,7 +1724,7 @@ fn one_sample_is_made_again_alone_and_the_others_are_left() {
         range: SampleRange::One(7),
         ..plan(dir.path(), 12)
     };
-    generate(&one, counted, &|_| {}, &AtomicBool::new(false)).unwrap();
+    make_of(&one, counted).unwrap();
     assert_eq!(made.into_inner().unwrap(), [7]);
     assert_eq!(before, bytes(dir.path()));
 }
@@ -1822,8 +1751,7 @@ fn what_was_damaged_at_its_size_is_found_and_made_again() {
 
 #[test]
 fn an_image_that_looks_like_a_trained_one_is_a_leak() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 12)).unwrap();
+    let dir = made(12);
     let train: Image<LinearRgb> = io::read(dir.path().join("images/train/000006.png")).unwrap();
     let brighter = train.map(|p| p.scale(1.01));
     io::write(dir.path().join("images/val/000005.png"), &brighter).unwrap();
@@ -1838,8 +1766,7 @@ fn an_image_that_looks_like_a_trained_one_is_a_leak() {
 
 #[test]
 fn a_copy_is_a_leak_whatever_its_labels_say() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 12)).unwrap();
+    let dir = made(12);
     let path = |name: &str| dir.path().join(name);
     let [train, val] = ["train/000006", "val/000005"];
     let mut retouched: Image<LinearRgb> = io::read(path(&format!("images/{train}.png"))).unwrap();
@@ -1896,8 +1823,7 @@ fn put_faint_object(dataset: &Path, name: &str, left: usize, grain: f32) {
 
 #[test]
 fn a_faint_object_is_a_leak_only_at_its_place() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 12)).unwrap();
+    let dir = made(12);
     put_faint_object(dir.path(), "train/000006", 4, 0.0);
     for (left, leaks) in [(48, false), (4, true)] {
         put_faint_object(dir.path(), "val/000005", left, 0.005);
@@ -1911,8 +1837,7 @@ fn a_faint_object_is_a_leak_only_at_its_place() {
 
 #[test]
 fn the_classes_balance_and_box_sizes_are_counted() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 12)).unwrap();
+    let dir = made(12);
     let checked = check(dir.path()).unwrap();
     let table = checked.balance();
     assert_eq!(table.rows.len(), 3);
@@ -1949,8 +1874,7 @@ fn browse(page: &str, script: &str) -> Option<String> {
 
 #[test]
 fn a_browser_shows_the_report_and_its_switches_work() {
-    let dir = tempfile::tempdir().unwrap();
-    make(&plan(dir.path(), 12)).unwrap();
+    let dir = made(12);
     let page = petcomp::dataset::page::page(
         dir.path(),
         &petcomp::dataset::page::DatasetReportOptions {
@@ -2030,10 +1954,21 @@ fn write_world(folder: &Path) {
     write("recipe.toml", recipe.into());
 }
 
-#[test]
-fn treated_edges_change_the_picture_and_no_label() {
+/// A folder with a recipe and its files.
+fn world() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     write_world(dir.path());
+    dir
+}
+
+fn opened(world: &Path) -> Pipeline {
+    let config = DatasetConfig::read(world.join("recipe.toml"), &[]).unwrap();
+    Pipeline::open(config).unwrap()
+}
+
+#[test]
+fn treated_edges_change_the_picture_and_no_label() {
+    let dir = world();
     let sample = |edges: &[EdgeTreatment], k: u64| {
         let mut setup = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
         setup.scene.edges = edges.to_vec();
@@ -2186,8 +2121,7 @@ fn whatever_decides_a_picture_or_a_label_is_compared_before_a_dataset_goes_on() 
 
 #[test]
 fn another_config_of_an_open_pipeline_has_absolute_paths_too() {
-    let dir = tempfile::tempdir().unwrap();
-    write_world(dir.path());
+    let dir = world();
     let here = std::env::current_dir().unwrap();
     let recipe = io::relative(&dir.path().join("recipe.toml"), &here);
     let config = || DatasetConfig::read(&recipe, &[]).unwrap();
@@ -2201,16 +2135,14 @@ fn another_config_of_an_open_pipeline_has_absolute_paths_too() {
 
 #[test]
 fn a_mask_beside_one_photo_of_several_is_known() {
-    let dir = tempfile::tempdir().unwrap();
-    write_world(dir.path());
+    let dir = world();
     let photos = dir.path().join("photos");
     let label = text(&photos, "tray.label.json").replace("tray.tif", "wall.tif");
     std::fs::write(photos.join("wall.label.json"), label).unwrap();
     std::fs::copy(photos.join("tray.tif"), photos.join("wall.tif")).unwrap();
     let mask = Image::filled(64, 48, Coverage(1.0));
     io::write(photos.join("wall.front.png"), &mask).unwrap();
-    let config = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
-    let pipeline = Pipeline::open(config).unwrap();
+    let pipeline = opened(dir.path());
     let recipe = pipeline.plan(1, 1, dir.path().join("out")).unwrap().recipe;
     let [tray, wall] = [0, 1].map(|i| &recipe["backgrounds"][i]);
     assert!(tray["name"] == "tray" && tray["front"].is_null());
@@ -2228,12 +2160,10 @@ fn what_changes_after_a_dataset_was_planned_is_told() {
         }
     };
     for name in ["photos/tray.tif", "photos/tray.front.png", "sky.exr"] {
-        let dir = tempfile::tempdir().unwrap();
-        write_world(dir.path());
+        let dir = world();
         let mask = Image::filled(64, 48, Coverage(0.0));
         io::write(dir.path().join("photos/tray.front.png"), &mask).unwrap();
-        let config = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
-        let pipeline = Pipeline::open(config).unwrap();
+        let pipeline = opened(dir.path());
         pipeline.plan(1, 1, dir.path().join("out")).unwrap();
         write_other(&dir.path().join(name)).unwrap();
         let told = pipeline.sample(1, 0).unwrap_err().to_string();
@@ -2269,8 +2199,7 @@ fn a_photo_that_a_label_or_a_manifest_names_is_one_of_its_folder() {
 
 #[test]
 fn what_a_mask_beside_the_photo_hides_is_the_place_in_picture_and_labels() {
-    let dir = tempfile::tempdir().unwrap();
-    write_world(dir.path());
+    let dir = world();
     let open = || {
         let rule = ["labels.min_visible=0.9".parse().unwrap()];
         Pipeline::open(DatasetConfig::read(dir.path().join("recipe.toml"), &rule).unwrap()).unwrap()
@@ -2304,10 +2233,8 @@ fn what_a_mask_beside_the_photo_hides_is_the_place_in_picture_and_labels() {
 
 #[test]
 fn a_scene_of_another_size_than_its_plate_is_told() {
-    let dir = tempfile::tempdir().unwrap();
-    write_world(dir.path());
-    let config = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
-    let pipeline = Pipeline::open(config).unwrap();
+    let dir = world();
+    let pipeline = opened(dir.path());
     let [w, h] = pipeline.config().scene.image;
     let scene = Scene {
         image: [w / 2, h / 2],
@@ -2325,24 +2252,20 @@ fn a_scene_of_another_size_than_its_plate_is_told() {
 
 #[test]
 fn a_mask_of_another_size_is_told() {
-    let dir = tempfile::tempdir().unwrap();
-    write_world(dir.path());
+    let dir = world();
     let path = dir.path().join("photos/tray.front.png");
     io::write(&path, &Image::filled(32, 24, Coverage(1.0))).unwrap();
-    let config = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
-    let told = Pipeline::open(config).unwrap().sample(1, 0).unwrap_err();
+    let told = opened(dir.path()).sample(1, 0).unwrap_err();
     let what = "tray.front.png: 32 x 24 pixels, but its label says 64 x 48";
     assert!(told.to_string().ends_with(what), "{told}");
 }
 
 #[test]
 fn what_the_place_hides_is_not_on_top_by_overlaps_either() {
-    let dir = tempfile::tempdir().unwrap();
-    write_world(dir.path());
+    let dir = world();
     let mask = Image::filled(64, 48, Coverage(1.0));
     io::write(dir.path().join("photos/tray.front.png"), &mask).unwrap();
-    let config = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
-    let hidden = Pipeline::open(config).unwrap().sample(1, 0).unwrap();
+    let hidden = opened(dir.path()).sample(1, 0).unwrap();
     assert!(hidden.labels.objects.len() > 2);
     for object in &hidden.labels.objects {
         assert!(!object.is_topmost() && object.visible_mask.is_empty());

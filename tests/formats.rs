@@ -9,33 +9,23 @@
 
 mod python;
 
-use petcomp::camera::Camera;
 use petcomp::dataset::{
     LabelConfig, Obstructed, Pictures, Plan, Provenance, Sample, SampleRange, SampleRecord,
     Sidecar, Split, generate,
 };
-use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
+use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector3};
 use petcomp::io::exr::read_channels;
 use petcomp::label::{LabelOptions, label};
 use petcomp::scene::{CameraSource, Card, Surface};
-use petcomp::{Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, Shot, composite, io, render};
+use petcomp::{
+    Camera, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, Shot, composite, io, render,
+};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 const IMAGE: [u32; 2] = [96, 72];
-
-/// A camera one metre above the surface that looks straight down.
-fn camera() -> Camera {
-    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-    Camera {
-        image: IMAGE,
-        focal_px: Vector2::new(100.0, 100.0),
-        principal_px: Point2::new(48.0, 36.0),
-        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
-    }
-}
 
 /// A ring, so that masks have a hole, a little see-through.
 fn ring(size: usize, light: LinearRgb) -> Image<PremulRgba> {
@@ -77,7 +67,8 @@ fn shot(k: u64) -> Shot {
         card(2, [0.05 + shift, 0.03, 0.06], 1.0, [0.25, 0.25]),
         card(3, [0.4, -0.2 + shift, 0.03], -0.5, [0.3, 0.2]),
     ];
-    let empty = Shot::new(camera()).with_ambient(LinearRgb::grey(1.0));
+    let camera = Camera::looking_down(1.0, 100.0, IMAGE);
+    let empty = Shot::new(camera).with_ambient(LinearRgb::grey(1.0));
     let plate = Arc::new(Image::filled(
         96,
         72,

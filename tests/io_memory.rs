@@ -1,6 +1,6 @@
 //! How much memory large pictures take. A process of its own: the high-water mark is the process's.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
+mod memory;
 
 use petcomp::diff::{Likeness, RowsFromFn, Thresholds, Verdict, compare};
 use petcomp::io::{self, Picture};
@@ -18,26 +18,9 @@ const BYTES: usize = 12;
 /// One at a time: the mark is everybody's.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// A line of `/proc/self/status`, bytes.
-fn status(name: &str) -> Option<usize> {
-    let text = fs::read_to_string("/proc/self/status").ok()?;
-    let line = text
-        .lines()
-        .find_map(|l| l.strip_prefix(name)?.strip_prefix(':').map(str::trim))?;
-    line.strip_suffix(" kB")?
-        .parse()
-        .ok()
-        .map(|kib: usize| kib * 1024)
-}
-
-/// What a call needs at its worst beyond what was there before it, bytes a pixel; none where the
-/// system does not tell.
+/// What a call needs at its worst, bytes for each pixel of a picture.
 fn bytes_a_pixel<T>(call: impl FnOnce() -> T) -> Option<f64> {
-    // 5 sets the high-water mark back to what is resident now.
-    fs::write("/proc/self/clear_refs", "5").ok()?;
-    let before = status("VmHWM")?;
-    let _kept = call();
-    Some(status("VmHWM")?.checked_sub(before)? as f64 / PIXELS as f64)
+    Some(memory::peak_growth(call)? as f64 / PIXELS as f64)
 }
 
 fn assert_at_most(most: f64, what: &str, taken: Option<f64>) {

@@ -26,13 +26,7 @@ const IMAGE: [u32; 2] = [96, 72];
 
 /// A camera one metre above the surface that looks straight down.
 fn camera() -> Camera {
-    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-    Camera {
-        image: IMAGE,
-        focal_px: Vector2::new(100.0, 100.0),
-        principal_px: Point2::new(48.0, 36.0),
-        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
-    }
+    Camera::looking_down(1.0, 100.0, IMAGE)
 }
 
 fn card(id: u32, center: [f64; 3], angles: [f64; 3], size: [f64; 2], outline: &[[f64; 2]]) -> Card {

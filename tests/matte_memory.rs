@@ -1,36 +1,16 @@
 //! How much memory keying a 4K frame takes. A process of its own: the high-water mark is the
 //! process's.
 
+mod memory;
+
+use memory::peak_growth;
 use petcomp::matte::key::{KeyOptions, Keying, Screen};
 use petcomp::{Image, LinearRgb, PremulRgba};
-use std::fs;
 
 const WIDTH: usize = 3840;
 const HEIGHT: usize = 2160;
 /// One channel of 32-bit floats.
 const CHANNEL: usize = WIDTH * HEIGHT * 4;
-
-/// A line of `/proc/self/status`, bytes.
-fn status(name: &str) -> Option<usize> {
-    let text = fs::read_to_string("/proc/self/status").ok()?;
-    let line = text
-        .lines()
-        .find_map(|l| l.strip_prefix(name)?.strip_prefix(':').map(str::trim))?;
-    line.strip_suffix(" kB")?
-        .parse()
-        .ok()
-        .map(|kib: usize| kib * 1024)
-}
-
-/// What a call needs at its worst beyond what was there before it; none where the system does not
-/// tell.
-fn peak_growth<T>(call: impl FnOnce() -> T) -> Option<usize> {
-    // 5 sets the high-water mark back to what is resident now.
-    fs::write("/proc/self/clear_refs", "5").ok()?;
-    let before = status("VmHWM")?;
-    let _kept = call();
-    status("VmHWM")?.checked_sub(before)
-}
 
 #[test]
 fn a_frame_takes_its_output_and_two_channels_at_most() {

@@ -97,21 +97,8 @@ def hsv():
     write("hsv", table)
 
 
-def ycbcr():
-    """Encoded colours, in and a little out of range."""
-    rgb = np.vstack([exact([[0, 0, 0], [1, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), colors(20, -0.1, 1.2, 5)])
-    ranges = {"full": (8, False), "video_8": (8, True), "video_10": (10, True)}
-    table = {}
-    for kind in ("BT.601", "BT.709", "BT.2020"):
-        weights = colour.WEIGHTS_YCBCR[f"ITU-R {kind}"]
-        for name, (bits, legal) in ranges.items():
-            how = {"in_legal": False, "in_int": False, "out_int": False, "out_bits": bits, "out_legal": legal}
-            table[f"{kind}/{name}"] = colour.RGB_to_YCbCr(rgb, K=weights, **how)
-    write("ycbcr", {"rgb": rgb, "ycbcr": table})
-
-
 if __name__ == "__main__":
     assert colour.__version__ == VERSION, f"colour-science {colour.__version__}, expected {VERSION}"
-    for case in (curves, spaces, hsv, ycbcr):
+    for case in (curves, spaces, hsv):
         (HERE / case.__name__).mkdir(exist_ok=True)
         case()

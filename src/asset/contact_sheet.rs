@@ -8,7 +8,7 @@ use super::pixels::Pixels;
 use super::texture::Texture;
 use super::thumbnail::{checkerboard, fitted_size};
 use crate::color::to_srgb8;
-use crate::draw::{self, TextSize};
+use crate::draw;
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::Image;
@@ -159,7 +159,7 @@ fn strip_height(lines: usize, rows: usize, tile_height: usize) -> usize {
 }
 
 fn text_height(lines: usize) -> usize {
-    lines * TextSize::Small.height() + GAP_PX / 2
+    lines * draw::LINE_PX + GAP_PX / 2
 }
 
 /// Height of the strip of a record whose cut-out is as high as any, pixels.
@@ -197,8 +197,8 @@ fn over_background(cutout: &Image<Film>, background: Background) -> Image<Srgb8>
 
 fn write_lines(canvas: &mut Image<Srgb8>, lines: &[(String, Srgb8)]) {
     for (i, (line, ink)) in lines.iter().enumerate() {
-        let at = [0, (i * TextSize::Small.height()) as isize];
-        draw::text(canvas, at, line, *ink, TextSize::Small);
+        let at = [0, (i * draw::LINE_PX) as isize];
+        draw::text(canvas, at, line, *ink);
     }
 }
 
@@ -214,7 +214,7 @@ fn lines_of(record: &PhotoRecord) -> Vec<(String, Srgb8)> {
 
 /// The lines of a text in one colour.
 fn wrapped_in(ink: Srgb8, text: &str) -> Vec<(String, Srgb8)> {
-    let lines = draw::wrapped(text, STRIP_WIDTH_PX, TextSize::Small);
+    let lines = draw::wrapped(text, STRIP_WIDTH_PX);
     lines.into_iter().map(|line| (line, ink)).collect()
 }
 

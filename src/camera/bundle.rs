@@ -17,7 +17,6 @@ use super::solution::Solution;
 use super::solve::FocalConflict;
 use super::uncertainty::{FocalShare, Uncertainty, focal_share};
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector6};
-use std::cmp::Ordering;
 
 /// Number of unknowns of a pose.
 const POSE_UNKNOWNS: usize = 6;
@@ -48,12 +47,6 @@ pub(crate) struct BundleEquations {
     normals: Vec<NormalEquations>,
     /// After how many iterations.
     iterations: usize,
-}
-
-impl BundleEquations {
-    fn compare_costs(&self, other: &Self) -> Ordering {
-        self.cost.total_cmp(&other.cost)
-    }
 }
 
 /// The normal equations of the shared unknowns.
@@ -87,15 +80,11 @@ impl Bundle {
         options: &SolveOptions,
     ) -> Result<Self, SolveError> {
         let labels: Vec<&Label> = used.iter().map(|&i| &labels[i]).collect();
-        let problems = labels
+        let mut problems = labels
             .iter()
             .map(|label| Problem::new(label, framing_or(label, unknown), options))
             .collect::<Result<Vec<_>, _>>()?;
         let surface = surfaces_shown(labels.into_iter().zip(&problems));
-        Self::from_problems(problems, surface)
-    }
-
-    fn from_problems(mut problems: Vec<Problem>, surface: Vec<usize>) -> Result<Self, SolveError> {
         share_lens(&mut problems);
         Ok(Self {
             residuals: problems.iter().map(without_shared_priors).collect(),
@@ -118,7 +107,8 @@ impl Bundle {
     }
 
     fn focal_share(&self, state: &State, covariance: &DMatrix<f64>) -> FocalShare {
-        let information = inverse_or_zero(covariance[(0, 0)]);
+        let variance = covariance[(0, 0)];
+        let information = if variance > 0.0 { 1.0 / variance } else { 0.0 };
         focal_share(state.ln_focal, information, self.focal_prior())
     }
 
@@ -126,7 +116,7 @@ impl Bundle {
     pub(crate) fn best(&self, alone: &[Result<Solution, SolveError>]) -> Option<BundleEquations> {
         self.ln_focal_starts(alone)
             .filter_map(|ln_focal| self.refine(self.posed(ln_focal)?))
-            .min_by(BundleEquations::compare_costs)
+            .min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
     /// Logarithms of the focal length from which to refine.
@@ -143,8 +133,9 @@ impl Bundle {
         self.problems
             .iter()
             .map(|problem| {
-                let found = with_fixed_lens(problem, ln_focal).search()?;
-                Some(found.best.state)
+                let mut posed = problem.clone();
+                posed.residuals.priors.fix_lens(ln_focal);
+                Some(posed.search()?.best.state)
             })
             .collect()
     }
@@ -272,8 +263,13 @@ impl Bundle {
             .map(|photo| self.photo_block(equations, photo))
             .collect();
         let mut shared = self.prior_system(&equations.states);
-        photos.iter().for_each(|photo| shared.add(photo));
-        damp_diagonal(&mut shared.matrix, damping);
+        for photo in &photos {
+            shared.matrix += &photo.own;
+            shared.right += &photo.own_right;
+        }
+        for i in 0..self.shared.len() {
+            shared.matrix[(i, i)] *= 1.0 + damping;
+        }
         for photo in &photos {
             shared.eliminate_pose(photo, damping)?;
         }
@@ -283,7 +279,11 @@ impl Bundle {
 
     /// The part of the shared system that comes from the priors.
     fn prior_system(&self, states: &[State]) -> SharedSystem {
-        let mut system = SharedSystem::zeros(self.shared.len());
+        let unknowns = self.shared.len();
+        let mut system = SharedSystem {
+            matrix: DMatrix::zeros(unknowns, unknowns),
+            right: DVector::zeros(unknowns),
+        };
         let values = self.shared_values(states);
         for (i, prior) in self.shared.iter().enumerate() {
             system.matrix[(i, i)] += prior.information();
@@ -296,7 +296,9 @@ impl Bundle {
     fn hold_unconstrained(&self, system: &mut SharedSystem) {
         for (i, prior) in self.shared.iter().enumerate() {
             if prior.is_fixed() || system.matrix[(i, i)] <= 0.0 {
-                system.hold(i);
+                clear_row_and_column(&mut system.matrix, i);
+                system.matrix[(i, i)] = 1.0;
+                system.right[i] = 0.0;
             }
         }
     }
@@ -403,27 +405,6 @@ fn set_pose_covariance(covariance: &mut Square, unknown: usize, cross: &Vector6<
 }
 
 impl SharedSystem {
-    /// No information on any of the unknowns.
-    fn zeros(unknowns: usize) -> Self {
-        Self {
-            matrix: DMatrix::zeros(unknowns, unknowns),
-            right: DVector::zeros(unknowns),
-        }
-    }
-
-    /// Keeps an unknown where it is.
-    fn hold(&mut self, unknown: usize) {
-        clear_row_and_column(&mut self.matrix, unknown);
-        self.matrix[(unknown, unknown)] = 1.0;
-        self.right[unknown] = 0.0;
-    }
-
-    /// Adds what a photo shows of the shared unknowns for its present pose.
-    fn add(&mut self, photo: &PhotoBlock) {
-        self.matrix += &photo.own;
-        self.right += &photo.own_right;
-    }
-
     /// Takes out what the photo's pose can explain as well: the Schur complement.
     fn eliminate_pose(&mut self, photo: &PhotoBlock, damping: f64) -> Option<()> {
         let inverse = photo.inverse_pose(damping)?;
@@ -437,12 +418,6 @@ impl SharedSystem {
         let step = self.matrix.cholesky()?.solve(&self.right);
         let limit = step.amax().max(1.0);
         Some(step / limit)
-    }
-}
-
-fn damp_diagonal(matrix: &mut DMatrix<f64>, damping: f64) {
-    for i in 0..matrix.nrows() {
-        matrix[(i, i)] *= 1.0 + damping;
     }
 }
 
@@ -535,13 +510,6 @@ fn framing_or(label: &Label, unknown: Framing) -> Framing {
     }
 }
 
-/// A photo's problem with a known lens: only the pose is unknown.
-fn with_fixed_lens(problem: &Problem, ln_focal: f64) -> Problem {
-    let mut problem = problem.clone();
-    problem.residuals.priors.fix_lens(ln_focal);
-    problem
-}
-
 /// Gives all photos the priors of the lens of the one that knows most of its focal length, and the
 /// principal point as well as any of them knows it.
 fn share_lens(problems: &mut [Problem]) {
@@ -573,7 +541,10 @@ fn least<'a>(
 
 /// Priors of the lens, and of each surface's stretch.
 fn shared_priors(problems: &[Problem], surface: &[usize]) -> Option<Vec<Prior>> {
-    let mut shared = lens_priors(&problems.first()?.residuals.priors).to_vec();
+    let lens = &problems.first()?.residuals.priors;
+    let principal = Prior::at_zero(lens.principal_sigma);
+    // In the order of `LENS_UNKNOWNS`.
+    let mut shared = vec![lens.ln_focal, principal, principal, lens.kappa];
     let surfaces = surface.iter().max().map_or(0, |last| last + 1);
     shared.extend((0..surfaces).map(|s| {
         let photos = problems.iter().zip(surface).filter(|&(_, &x)| x == s);
@@ -581,12 +552,6 @@ fn shared_priors(problems: &[Problem], surface: &[usize]) -> Option<Vec<Prior>> 
         Prior::at_zero(least(shown_by, |priors| priors.stretch_sigma))
     }));
     Some(shared)
-}
-
-/// In the order of [`LENS_UNKNOWNS`].
-fn lens_priors(priors: &ParameterPriors) -> [Prior; 4] {
-    let principal = Prior::at_zero(priors.principal_sigma);
-    [priors.ln_focal, principal, principal, priors.kappa]
 }
 
 /// What a photo shows, with flat priors of what is shared.
@@ -618,8 +583,4 @@ fn weighted_focal_px(solution: &Solution) -> Option<(f64, f64)> {
     weight
         .is_finite()
         .then_some((weight, solution.focal.from_data_px?))
-}
-
-fn inverse_or_zero(variance: f64) -> f64 {
-    if variance > 0.0 { 1.0 / variance } else { 0.0 }
 }

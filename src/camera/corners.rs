@@ -57,29 +57,21 @@ const OTHER_CORNERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 
 
 fn refuse_coincident(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError> {
     let limit_px = COINCIDENT_PX.max(COINCIDENT_SIGMAS * sigma);
-    CORNER_PAIRS
-        .into_iter()
-        .try_for_each(|pair| refuse_close_pair(c, pair, limit_px))
-}
-
-const CORNER_PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
-
-fn refuse_close_pair(
-    c: &[Point2<f64>; 4],
-    [first, second]: [usize; 2],
-    limit_px: f64,
-) -> Result<(), SolveError> {
-    let distance_px = (c[first] - c[second]).norm();
-    if distance_px < limit_px {
-        return Err(SolveError::Coincident {
-            first,
-            second,
-            distance_px,
-            limit_px,
-        });
+    for [first, second] in CORNER_PAIRS {
+        let distance_px = (c[first] - c[second]).norm();
+        if distance_px < limit_px {
+            return Err(SolveError::Coincident {
+                first,
+                second,
+                distance_px,
+                limit_px,
+            });
+        }
     }
     Ok(())
 }
+
+const CORNER_PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 /// The order in which the corners run clockwise, and what had to be repaired for that.
 fn clockwise(c: &[Point2<f64>; 4]) -> ([usize; 4], Option<Diagnostic>) {
@@ -87,20 +79,14 @@ fn clockwise(c: &[Point2<f64>; 4]) -> ([usize; 4], Option<Diagnostic>) {
     if areas.iter().all(|&a| a > 0.0) {
         ([0, 1, 2, 3], None)
     } else if areas.iter().all(|&a| a < 0.0) {
-        ([0, 3, 2, 1], Some(reversed_warning()))
+        let what = "the corners run anticlockwise; the second and fourth were exchanged";
+        let reversed = Diagnostic::warning(Code::CornersReversed, what);
+        ([0, 3, 2, 1], Some(reversed))
     } else {
-        (by_angle(c), Some(reordered_warning()))
+        let what = "the corners cross each other; sorted clockwise, starting at the first";
+        let reordered = Diagnostic::warning(Code::CornersReordered, what);
+        (by_angle(c), Some(reordered))
     }
-}
-
-fn reversed_warning() -> Diagnostic {
-    let what = "the corners run anticlockwise; the second and fourth were exchanged";
-    Diagnostic::warning(Code::CornersReversed, what)
-}
-
-fn reordered_warning() -> Diagnostic {
-    let what = "the corners cross each other; sorted clockwise, starting at the first";
-    Diagnostic::warning(Code::CornersReordered, what)
 }
 
 /// By angle around the mean (clockwise, as y runs down), rotated so that corner 0 stays first.
@@ -109,47 +95,30 @@ fn by_angle(c: &[Point2<f64>; 4]) -> [usize; 4] {
     let angles = c.map(|p| libm::atan2(p.y - mean.y, p.x - mean.x));
     let mut order = [0, 1, 2, 3];
     order.sort_by(|&i: &usize, &j: &usize| angles[i].total_cmp(&angles[j]));
-    starting_at_zero(order)
-}
-
-fn starting_at_zero(mut ring: [usize; 4]) -> [usize; 4] {
-    let first = ring.iter().position(|&i| i == 0).unwrap_or(0);
-    ring.rotate_left(first);
-    ring
+    let first = order.iter().position(|&i| i == 0).unwrap_or(0);
+    order.rotate_left(first);
+    order
 }
 
 /// Ordered corners must be convex, and none within noise of the line of two others; `order` is
 /// where they are in the label.
 fn refuse_folded(c: &[Point2<f64>; 4], order: [usize; 4], sigma: f64) -> Result<(), SolveError> {
     let areas = triangle_areas(&c.map(|p| p.coords));
+    let limit_px = COLLINEAR_SIGMAS * sigma;
     for (left_out, area) in areas.into_iter().enumerate() {
-        let middle = order[(left_out + 2) % 4];
         let height_px = area / longest_side_without(c, left_out);
-        refuse_flat(middle, height_px, COLLINEAR_SIGMAS * sigma)?;
-        if area <= 0.0 {
-            return Err(collinear(middle, height_px, COLLINEAR_SIGMAS * sigma));
+        if height_px <= -limit_px.max(f64::MIN_POSITIVE) {
+            return Err(SolveError::NotConvex);
+        }
+        if height_px < limit_px || area <= 0.0 {
+            return Err(SolveError::Collinear {
+                corner: order[(left_out + 2) % 4],
+                distance_px: height_px.abs(),
+                limit_px,
+            });
         }
     }
     Ok(())
-}
-
-/// A triangle of three corners is at least so high over its middle one.
-fn refuse_flat(middle: usize, height_px: f64, limit_px: f64) -> Result<(), SolveError> {
-    if height_px <= -limit_px.max(f64::MIN_POSITIVE) {
-        Err(SolveError::NotConvex)
-    } else if height_px < limit_px {
-        Err(collinear(middle, height_px, limit_px))
-    } else {
-        Ok(())
-    }
-}
-
-fn collinear(corner: usize, height_px: f64, limit_px: f64) -> SolveError {
-    SolveError::Collinear {
-        corner,
-        distance_px: height_px.abs(),
-        limit_px,
-    }
 }
 
 /// The longest side of the triangle of the other three corners.
@@ -176,26 +145,19 @@ fn longest_side(c: &[Point2<f64>; 4]) -> f64 {
 
 /// In the order of the label, in which a person looks for them.
 fn far_outside(labelled: [Point2<f64>; 4], image: [u32; 2]) -> impl Iterator<Item = Diagnostic> {
-    (0..4)
-        .filter(move |&corner| is_far_outside(labelled[corner], image))
-        .map(outside_warning)
-}
-
-fn outside_warning(corner: usize) -> Diagnostic {
-    let name = corner_name(corner);
-    let what = format!("the {name} corner lies more than a diagonal outside the picture");
-    Diagnostic::warning(Code::CornerOutside, what)
+    let far = (0..4).filter(move |&corner| is_far_outside(labelled[corner], image));
+    far.map(|corner| {
+        let name = corner_name(corner);
+        let what = format!("the {name} corner lies more than a diagonal outside the picture");
+        Diagnostic::warning(Code::CornerOutside, what)
+    })
 }
 
 /// More than a diagonal of the picture.
 fn is_far_outside(corner: Point2<f64>, image: [u32; 2]) -> bool {
     let size = Vector2::from(image.map(f64::from));
-    distance_outside_px(corner, size) > size.norm()
-}
-
-fn distance_outside_px(corner: Point2<f64>, size: Vector2<f64>) -> f64 {
     let inside = Vector2::new(corner.x.clamp(0.0, size.x), corner.y.clamp(0.0, size.y));
-    (corner.coords - inside).norm()
+    (corner.coords - inside).norm() > size.norm()
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! The direct linear transformation with Hartley's normalisation: both point sets to zero mean and
 //! RMS distance sqrt 2.
 
-use crate::geom::{Homography, Point2, Vector2, Vector3};
+use crate::geom::{Homography, Point2, Vector3, mean_point};
 use nalgebra::{Matrix3, SMatrix, SVector};
 
 /// Singular systems have a second eigenvalue below this, a point.
@@ -16,28 +16,15 @@ pub(crate) fn homography(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<Homogra
     if pairs.len() < 4 {
         return None;
     }
-    let from = normalisation(pairs.iter().map(|p| p.0))?;
-    let to = normalisation(pairs.iter().map(|p| p.1))?;
-    let normalized = pairs
+    let (sources, targets): (Vec<_>, Vec<_>) = pairs.iter().copied().unzip();
+    let (from, to) = (normalisation(&sources)?, normalisation(&targets)?);
+    let rows = pairs
         .iter()
-        .map(|(p, q)| (from * p.to_homogeneous(), to * q.to_homogeneous()));
-    let square = normal_matrix(normalized);
+        .flat_map(|(p, q)| equations(&(from * p.to_homogeneous()), &(to * q.to_homogeneous())));
+    let square = rows.map(|row| row * row.transpose()).sum();
     let h = null_vector(square, SINGULAR_EIGENVALUE * pairs.len() as f64)?;
-    let map = to.try_inverse()? * matrix_from(&h) * from;
+    let map = to.try_inverse()? * Matrix3::from_row_slice(h.as_slice()) * from;
     map.iter().all(|v| v.is_finite()).then_some(Homography(map))
-}
-
-/// A matrix from its elements row by row.
-fn matrix_from(elements: &SVector<f64, 9>) -> Matrix3<f64> {
-    Matrix3::from_fn(|i, j| elements[3 * i + j])
-}
-
-/// The sum of the squares of all equations.
-fn normal_matrix(pairs: impl Iterator<Item = (Vector3<f64>, Vector3<f64>)>) -> SMatrix<f64, 9, 9> {
-    pairs
-        .flat_map(|(p, q)| equations(&p, &q))
-        .map(|row| row * row.transpose())
-        .sum()
 }
 
 /// The two linear equations of a pair of points, one for each coordinate.
@@ -65,23 +52,14 @@ fn null_vector(square: SMatrix<f64, 9, 9>, threshold: f64) -> Option<SVector<f64
 }
 
 /// The map to zero mean and a root mean square distance of sqrt 2.
-fn normalisation(points: impl Iterator<Item = Point2<f64>> + Clone) -> Option<Matrix3<f64>> {
-    let (mean, spread) = mean_and_spread(points);
+fn normalisation(points: &[Point2<f64>]) -> Option<Matrix3<f64>> {
+    let mean = mean_point(points);
+    let squares = points.iter().map(|p| (p.coords - mean).norm_squared());
+    let spread = (squares.sum::<f64>() / points.len() as f64).sqrt();
     let scale = std::f64::consts::SQRT_2 / spread;
     let (x, y) = (-scale * mean.x, -scale * mean.y);
     let matrix = Matrix3::new(scale, 0.0, x, 0.0, scale, y, 0.0, 0.0, 1.0);
     scale.is_finite().then_some(matrix)
-}
-
-/// The mean of points and their root mean square distance from it.
-fn mean_and_spread(points: impl Iterator<Item = Point2<f64>> + Clone) -> (Vector2<f64>, f64) {
-    let count = points.clone().count() as f64;
-    let sum = points
-        .clone()
-        .fold(Vector2::zeros(), |sum, p| sum + p.coords);
-    let mean = sum / count;
-    let squares: f64 = points.map(|p| (p.coords - mean).norm_squared()).sum();
-    (mean, (squares / count).sqrt())
 }
 
 #[cfg(test)]

@@ -24,18 +24,15 @@ pub fn doctor(label: &Label, solution: &Solution, options: &SolveOptions) -> Str
         surface_line(solution),
         height_line(solution),
     ];
-    misfit_line(solution)
+    let misfit = solution.misfit();
+    misfit
+        .map(|error| format!("This camera cannot be used: {error}."))
         .into_iter()
         .chain(lines)
         .chain(warning_lines(solution))
         .chain(height_advice(label, solution, options))
         .map(|line| line + "\n")
         .collect()
-}
-
-fn misfit_line(solution: &Solution) -> Option<String> {
-    let error = solution.misfit()?;
-    Some(format!("This camera cannot be used: {error}."))
 }
 
 /// All warnings but that of the framing, which has a line of its own.
@@ -152,10 +149,10 @@ fn height_advice(label: &Label, solution: &Solution, options: &SolveOptions) -> 
         return None;
     }
     let height = solution.camera.height_m();
-    let better = solve(&with_measured_height(label, height), options)
-        .ok()?
-        .sigma
-        .height_px;
+    let mut measured = label.clone();
+    measured.camera.height_m = Some(height);
+    measured.camera.height_sigma_m = Some(TAPE_HEIGHT_SIGMA * height);
+    let better = solve(&measured, options).ok()?.sigma.height_px;
     let place = place_for_more(label);
     (better < WORTHWHILE_FACTOR * solution.sigma.height_px).then(|| {
         format!(
@@ -166,14 +163,6 @@ fn height_advice(label: &Label, solution: &Solution, options: &SolveOptions) -> 
             solution.sigma.height_px
         )
     })
-}
-
-/// The label as it would be with the height of the lens, measured with a tape.
-fn with_measured_height(label: &Label, height: f64) -> Label {
-    let mut measured = label.clone();
-    measured.camera.height_m = Some(height);
-    measured.camera.height_sigma_m = Some(TAPE_HEIGHT_SIGMA * height);
-    measured
 }
 
 #[cfg(test)]

@@ -161,17 +161,6 @@ impl SolveError {
             _ => None,
         }
     }
-
-    /// The camera fits with width and height exchanged.
-    pub(super) fn is_exchange(&self) -> bool {
-        matches!(
-            self,
-            Self::NoFit {
-                exchanged: Some(_),
-                ..
-            }
-        )
-    }
 }
 
 /// What a person calls a corner of a label, which counts from 0.

@@ -157,19 +157,14 @@ impl Camera {
 
     /// The camera in OpenCV's terms.
     pub fn to_opencv(&self) -> OpencvCamera {
-        OpencvCamera {
-            k: matrix_rows(&self.opencv_intrinsics()),
-            r: matrix_rows(&self.rotation()),
-            t: self.camera_from_world.translation.vector.into(),
-        }
-    }
-
-    /// The camera matrix where pixel centres are integers.
-    fn opencv_intrinsics(&self) -> Matrix3<f64> {
         let mut k = self.intrinsics();
         k[(0, 2)] -= 0.5;
         k[(1, 2)] -= 0.5;
-        k
+        OpencvCamera {
+            k: matrix_rows(&k),
+            r: matrix_rows(&self.rotation()),
+            t: self.camera_from_world.translation.vector.into(),
+        }
     }
 
     /// The camera that OpenCV means, for a picture of this size.
@@ -240,16 +235,12 @@ impl ColmapModel {
     pub fn new<'a>(views: impl IntoIterator<Item = (&'a str, &'a Camera, f64)>) -> Self {
         let mut model = Self::default();
         for (i, (name, camera, k1)) in views.into_iter().enumerate() {
-            model.add_view(i + 1, name, camera, k1);
+            let (id, pose) = (i + 1, colmap_pose(camera));
+            // Writing to a string cannot fail.
+            let _ = writeln!(model.cameras, "{id} {}", colmap_intrinsics(camera, k1));
+            let _ = writeln!(model.images, "{id} {pose} {id} {name}\n");
         }
         model
-    }
-
-    fn add_view(&mut self, id: usize, name: &str, camera: &Camera, k1: f64) {
-        let pose = colmap_pose(camera);
-        // Writing to a string cannot fail.
-        let _ = writeln!(self.cameras, "{id} {}", colmap_intrinsics(camera, k1));
-        let _ = writeln!(self.images, "{id} {pose} {id} {name}\n");
     }
 }
 

@@ -4,9 +4,8 @@ use super::exchange::{BlenderCamera, OpencvCamera, matrix_rows};
 use super::focal::FocalSource;
 use super::label::{Framing, Label, LabelImage};
 use super::label_check::MAX_MAGNITUDE;
-use super::model::Square;
 use super::pinhole::{Camera, k1_from_kappa};
-use super::solution::{FocalFinding, Solution};
+use super::solution::Solution;
 use super::uncertainty::UNKNOWN_NAMES;
 use crate::diagnostic::Diagnostic;
 use crate::error::{Error, Result};
@@ -223,30 +222,20 @@ impl CameraFile {
             check_positive("surface", side)?;
         }
         check_pose(&self.found.opencv)?;
-        check_above_surface(&self.camera())
+        if self.camera().height_m() > 0.0 {
+            Ok(())
+        } else {
+            Err(Error::value("opencv.t", "the camera is below the surface"))
+        }
     }
 
     fn check_image(&self, image: [u32; 2]) -> Result<()> {
-        let size = self.image.size();
-        if size == image && !image.contains(&0) {
+        let ([w, h], [width, height]) = (self.image.size(), image);
+        if self.image.size() == image && !image.contains(&0) {
             return Ok(());
         }
-        Err(other_size(size, image))
-    }
-}
-
-impl FittedSurface {
-    fn new([width_m, height_m]: [f64; 2]) -> Self {
-        Self { width_m, height_m }
-    }
-}
-
-impl FocalPrior {
-    fn new(focal: &FocalFinding) -> Self {
-        Self {
-            px: focal.prior_px,
-            sigma: finite(focal.prior_sigma),
-        }
+        let what = format!("{w} x {h} pixels, expected {width} x {height}");
+        Err(Error::value("image", what))
     }
 }
 
@@ -265,19 +254,6 @@ impl Model {
             .iter()
             .try_for_each(|v| check_magnitude("model.principal_point_px", *v))
     }
-}
-
-fn check_above_surface(camera: &Camera) -> Result<()> {
-    if camera.height_m() > 0.0 {
-        Ok(())
-    } else {
-        Err(Error::value("opencv.t", "the camera is below the surface"))
-    }
-}
-
-fn other_size([w, h]: [u32; 2], [width, height]: [u32; 2]) -> Error {
-    let what = format!("{w} x {h} pixels, expected {width} x {height}");
-    Error::value("image", what)
 }
 
 fn check_pose(opencv: &OpencvCamera) -> Result<()> {
@@ -363,7 +339,8 @@ fn checksum_without_wall(label: &Label) -> u32 {
 
 impl FoundCamera {
     fn new(solution: &Solution) -> Self {
-        let camera = &solution.camera;
+        let (camera, focal) = (&solution.camera, &solution.focal);
+        let [width_m, height_m] = solution.size;
         let alternative = solution.alternative.as_deref().map(Self::new);
         // Long, but only a list: one line for each field of the file.
         Self {
@@ -372,15 +349,18 @@ impl FoundCamera {
             center_m: camera.center().into(),
             tilt_deg: camera.tilt_deg(),
             blender: camera.to_blender(),
-            surface: FittedSurface::new(solution.size),
+            surface: FittedSurface { width_m, height_m },
             homography: matrix_rows(&camera.pixel_from_surface().0),
             sigma: SigmaRecord::new(solution),
             fit: FitRecord::new(solution),
             framing: solution.framing,
             focal_source: solution.focal_source,
-            data_share: solution.focal.share,
-            focal_from_data: solution.focal.from_data_px,
-            focal_prior: FocalPrior::new(&solution.focal),
+            data_share: focal.share,
+            focal_from_data: focal.from_data_px,
+            focal_prior: FocalPrior {
+                px: focal.prior_px,
+                sigma: finite(focal.prior_sigma),
+            },
             warnings: solution.warnings.clone(),
             alternative: alternative.map(Box::new),
         }
@@ -390,6 +370,7 @@ impl FoundCamera {
 impl SigmaRecord {
     fn new(solution: &Solution) -> Self {
         let sigma = &solution.sigma;
+        let rows = sigma.covariance.row_iter();
         Self {
             ln_f: finite(sigma.ln_focal),
             tilt_deg: finite(sigma.tilt.to_degrees()),
@@ -398,7 +379,9 @@ impl SigmaRecord {
             height_ref_m: sigma.reference_height,
             principal_point_px: finite(sigma.principal_px),
             unknowns: UNKNOWN_NAMES.map(String::from).into(),
-            covariance: finite_rows(&sigma.covariance),
+            covariance: rows
+                .map(|row| row.iter().copied().map(finite).collect())
+                .collect(),
         }
     }
 }
@@ -406,13 +389,6 @@ impl SigmaRecord {
 /// The standard deviations of a covariance.
 fn deviations(covariance: &Matrix3<f64>) -> [f64; 3] {
     [0, 1, 2].map(|i| covariance[(i, i)].max(0.0).sqrt())
-}
-
-fn finite_rows(square: &Square) -> Vec<Vec<Option<f64>>> {
-    square
-        .row_iter()
-        .map(|row| row.iter().map(|&v| finite(v)).collect())
-        .collect()
 }
 
 impl FitRecord {

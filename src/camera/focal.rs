@@ -2,6 +2,7 @@
 
 use super::label::{Framing, Label, LabelCamera};
 use super::options::Priors;
+use super::pinhole::diagonal_px;
 use super::prior::Prior;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
@@ -66,12 +67,12 @@ pub(crate) enum PriorSource {
 
 /// The focal length in pixels that a 35 mm equivalent stands for, by the diagonal.
 pub fn focal_from_equivalent(focal_35mm: f64, image: [u32; 2]) -> f64 {
-    focal_35mm * diagonal(image) / FULL_FRAME_DIAGONAL_MM
+    focal_35mm * diagonal_px(image) / FULL_FRAME_DIAGONAL_MM
 }
 
 /// The 35 mm equivalents that a picture of some size can have.
 pub(crate) fn plausible_equivalents(image: [u32; 2]) -> RangeInclusive<f64> {
-    let mm_per_side = longer_side(image) * FULL_FRAME_DIAGONAL_MM / diagonal(image);
+    let mm_per_side = longer_side(image) * FULL_FRAME_DIAGONAL_MM / diagonal_px(image);
     rounded_range(EQUIVALENT_SIDES, mm_per_side)
 }
 
@@ -102,10 +103,13 @@ pub(crate) fn length_prior(
     match (camera.focal_px, equivalent_px(label, framing)) {
         (Some(px), _) => (stated_prior(camera, px, STATED_SIGMA), PriorSource::Label),
         (None, Some(px)) => (equivalent_prior(camera, framing, px), PriorSource::Exif),
-        (None, None) => (
-            nominal_prior(label.taken_size(), priors),
-            PriorSource::Nominal,
-        ),
+        (None, None) => {
+            let nominal = Prior {
+                mean: libm::log(nominal_px(label.taken_size())),
+                sigma: priors.focal_sigma,
+            };
+            (nominal, PriorSource::Nominal)
+        }
     }
 }
 
@@ -137,20 +141,8 @@ fn equivalent_prior(camera: &LabelCamera, framing: Framing, focal_px: f64) -> Pr
     prior
 }
 
-/// Where nothing states the focal length.
-fn nominal_prior(image: [u32; 2], priors: &Priors) -> Prior {
-    Prior {
-        mean: libm::log(nominal_px(image)),
-        sigma: priors.focal_sigma,
-    }
-}
-
 fn longer_side(image: [u32; 2]) -> f64 {
     f64::from(image[0].max(image[1]))
-}
-
-fn diagonal(image: [u32; 2]) -> f64 {
-    libm::hypot(f64::from(image[0]), f64::from(image[1]))
 }
 
 #[cfg(test)]

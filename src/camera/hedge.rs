@@ -11,38 +11,17 @@ use super::import::place_for_more;
 use super::label::{Framing, Label};
 use super::model::Unknowns;
 use super::options::SolveOptions;
-use super::pinhole::{Camera, distorted};
+use super::pinhole::distorted;
 use super::rectangle::corner_points;
 use super::solution::{Sigma, Solution};
 use super::uncertainty::{grid_at_height, repaired_variance};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::geom::{Point2, Point3, Vector2, Vector3};
+use crate::geom::{Point2, Point3, Vector2};
 use nalgebra::Matrix2;
 
 /// Corners that fit a cropped picture this much better than a whole one belong to a cropped one.
 pub(crate) fn is_off_center(whole: f64, loose: f64) -> bool {
     whole > loose + CHI2_99
-}
-
-/// How far apart two cameras are.
-struct CameraDifference {
-    ln_focal: f64,
-    tilt: f64,
-    center: Vector3<f64>,
-    /// Along one axis, root mean square.
-    principal_px: f64,
-}
-
-impl CameraDifference {
-    fn new(from: &Camera, to: &Camera) -> Self {
-        let principal = to.principal_px - from.principal_px;
-        Self {
-            ln_focal: libm::log(to.focal_px.x / from.focal_px.x),
-            tilt: to.tilt() - from.tilt(),
-            center: to.center() - from.center(),
-            principal_px: principal.norm() / std::f64::consts::SQRT_2,
-        }
-    }
 }
 
 impl Solution {
@@ -103,7 +82,8 @@ impl Solution {
     }
 
     fn off_center_warning(&self) -> Diagnostic {
-        let off_px = off_center_px(&self.camera);
+        let [w, h] = self.camera.image.map(f64::from);
+        let off_px = (self.camera.principal_px - Point2::new(w / 2.0, h / 2.0)).norm();
         let what = format!(
             "the principal point lies {off_px:.0} px (+- {:.0}) off the middle of the picture: it was cropped, the lens \
              was shifted, or the EXIF focal length is wrong",
@@ -113,18 +93,20 @@ impl Solution {
     }
 
     fn sigma_with(&self, loose: &Self, apart: &Unknowns) -> Sigma {
-        let (sigma, off) = (
-            &loose.sigma,
-            CameraDifference::new(&self.camera, &loose.camera),
-        );
+        let (sigma, from, to) = (&loose.sigma, &self.camera, &loose.camera);
+        let ln_focal = libm::log(to.focal_px.x / from.focal_px.x);
+        let center = to.center() - from.center();
+        let principal = to.principal_px - from.principal_px;
+        // Along one axis, root mean square.
+        let principal_px = principal.norm() / std::f64::consts::SQRT_2;
         Sigma {
-            ln_focal: libm::hypot(sigma.ln_focal, off.ln_focal),
-            tilt: libm::hypot(sigma.tilt, off.tilt),
-            center: sigma.center + off.center * off.center.transpose(),
+            ln_focal: libm::hypot(sigma.ln_focal, ln_focal),
+            tilt: libm::hypot(sigma.tilt, to.tilt() - from.tilt()),
+            center: sigma.center + center * center.transpose(),
             corners_px: self.corner_covariances_with(loose),
             reference_height: self.sigma.reference_height,
             height_px: libm::hypot(sigma.height_px, self.height_apart_px(loose)),
-            principal_px: libm::hypot(sigma.principal_px, off.principal_px),
+            principal_px: libm::hypot(sigma.principal_px, principal_px),
             covariance: sigma.covariance + apart * apart.transpose(),
         }
     }
@@ -156,12 +138,6 @@ impl Solution {
     fn sees(&self, point: Point3<f64>) -> Vector2<f64> {
         distorted(&self.camera, self.kappa, point).coords
     }
-}
-
-/// Distance of the principal point from the middle of the picture.
-fn off_center_px(camera: &Camera) -> f64 {
-    let [w, h] = camera.image.map(f64::from);
-    (camera.principal_px - Point2::new(w / 2.0, h / 2.0)).norm()
 }
 
 #[cfg(test)]

@@ -21,12 +21,17 @@ pub fn init_label(photo: &Path, path: &Path, like: Option<&Label>) -> Result<Lab
         [1.0; 2],
     );
     label.image.file = file_below(photo, path)?;
-    label.surface = unmeasured_surface();
+    label.surface = LabelSurface {
+        id: "surface".into(),
+        ..LabelSurface::default()
+    };
     if let Some(like) = like {
         copy_shared(&mut label, like);
     }
     if equivalent_mm(&label, &header).is_some() {
-        forget_equivalent(&mut label.camera);
+        // A lens that zooms has another focal length in each photo: the other photo's, which its
+        // label may have from EXIF data, gives way to the photo's own.
+        label.camera.forget_equivalent();
     }
     apply_exif(&mut label, &header);
     let camera = &mut label.camera;
@@ -34,60 +39,26 @@ pub fn init_label(photo: &Path, path: &Path, like: Option<&Label>) -> Result<Lab
     Ok(label)
 }
 
-fn unmeasured_surface() -> LabelSurface {
-    LabelSurface {
-        id: "surface".into(),
-        ..LabelSurface::default()
-    }
-}
-
-/// A lens that zooms has another focal length in each photo: the other photo's, which its label may
-/// have from EXIF data, gives way to the photo's own.
-fn forget_equivalent(camera: &mut LabelCamera) {
-    if camera.focal_px.is_none() {
-        (camera.focal_35mm, camera.focal_sigma) = (None, None);
-        camera.focal_fixed = false;
-    }
-}
-
-/// Takes over from another label of the same rectangle what the photos share.
+/// Takes over from another label of the same rectangle what the photos share: the lens, and what
+/// was cut off the picture, hold for pictures of the same size, the camera's name for all.
 fn copy_shared(label: &mut Label, like: &Label) {
-    label.surface = without_corners(&like.surface);
-    label.markers = like.markers.clone();
-    copy_camera(label, like);
-}
-
-/// The lens, and what was cut off the picture, hold for pictures of the same size, the camera's
-/// name for all.
-fn copy_camera(label: &mut Label, like: &Label) {
-    if like.image_size() == label.image_size() {
-        label.image.crop = like.image.crop;
-        label.camera = without_height(&like.camera);
-        label.camera.principal_point_px = principal_from_corner(like);
-    }
-    label.camera.id = like.camera.id.clone();
-}
-
-fn without_corners(surface: &LabelSurface) -> LabelSurface {
-    LabelSurface {
+    label.surface = LabelSurface {
         corners_px: None,
         source: None,
-        ..surface.clone()
+        ..like.surface.clone()
+    };
+    label.markers = like.markers.clone();
+    if like.image_size() == label.image_size() {
+        let principal = like.camera.principal_point_px;
+        label.image.crop = like.image.crop;
+        label.camera = LabelCamera {
+            principal_point_px: principal.map(|stated| like.pixel(stated).into()),
+            height_m: None,
+            height_sigma_m: None,
+            ..like.camera.clone()
+        };
     }
-}
-
-fn without_height(camera: &LabelCamera) -> LabelCamera {
-    LabelCamera {
-        height_m: None,
-        height_sigma_m: None,
-        ..camera.clone()
-    }
-}
-
-/// The stated principal point, in a new label's pixels.
-fn principal_from_corner(label: &Label) -> Option<[f64; 2]> {
-    let stated = label.camera.principal_point_px?;
-    Some(label.pixel(stated).into())
+    label.camera.id = like.camera.id.clone();
 }
 
 /// The photo as a label at `path` names it.
@@ -181,7 +152,10 @@ impl FoldedLines {
                 *open = format!("{}{part}", open.trim_end());
                 self.close_list();
             }
-            Some(open) if is_number(part) => append_number(open, part),
+            Some(open) if is_number(part) => {
+                *open += part;
+                *open += if part.ends_with(',') { " " } else { "" };
+            }
             _ => {
                 self.close_list();
                 self.lines.push(line.to_owned());
@@ -192,11 +166,6 @@ impl FoldedLines {
     fn close_list(&mut self) {
         self.lines.extend(self.list.take());
     }
-}
-
-fn append_number(list: &mut String, number: &str) {
-    *list += number;
-    *list += if number.ends_with(',') { " " } else { "" };
 }
 
 /// An element of a list of numbers, `null` among them.
@@ -212,11 +181,17 @@ mod tests {
     use crate::image::Image;
     use crate::pixel::Srgb8;
 
+    /// A photo of 90 x 60 pixels without EXIF data.
+    fn bare_photo(folder: &tempfile::TempDir) -> std::path::PathBuf {
+        let photo = folder.path().join("a.png");
+        io::write(&photo, &Image::<Srgb8>::new(90, 60)).unwrap();
+        photo
+    }
+
     #[test]
     fn a_label_from_nothing_reads_back_without_its_corners() {
         let folder = tempfile::tempdir().unwrap();
-        let photo = folder.path().join("a.png");
-        io::write(&photo, &Image::<Srgb8>::new(90, 60)).unwrap();
+        let photo = bare_photo(&folder);
         let path = folder.path().join("a.label.json");
         let mut label = init_label(&photo, &path, None).unwrap();
         (label.surface.width_m, label.surface.height_m) = (Some(0.56), Some(0.37));
@@ -238,8 +213,7 @@ mod tests {
     #[test]
     fn another_label_of_the_rectangle_lends_what_the_photos_share() {
         let folder = tempfile::tempdir().unwrap();
-        let photo = folder.path().join("a.png");
-        io::write(&photo, &Image::<Srgb8>::new(90, 60)).unwrap();
+        let photo = bare_photo(&folder);
         let mut like = Label::new([90, 60], [[1.0; 2]; 4], [0.6, 0.4]);
         (like.surface.id, like.camera.id) = ("tray".into(), Some("phone".into()));
         (like.camera.focal_px, like.camera.height_m) = (Some(80.0), Some(1.0));
@@ -261,8 +235,7 @@ mod tests {
     #[test]
     fn the_lens_comes_with_the_frame_that_it_is_stated_in() {
         let folder = tempfile::tempdir().unwrap();
-        let photo = folder.path().join("a.png");
-        io::write(&photo, &Image::<Srgb8>::new(90, 60)).unwrap();
+        let photo = bare_photo(&folder);
         let path = photo.with_extension("label.json");
         let mut like = Label::new([90, 60], [[1.0; 2]; 4], [0.6, 0.4]);
         like.pixel_origin = PixelOrigin::Center;

@@ -166,16 +166,12 @@ fn contradiction_warning() -> Diagnostic {
 
 /// The photos that no camera fits when they are alone.
 fn misfit_outliers(photos: &[Result<Solution, SolveError>]) -> Vec<OutlierPhoto> {
-    photos
-        .iter()
-        .enumerate()
-        .filter_map(|(photo, solution)| misfit_outlier(photo, solution.as_ref().ok()?))
-        .collect()
-}
-
-fn misfit_outlier(photo: usize, solution: &Solution) -> Option<OutlierPhoto> {
-    let chi2 = solution.fit.chi2;
-    solution.misfit().map(|_| OutlierPhoto { photo, chi2 })
+    let misfits = photos.iter().enumerate().filter_map(|(photo, solution)| {
+        let solution = solution.as_ref().ok()?;
+        let chi2 = solution.fit.chi2;
+        solution.misfit().map(|_| OutlierPhoto { photo, chi2 })
+    });
+    misfits.collect()
 }
 
 /// Photos of one camera, and what each gives alone, with the same options.
@@ -209,14 +205,11 @@ impl JointSolver<'_> {
         let Some(conflict) = estimate.conflict else {
             return Ok(Some(estimate));
         };
-        let warned = |estimate: JointEstimate| {
-            let warning = conflict.warning(&estimate.solutions[0]);
-            estimate.warned(&warning)
+        let estimate = match conflict.is_with_exif() {
+            true => self.without_exif()?,
+            false => Some(estimate),
         };
-        match conflict.is_with_exif() {
-            true => Ok(self.without_exif()?.map(warned)),
-            false => Ok(Some(warned(estimate))),
-        }
+        Ok(estimate.map(|estimate| estimate.warned(&conflict)))
     }
 
     fn without_exif(&self) -> Result<Option<JointEstimate>, SolveError> {
@@ -278,12 +271,13 @@ impl JointSolver<'_> {
     fn estimate_from(&self, used: &[usize], unknown: Framing) -> Result<JointEstimate, SolveError> {
         let bundle = Bundle::new(self.labels, used, unknown, self.options)?;
         let best = bundle.best(self.alone).ok_or(SolveError::NoPose)?;
+        let fits = best.chi2.iter().zip(bundle.degrees_of_freedom());
         Ok(JointEstimate {
             used: used.to_vec(),
             solutions: bundle.solutions(&best, self.options),
             conflict: bundle.focal_conflict(&best),
             states: best.states,
-            fits: PhotoFit::of_all(&best.chi2, &bundle.degrees_of_freedom()),
+            fits: fits.map(|(&chi2, dof)| PhotoFit::new(chi2, dof)).collect(),
             cost: best.cost,
             shared_dof: bundle.shared_degrees_of_freedom(),
             outliers: Vec::new(),
@@ -308,11 +302,6 @@ impl PhotoFit {
             dof,
             probability: chi::exceeds(chi2, dof).unwrap_or(1.0),
         }
-    }
-
-    fn of_all(chi2: &[f64], dof: &[usize]) -> Vec<Self> {
-        let pairs = chi2.iter().zip(dof);
-        pairs.map(|(&chi2, &dof)| Self::new(chi2, dof)).collect()
     }
 
     /// By probability, or where both have too little of it to be told apart, by chi squared per
@@ -346,7 +335,8 @@ impl JointEstimate {
     }
 
     /// With a warning about every photo.
-    fn warned(mut self, warning: &Diagnostic) -> Self {
+    fn warned(mut self, conflict: &FocalConflict) -> Self {
+        let warning = conflict.warning(&self.solutions[0]);
         let all = self.solutions.iter_mut();
         all.for_each(|solution| solution.warnings.push(warning.clone()));
         self
@@ -363,21 +353,16 @@ impl JointEstimate {
     fn hedged(mut self, loose: &Self, labels: &[Label], options: &SolveOptions) -> Self {
         let solutions = std::mem::take(&mut self.solutions).into_iter().enumerate();
         self.solutions = solutions
-            .map(|(i, solution)| match loose.index_of(self.used[i]) {
-                None => solution,
-                Some(other) => {
-                    let apart = self.states[i].step_to(&loose.states[other]);
-                    let label = &labels[self.used[i]];
-                    solution.hedged(&loose.solutions[other], &apart, label, options)
-                }
+            .map(|(i, solution)| {
+                let photo = self.used[i];
+                let Some(other) = loose.used.iter().position(|&used| used == photo) else {
+                    return solution;
+                };
+                let apart = self.states[i].step_to(&loose.states[other]);
+                solution.hedged(&loose.solutions[other], &apart, &labels[photo], options)
             })
             .collect();
         self
-    }
-
-    /// Where a photo is among those that were used.
-    fn index_of(&self, photo: usize) -> Option<usize> {
-        self.used.iter().position(|used| *used == photo)
     }
 }
 
@@ -464,10 +449,9 @@ fn with_shared_lens(labels: &[Label]) -> Vec<Label> {
 /// Takes over the principal point of the same picture at another size.
 fn share_principal_point(label: &mut Label, other: &Label) {
     let scale = diagonal_px(label) / diagonal_px(other);
-    let offset_px = Vector2::repeat(label.pixel_origin.offset_px());
     let principal = other.camera.principal_point_px;
     label.camera.principal_point_px =
-        principal.map(|px| (other.pixel(px) * scale - offset_px).into());
+        principal.map(|px| label.labelled_px(other.pixel(px) * scale));
     let sigma_px = other.camera.principal_point_sigma_px;
     label.camera.principal_point_sigma_px = sigma_px.map(|sigma| sigma * scale);
 }
@@ -479,13 +463,9 @@ fn same_frame(a: &Label, b: &Label) -> bool {
         return false;
     }
     if is_part(a) || is_part(b) {
-        return show_same_part(a, b);
+        return a.image_size() == b.image_size() && a.image.crop == b.image.crop;
     }
     have_same_shape(a.image_size(), b.image_size())
-}
-
-fn show_same_part(a: &Label, b: &Label) -> bool {
-    a.image_size() == b.image_size() && a.image.crop == b.image.crop
 }
 
 /// Two sizes of a picture have the same shape.

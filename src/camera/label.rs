@@ -230,12 +230,22 @@ impl Label {
     /// A label of a rectangle of `size` metres, seen at `corners_px` (from the top left, clockwise)
     /// in a picture of `image` pixels; nothing else is known.
     pub fn new(image: [u32; 2], corners_px: [[f64; 2]; 4], size: [f64; 2]) -> Self {
+        let ([width, height], [width_m, height_m]) = (image, size.map(Some));
         Self {
             format: LabelFormat::PlaneLabel,
             version: 1,
-            image: LabelImage::unnamed(image),
+            image: LabelImage {
+                width,
+                height,
+                ..LabelImage::default()
+            },
             pixel_origin: PixelOrigin::Corner,
-            surface: LabelSurface::unnamed(corners_px, size),
+            surface: LabelSurface {
+                width_m,
+                height_m,
+                corners_px: Some(corners_px),
+                ..LabelSurface::default()
+            },
             camera: LabelCamera::default(),
             points: Vec::new(),
             markers: None,
@@ -257,22 +267,31 @@ impl Label {
     /// The centre of the picture that the camera took, in this one's pixels.
     pub(crate) fn taken_center(&self) -> Point2<f64> {
         let center = self.taken_size().map(|side| f64::from(side) / 2.0);
-        Point2::from(center) - self.image.crop_offset_px()
+        let offset_px = self.image.crop.map_or([0.0; 2], |crop| crop.offset_px);
+        Point2::from(center) - Vector2::from(offset_px)
     }
 
     /// Which part of the picture that the camera took this one is.
     pub fn framing(&self) -> Framing {
+        let camera = &self.camera;
+        let states_principal_point =
+            camera.principal_point_px.is_some() || camera.principal_point_sigma_px.is_some();
         match self.image.cropped {
             _ if self.image.crop.is_some() => Framing::Whole,
             Some(true) => Framing::Cropped,
-            None if !self.camera.states_principal_point() => Framing::Unknown,
+            None if !states_principal_point => Framing::Unknown,
             _ => Framing::Whole,
         }
     }
 
     /// A labelled pixel position in our convention.
     pub(crate) fn pixel(&self, px: [f64; 2]) -> Point2<f64> {
-        Point2::from(px) + Vector2::repeat(self.pixel_origin.offset_px())
+        Point2::from(px) + self.pixel_origin.offset_px()
+    }
+
+    /// A pixel position in our convention, as the label would state it.
+    pub(crate) fn labelled_px(&self, px: Point2<f64>) -> [f64; 2] {
+        (px - self.pixel_origin.offset_px()).into()
     }
 }
 
@@ -290,30 +309,9 @@ impl LabelImage {
     pub(crate) fn size(&self) -> [u32; 2] {
         [self.width, self.height]
     }
-
-    /// The upper left corner in the picture that the camera took, pixels.
-    fn crop_offset_px(&self) -> Vector2<f64> {
-        self.crop.map_or([0.0; 2], |crop| crop.offset_px).into()
-    }
-    fn unnamed([width, height]: [u32; 2]) -> Self {
-        Self {
-            width,
-            height,
-            ..Self::default()
-        }
-    }
 }
 
 impl LabelSurface {
-    fn unnamed(corners_px: [[f64; 2]; 4], [width, height]: [f64; 2]) -> Self {
-        Self {
-            width_m: Some(width),
-            height_m: Some(height),
-            corners_px: Some(corners_px),
-            ..Self::default()
-        }
-    }
-
     /// The length of a side is stated.
     pub(crate) fn has_side(&self) -> bool {
         self.width_m.is_some() || self.height_m.is_some()
@@ -325,17 +323,21 @@ impl LabelSurface {
 }
 
 impl LabelCamera {
-    fn states_principal_point(&self) -> bool {
-        self.principal_point_px.is_some() || self.principal_point_sigma_px.is_some()
+    /// Drops what EXIF data say of the focal length, where that is what the label goes by.
+    pub(super) fn forget_equivalent(&mut self) {
+        if self.focal_px.is_none() {
+            (self.focal_35mm, self.focal_sigma) = (None, None);
+            self.focal_fixed = false;
+        }
     }
 }
 
 impl PixelOrigin {
-    /// What has to be added to a coordinate to bring it into our convention.
-    pub(crate) fn offset_px(self) -> f64 {
+    /// What has to be added to a position to bring it into our convention.
+    fn offset_px(self) -> Vector2<f64> {
         match self {
-            Self::Corner => 0.0,
-            Self::Center => 0.5,
+            Self::Corner => Vector2::zeros(),
+            Self::Center => Vector2::repeat(0.5),
         }
     }
 }
@@ -412,7 +414,10 @@ fn missing_keys(value: &Value) -> Option<String> {
     if missing.is_empty() || !value.is_object() {
         return None;
     }
-    missing.extend(missing_alternatives(value));
+    let lacking = KEY_ALTERNATIVES
+        .into_iter()
+        .filter(|(keys, _)| keys.iter().all(|key| is_missing(value, key)));
+    missing.extend(lacking.map(|(_, named)| named.to_owned()));
     Some(missing_message(&missing))
 }
 
@@ -420,14 +425,6 @@ fn missing_message(keys: &[String]) -> String {
     let key = if keys.len() == 1 { "key" } else { "keys" };
     let names = keys.join(", ");
     format!("missing {key} {names}; `petcomp camera init PHOTO --size WxH` writes them")
-}
-
-/// Alternative keys, where a label has none of them.
-fn missing_alternatives(value: &Value) -> impl Iterator<Item = String> {
-    KEY_ALTERNATIVES
-        .iter()
-        .filter(|(keys, _)| lacks_all(value, keys))
-        .map(|&(_, missing)| missing.into())
 }
 
 /// Keys of which a label has at least one, as pointers, and what to say where it has none.
@@ -441,10 +438,6 @@ const KEY_ALTERNATIVES: [(&[&str], &str); 2] = [
         "surface.width_m (or surface.height_m)",
     ),
 ];
-
-fn lacks_all(value: &Value, keys: &[&str]) -> bool {
-    keys.iter().all(|key| is_missing(value, key))
-}
 
 fn is_missing(value: &Value, key: &str) -> bool {
     value.pointer(key).is_none_or(Value::is_null)

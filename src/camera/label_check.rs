@@ -186,32 +186,33 @@ mod tests {
     use crate::camera::simulate::Scenario;
     use crate::pixel::LinearRgb;
 
-    fn refusal_of_wall(wall: LabelWall) -> String {
+    /// What is said of a label with an impossible number.
+    fn refusal(edit: impl FnOnce(&mut Label)) -> String {
         let mut label = Scenario::default().view(1, 0).label;
-        label.surface.wall = Some(wall);
+        edit(&mut label);
         check_label(&label).unwrap_err().to_string()
     }
 
     #[test]
     fn walls_have_a_height_that_is_possible_and_lean_outwards() {
         for (height, question) in [(-0.07, ""), (75.0, "; is it in centimetres?")] {
-            let refusal = refusal_of_wall(LabelWall {
+            let wall = LabelWall {
                 height_m: Some(height),
                 slope_deg: None,
-            });
+            };
             let expected = "expected 0 to 50 m (0 is a table without walls)";
             assert_eq!(
-                refusal,
+                refusal(|label| label.surface.wall = Some(wall)),
                 format!("surface.wall.height_m: {height}, {expected}{question}")
             );
         }
         for slope in [-8.0, 90.0, f64::NAN] {
-            let refusal = refusal_of_wall(LabelWall {
+            let wall = LabelWall {
                 height_m: None,
                 slope_deg: Some(slope),
-            });
+            };
             assert_eq!(
-                refusal,
+                refusal(|label| label.surface.wall = Some(wall)),
                 format!(
                     "surface.wall.slope_deg: {slope}, expected 0 to 80 (degrees from upright, outwards)"
                 )
@@ -221,60 +222,41 @@ mod tests {
 
     #[test]
     fn a_camera_height_in_millimetres_is_asked_about() {
-        let mut label = Scenario::default().view(1, 0).label;
-        label.camera.height_m = Some(1120.0);
-        let refusal = check_label(&label).unwrap_err().to_string();
+        let refusal = refusal(|label| label.camera.height_m = Some(1120.0));
         let expected = "camera.height_m: 1120, expected 0.001 to 50 m";
         assert!(refusal.starts_with(expected), "{refusal}");
         assert!(refusal.ends_with("; is it in millimetres?"), "{refusal}");
     }
 
-    fn refusal_of_camera(camera: LabelCamera) -> String {
-        let mut label = Scenario::default().view(1, 0).label;
-        label.camera = camera;
-        check_label(&label).unwrap_err().to_string()
-    }
-
     #[test]
     fn the_real_focal_length_of_a_phone_is_asked_about() {
-        let camera = |focal_35mm| LabelCamera {
-            focal_35mm: Some(focal_35mm),
-            focal_fixed: true,
-            ..LabelCamera::default()
+        let told = |focal_35mm| {
+            refusal(|label| {
+                (label.camera.focal_35mm, label.camera.focal_fixed) = (Some(focal_35mm), true);
+            })
         };
         let expected = "expected 6.9 to 692.3 for a picture of this size";
         let question = "is it the real focal length of a phone?";
         assert_eq!(
-            refusal_of_camera(camera(4.2)),
+            told(4.2),
             format!("camera.focal_35mm: 4.2, {expected}; {question}")
         );
-        assert_eq!(
-            refusal_of_camera(camera(5000.0)),
-            format!("camera.focal_35mm: 5000, {expected}")
-        );
+        assert_eq!(told(5000.0), format!("camera.focal_35mm: 5000, {expected}"));
     }
 
     #[test]
     fn pixels_that_are_millimetres_are_asked_about() {
-        let camera = LabelCamera {
-            focal_px: Some(26.0),
-            ..LabelCamera::default()
-        };
         let expected = "expected 200 to 400000 for a picture of this size";
         assert_eq!(
-            refusal_of_camera(camera),
+            refusal(|label| label.camera.focal_px = Some(26.0)),
             format!("camera.focal_px: 26, {expected}; is it in millimetres?")
         );
     }
 
     #[test]
     fn a_focal_length_that_is_exact_is_stated() {
-        let camera = LabelCamera {
-            focal_fixed: true,
-            ..LabelCamera::default()
-        };
         assert_eq!(
-            refusal_of_camera(camera),
+            refusal(|label| label.camera.focal_fixed = true),
             "camera.focal_fixed: true, expected camera.focal_px or focal_35mm beside it"
         );
     }
@@ -299,18 +281,12 @@ mod tests {
         assert!(checked([-1.0, 0.0], 5000).is_err());
     }
 
-    fn refusal_of(albedo: Albedo) -> String {
-        let mut label = Scenario::default().view(1, 0).label;
-        label.surface.albedo = Some(albedo);
-        check_label(&label).unwrap_err().to_string()
-    }
-
     #[test]
     fn a_surface_reflects_some_of_the_light_and_at_most_all() {
         for impossible in [-0.5, 0.0, 1.5, 10.0] {
             let color = LinearRgb::new(0.5, impossible as f32, 0.5);
             for albedo in [Albedo::Luminance(impossible), Albedo::Color(color)] {
-                let refusal = refusal_of(albedo);
+                let refusal = refusal(|label| label.surface.albedo = Some(albedo));
                 assert!(refusal.contains("surface.albedo"), "{refusal}");
                 assert!(refusal.contains(&impossible.to_string()), "{refusal}");
             }

@@ -84,14 +84,7 @@ impl RadialDistortion {
     /// How many pixels of the picture a pixel of a pinhole camera is at a position of its, along both
     /// axes.
     pub(super) fn distort_slope(&self, px: Point2<f64>) -> Matrix2<f64> {
-        let bent = self.slope_in_focal_lengths(px);
-        let [fx, fy] = [self.focal_px.x, self.focal_px.y];
-        Matrix2::new(
-            bent[(0, 0)],
-            bent[(0, 1)] * fx / fy,
-            bent[(1, 0)] * fy / fx,
-            bent[(1, 1)],
-        )
+        self.slope_in_pixels(&self.slope_in_focal_lengths(px))
     }
 
     fn slope_in_focal_lengths(&self, px: Point2<f64>) -> Matrix2<f64> {
@@ -103,13 +96,16 @@ impl RadialDistortion {
     /// axes.
     pub(super) fn undistort_slope(&self, px: Point2<f64>) -> Matrix2<f64> {
         let bent = self.slope_in_focal_lengths(self.undistort(px));
+        self.slope_in_pixels(&bent.try_inverse().unwrap_or_else(Matrix2::identity))
+    }
+
+    fn slope_in_pixels(&self, slope: &Matrix2<f64>) -> Matrix2<f64> {
         let [fx, fy] = [self.focal_px.x, self.focal_px.y];
-        let inverse = bent.try_inverse().unwrap_or_else(Matrix2::identity);
         Matrix2::new(
-            inverse[(0, 0)],
-            inverse[(0, 1)] * fx / fy,
-            inverse[(1, 0)] * fy / fx,
-            inverse[(1, 1)],
+            slope[(0, 0)],
+            slope[(0, 1)] * fx / fy,
+            slope[(1, 0)] * fy / fx,
+            slope[(1, 1)],
         )
     }
 

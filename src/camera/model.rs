@@ -214,7 +214,9 @@ impl State {
         let stretched = self.stretched(point, rigid);
         let seen = self.pinhole(&stretched)?;
         let per_stretch = self.stretch_derivative(&stretched, rigid);
-        let mut slope = self.pinhole_slope(&seen, &per_stretch);
+        let near = self.pose.scale / seen.depth;
+        let axes = [0, 1].map(|axis| seen.axis_slope(axis, near, &per_stretch));
+        let mut slope = Slope::from_columns(&axes);
         self.distort_slope(&seen.position, &mut slope);
         Some((self.distorted(&seen.position), slope))
     }
@@ -248,13 +250,6 @@ impl State {
             self.stretch_shares.0
         };
         self.pose.rotation * Vector3::new(x * stretched.x, y * stretched.y, 0.0)
-    }
-
-    /// Change of a position without distortion, relative to the principal point.
-    #[inline]
-    fn pinhole_slope(&self, seen: &PinholeView, per_stretch: &Vector3<f64>) -> Slope {
-        let near = self.pose.scale / seen.depth;
-        Slope::from_columns(&[0, 1].map(|axis| seen.axis_slope(axis, near, per_stretch)))
     }
 
     /// What distortion makes of the change of a position.

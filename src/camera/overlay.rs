@@ -5,16 +5,16 @@ use super::pinhole::{Camera, distorted_line};
 use super::rectangle::corner_points;
 use super::solution::Solution;
 use crate::color::{decode_srgb8, encode_srgb8};
-use crate::draw::{self, TextSize};
+use crate::draw;
 use crate::geom::{Point2, Point3, Vector2};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, Srgb8};
 use nalgebra::{Matrix2, SymmetricEigen};
 
-const GRID_COLOR: LinearRgb = linear_rgb(0.9, 0.9, 0.9);
-const RECTANGLE_COLOR: LinearRgb = linear_rgb(0.05, 0.8, 0.1);
-const BOX_COLOR: LinearRgb = linear_rgb(1.0, 0.3, 0.0);
-const LABEL_COLOR: LinearRgb = linear_rgb(0.9, 0.0, 0.35);
+const GRID_COLOR: LinearRgb = LinearRgb::grey(0.9);
+const RECTANGLE_COLOR: LinearRgb = LinearRgb::new(0.05, 0.8, 0.1);
+const BOX_COLOR: LinearRgb = LinearRgb::new(1.0, 0.3, 0.0);
+const LABEL_COLOR: LinearRgb = LinearRgb::new(0.9, 0.0, 0.35);
 /// Widths of lines, in those of a cross.
 const GRID_WEIGHT: f64 = 0.6;
 const BOX_WEIGHT: f64 = 1.0;
@@ -33,14 +33,9 @@ const LEGEND_COLUMNS: usize = 1600;
 /// Room around the legend and between a mark and its text, and the side of a mark, pixels.
 const MARGIN_PX: usize = 8;
 const MARK_PX: usize = 12;
-const LEGEND_SIZE: TextSize = TextSize::Small;
 const PAPER: Srgb8 = draw::rgb(0x1C, 0x1E, 0x22);
 const INK: Srgb8 = draw::rgb(0xF2, 0xF2, 0xF2);
 const WARNING_INK: Srgb8 = draw::rgb(0xFF, 0xB0, 0x40);
-
-const fn linear_rgb(r: f32, g: f32, b: f32) -> LinearRgb {
-    LinearRgb { r, g, b }
-}
 
 /// Draws a solution over its photo, with a legend below it.
 ///
@@ -65,7 +60,6 @@ fn stacked(above: &Image<LinearRgb>, below: &Image<LinearRgb>) -> Image<LinearRg
 }
 
 /// An entry of the legend.
-#[derive(Clone)]
 struct LegendEntry {
     mark: Option<Srgb8>,
     text: String,
@@ -91,7 +85,7 @@ impl LegendEntry {
 
     /// Lines of at most `columns` columns, the mark beside the first.
     fn wrapped(&self, columns: usize) -> impl Iterator<Item = Self> {
-        let lines = draw::wrapped(&self.text, columns, LEGEND_SIZE);
+        let lines = draw::wrapped(&self.text, columns);
         lines.into_iter().enumerate().map(|(i, text)| Self {
             mark: self.mark.filter(|_| i == 0),
             text,
@@ -101,16 +95,12 @@ impl LegendEntry {
 
     /// Draws a line of the legend.
     fn draw(&self, canvas: &mut Image<Srgb8>, top: usize) {
-        self.draw_mark(canvas, top);
-        let at = [TEXT_LEFT_PX as isize, top as isize];
-        draw::text(canvas, at, &self.text, self.ink, LEGEND_SIZE);
-    }
-
-    fn draw_mark(&self, canvas: &mut Image<Srgb8>, top: usize) {
         if let Some(color) = self.mark {
             let at = [MARGIN_PX as isize, top as isize + 2];
             draw::fill(canvas, at, [MARK_PX; 2], color);
         }
+        let at = [TEXT_LEFT_PX as isize, top as isize];
+        draw::text(canvas, at, &self.text, self.ink);
     }
 }
 
@@ -121,25 +111,22 @@ const TEXT_LEFT_PX: usize = 2 * MARGIN_PX + MARK_PX;
 fn legend(width: usize, solution: &Solution) -> Image<LinearRgb> {
     let grown = (width * 2).div_ceil(LEGEND_COLUMNS).max(1);
     let columns = width.div_ceil(grown).max(1);
-    let canvas = draw_lines(&legend_lines(solution, columns), columns);
+    let text_columns = columns.saturating_sub(TEXT_LEFT_PX + MARGIN_PX);
+    let lines: Vec<_> = legend_entries(solution)
+        .iter()
+        .flat_map(|entry| entry.wrapped(text_columns))
+        .collect();
+    let canvas = draw_lines(&lines, columns);
     Image::from_fn(width, canvas.height() * grown, |x, y| {
         decode_srgb8(canvas[(x / grown, y / grown)])
     })
 }
 
-fn legend_lines(solution: &Solution, columns: usize) -> Vec<LegendEntry> {
-    let text_columns = columns.saturating_sub(TEXT_LEFT_PX + MARGIN_PX);
-    legend_entries(solution)
-        .iter()
-        .flat_map(|entry| entry.wrapped(text_columns))
-        .collect()
-}
-
 fn draw_lines(lines: &[LegendEntry], columns: usize) -> Image<Srgb8> {
-    let rows = 2 * MARGIN_PX + lines.len() * LEGEND_SIZE.height();
+    let rows = 2 * MARGIN_PX + lines.len() * draw::LINE_PX;
     let mut canvas = Image::filled(columns, rows, PAPER);
     for (i, line) in lines.iter().enumerate() {
-        line.draw(&mut canvas, MARGIN_PX + i * LEGEND_SIZE.height());
+        line.draw(&mut canvas, MARGIN_PX + i * draw::LINE_PX);
     }
     canvas
 }
@@ -214,15 +201,11 @@ pub(super) fn grid_step(size: [f64; 2]) -> f64 {
 
 /// The next 1, 2 or 5 times a power of ten.
 fn round_step(least: f64) -> f64 {
-    let power = power_of_ten_below(least);
+    let power = libm::pow(10.0, libm::floor(libm::log10(least)));
     [power, 2.0 * power, 5.0 * power]
         .into_iter()
         .find(|&step| step >= least)
         .unwrap_or(10.0 * power)
-}
-
-fn power_of_ten_below(value: f64) -> f64 {
-    libm::pow(10.0, libm::floor(libm::log10(value)))
 }
 
 /// A picture that is drawn on.
@@ -238,37 +221,23 @@ struct OverlayDrawing {
 impl OverlayDrawing {
     /// A solution drawn over a photo, of the label's size or another.
     fn new(photo: &Image<LinearRgb>, solution: &Solution) -> Self {
-        let mut drawing = Self::over_photo(photo, solution);
-        drawing.draw_grid(solution.size);
-        drawing.draw_box(solution.size, solution.sigma.reference_height);
-        let zoom = photo.width() as f64 / f64::from(solution.camera.image[0].max(1));
-        drawing.draw_corners(solution, zoom);
-        drawing
-    }
-
-    /// A photo on which nothing is drawn yet, and a camera for its size.
-    fn over_photo(photo: &Image<LinearRgb>, solution: &Solution) -> Self {
         let (width, height) = photo.size();
-        Self {
+        let mut drawing = Self {
             picture: photo.clone(),
             camera: solution.camera.resized([width as u32, height as u32]),
             kappa: solution.kappa,
-            line_px: line_width_px(width.max(height)),
+            line_px: (width.max(height) as f64 / SIDE_PER_LINE_WIDTH).max(1.0),
+        };
+        for line in grid(solution.size) {
+            drawing.line(line, GRID_COLOR, GRID_WEIGHT);
         }
-    }
-
-    /// Labelled corners and their error ellipses, in a picture enlarged by `zoom`.
-    fn draw_corners(&mut self, solution: &Solution, zoom: f64) {
+        drawing.draw_box(solution.size, solution.sigma.reference_height);
+        let zoom = width as f64 / f64::from(solution.camera.image[0].max(1));
         for (corner, covariance) in solution.corners_px.iter().zip(&solution.sigma.corners_px) {
-            self.cross(corner * zoom);
-            self.ellipse(corner * zoom, &(covariance * zoom * zoom));
+            drawing.cross(corner * zoom);
+            drawing.ellipse(corner * zoom, &(covariance * zoom * zoom));
         }
-    }
-
-    fn draw_grid(&mut self, size: [f64; 2]) {
-        for line in grid(size) {
-            self.line(line, GRID_COLOR, GRID_WEIGHT);
-        }
+        drawing
     }
 
     /// The rectangle, and a box of some height over it.
@@ -347,11 +316,6 @@ fn stroke_coverage(x: usize, y: usize, ends: [Point2<f64>; 2], width: f64) -> f3
     (width / 2.0 + 0.5 - distance(center, ends)).clamp(0.0, 1.0) as f32
 }
 
-/// The width of a line that is well seen in a picture of this size.
-fn line_width_px(longer_side: usize) -> f64 {
-    (longer_side as f64 / SIDE_PER_LINE_WIDTH).max(1.0)
-}
-
 /// One of the points around an ellipse along the axes.
 fn on_ellipse(sigmas: &Vector2<f64>, i: usize) -> Vector2<f64> {
     let radii = sigmas.map(|sigma| ELLIPSE_SIGMAS * sigma);
@@ -387,15 +351,22 @@ mod tests {
     use crate::camera::simulate::Scenario;
     use crate::camera::{SolveOptions, solve};
 
-    #[test]
-    fn the_rectangle_is_drawn_where_it_was_labelled() {
-        let scenario = Scenario {
+    fn small_picture() -> Scenario {
+        Scenario {
             image: [400, 300],
             focal_px: 320.0,
             ..Scenario::default()
-        };
-        let view = scenario.tilted(30.0).view(1, 0);
-        let solution = solve(&view.label, &SolveOptions::default()).unwrap();
+        }
+    }
+
+    fn tilted() -> Solution {
+        let view = small_picture().tilted(30.0).view(1, 0);
+        solve(&view.label, &SolveOptions::default()).unwrap()
+    }
+
+    #[test]
+    fn the_rectangle_is_drawn_where_it_was_labelled() {
+        let solution = tilted();
         let drawn = overlay(&Image::filled(400, 300, LinearRgb::BLACK), &solution);
         let corners = solution.corners_px;
         let middle = nalgebra::center(&corners[0], &corners[1]);
@@ -418,10 +389,8 @@ mod tests {
     #[test]
     fn lines_are_drawn_where_the_lens_bends_them() {
         let scenario = Scenario {
-            image: [400, 300],
-            focal_px: 320.0,
             kappa: 0.2,
-            ..Scenario::default()
+            ..small_picture()
         };
         let view = scenario.tilted(20.0).view(1, 0);
         let mut label = view.label;
@@ -449,16 +418,7 @@ mod tests {
 
     #[test]
     fn the_legend_stands_below_the_photo_and_names_the_colours() {
-        let scenario = Scenario {
-            image: [400, 300],
-            focal_px: 320.0,
-            ..Scenario::default()
-        };
-        let solution = solve(
-            &scenario.tilted(30.0).view(1, 0).label,
-            &SolveOptions::default(),
-        )
-        .unwrap();
+        let solution = tilted();
         let texts: Vec<String> = legend_entries(&solution)
             .into_iter()
             .map(|entry| entry.text)

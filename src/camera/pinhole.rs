@@ -76,14 +76,9 @@ impl Camera {
     /// the camera.
     pub fn project(&self, world: Point3<f64>) -> Option<(Point2<f64>, f64)> {
         let c = self.camera_from_world * world;
-        (c.z > 0.0).then_some((self.seen_px(c), c.z))
-    }
-
-    /// Where a point of the camera's frame is seen.
-    #[inline]
-    fn seen_px(&self, c: Point3<f64>) -> Point2<f64> {
-        Point2::new(c.x / c.z * self.focal_px.x, c.y / c.z * self.focal_px.y)
-            + self.principal_px.coords
+        let px = Point2::new(c.x / c.z * self.focal_px.x, c.y / c.z * self.focal_px.y)
+            + self.principal_px.coords;
+        (c.z > 0.0).then_some((px, c.z))
     }
 
     /// The ray through a pixel position. Its parameter *is* the depth along the optical axis, in
@@ -151,7 +146,8 @@ impl Camera {
 
 /// The camera's axes when it looks along a direction, upright.
 fn upright_rotation(forward: &Vector3<f64>) -> UnitQuaternion<f64> {
-    let up = if is_vertical(forward) {
+    let is_vertical = forward.cross(&Vector3::z()).norm() < 1e-9 * forward.norm();
+    let up = if is_vertical {
         Vector3::y()
     } else {
         Vector3::z()
@@ -159,21 +155,20 @@ fn upright_rotation(forward: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::look_at_lh(forward, &-up)
 }
 
-fn is_vertical(direction: &Vector3<f64>) -> bool {
-    direction.cross(&Vector3::z()).norm() < 1e-9 * direction.norm()
+/// Diagonal of a picture of some size.
+pub(super) fn diagonal_px([width, height]: [u32; 2]) -> f64 {
+    libm::hypot(f64::from(width), f64::from(height))
 }
 
 /// OpenCV's k1 of a camera whose radial distortion is known by half the picture's diagonal, as
 /// [`Solution::kappa`](super::Solution::kappa) is.
 pub(crate) fn k1_from_kappa(camera: &Camera, kappa: f64) -> f64 {
-    let [w, h] = camera.image.map(f64::from);
-    kappa * (2.0 * camera.focal_px.x / libm::hypot(w, h)).powi(2)
+    kappa * (2.0 * camera.focal_px.x / diagonal_px(camera.image)).powi(2)
 }
 
 /// Where a point is seen through a lens with distortion; not finite behind the camera.
 pub fn distorted(camera: &Camera, kappa: f64, point: Point3<f64>) -> Point2<f64> {
-    let [w, h] = camera.image.map(f64::from);
-    let half = libm::hypot(w, h) / 2.0;
+    let half = diagonal_px(camera.image) / 2.0;
     let Some((px, _)) = camera.project(point) else {
         return Point2::new(f64::NAN, f64::NAN);
     };
@@ -201,18 +196,8 @@ pub(super) fn distorted_line(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::{Plane, UnitQuaternion};
-
-    fn looking_down() -> Camera {
-        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-        let tilt = UnitQuaternion::from_euler_angles(0.2, -0.1, 0.7);
-        Camera {
-            image: [640, 480],
-            focal_px: Vector2::new(700.0, 710.0),
-            principal_px: Point2::new(320.0, 236.0),
-            camera_from_world: Pose::from_parts(Vector3::new(0.02, -0.03, 1.1).into(), tilt * down),
-        }
-    }
+    use crate::camera::tilted_camera;
+    use crate::geom::Plane;
 
     #[test]
     #[should_panic(expected = "height: -1, expected above 0 (metres)")]
@@ -222,7 +207,7 @@ mod tests {
 
     #[test]
     fn a_pixel_s_ray_projects_back_to_it() {
-        let cam = looking_down();
+        let cam = tilted_camera();
         let px = Point2::new(123.4, 321.0);
         let (back, depth) = cam.project(cam.ray(px).at(0.8)).expect("in front");
         assert!((back - px).norm() < 1e-10 && (depth - 0.8).abs() < 1e-12);
@@ -230,15 +215,15 @@ mod tests {
 
     #[test]
     fn the_homography_agrees_with_projection() {
-        let cam = looking_down();
+        let cam = tilted_camera();
         let (px, _) = cam.project(Point3::new(0.2, -0.1, 0.0)).expect("in front");
         assert!((cam.pixel_from_surface().map(Point2::new(0.2, -0.1)) - px).norm() < 1e-10);
     }
 
     #[test]
     fn resizing_keeps_the_view() {
-        let (cam, p) = (looking_down(), Point3::new(0.1, 0.05, 0.02));
-        let half = cam.resized([320, 240]);
+        let (cam, p) = (tilted_camera(), Point3::new(0.1, 0.05, 0.02));
+        let half = cam.resized([80, 60]);
         let (a, b) = (
             cam.project(p).expect("in front").0,
             half.project(p).expect("in front").0,
@@ -248,7 +233,7 @@ mod tests {
 
     #[test]
     fn tilt_is_measured_from_straight_down() {
-        let cam = looking_down();
+        let cam = tilted_camera();
         let ray = cam.ray(cam.principal_px);
         assert!(Plane::surface().intersect(&ray).is_some());
         let cos = ray.direction.normalize().dot(&-Vector3::z());

@@ -7,6 +7,7 @@ use super::label::{Framing, Label, LabelPoint};
 use super::label_check::check_label;
 use super::model::{Observation, State, StretchShares, kappa_from_k1};
 use super::options::{Priors, SolveOptions};
+use super::pinhole::diagonal_px;
 use super::prior::{ParameterPriors, Prior};
 use super::rectangle::{ProjectedRectangle, corner_points};
 use super::refine::Residuals;
@@ -65,16 +66,16 @@ impl Problem {
         check_label(label)?;
         let sides = MeasuredSides::new(label, options)?;
         let (stretch_shares, scale_sigma) = (sides.stretch_shares(), sides.scale_sigma(label));
-        let (corners_px, warnings) = used_corners(label, sides, options)?;
+        let used = used_corners(label, sides, options)?;
         let units = SolverUnits::for_picture(label);
         let (priors, prior_source) = units.lens_priors(label, framing, &options.priors);
         let (k1, prior_focal) = (label.camera.k1, libm::exp(priors.ln_focal.mean));
         let kappa = k1.map_or(0.0, |k1| kappa_from_k1(k1, prior_focal));
-        let projected = units.projected(&corners_px, kappa);
+        let projected = units.projected(&used.corners, kappa);
         let size = sides.completed(|| ratio_by_right_angle(&projected, prior_focal));
         let units = units.for_rectangle(size);
         let residuals = Residuals {
-            observations: units.observations(label, size, &corners_px, stretch_shares),
+            observations: units.observations(label, size, &used.corners, stretch_shares),
             priors: ParameterPriors {
                 stretch_sigma: sides.stretch_sigma(label, &options.priors),
                 ln_height: height_prior(label, &units, scale_sigma),
@@ -86,7 +87,7 @@ impl Problem {
             image: label.image_size(),
             framing,
             units,
-            corners_px,
+            corners_px: used.corners,
             has_labelled_corners: label.surface.corners_px.is_some(),
             projected,
             size,
@@ -95,7 +96,7 @@ impl Problem {
             k1,
             residuals,
             prior_source,
-            warnings,
+            warnings: used.warnings,
         })
     }
 
@@ -117,17 +118,13 @@ impl Problem {
     /// The focal length that the corners give in closed form, where they give one that can be
     /// followed.
     pub(crate) fn closed_form_focal(&self) -> Option<f64> {
-        let squared = self.closed_form_focal_squared();
-        let [shortest, longest] = self.residuals.ln_focal_range.map(libm::exp);
-        (squared > shortest * shortest && squared < longest * longest).then(|| squared.sqrt())
-    }
-
-    fn closed_form_focal_squared(&self) -> f64 {
-        if self.stretch_shares == StretchShares::BOTH {
+        let squared = if self.stretch_shares == StretchShares::BOTH {
             self.projected.focal_squared(self.size[0] / self.size[1])
         } else {
             self.projected.focal_squared_any_ratio()
-        }
+        };
+        let [shortest, longest] = self.residuals.ln_focal_range.map(libm::exp);
+        (squared > shortest * shortest && squared < longest * longest).then(|| squared.sqrt())
     }
 
     /// The sides in a state, metres.
@@ -141,25 +138,18 @@ fn used_corners(
     label: &Label,
     sides: MeasuredSides,
     options: &SolveOptions,
-) -> Result<([Point2<f64>; 4], Vec<Diagnostic>), SolveError> {
-    let labelled = labelled_corners(label);
+) -> Result<OrderedCorners, SolveError> {
+    let labelled = label.surface.corners_px;
+    let labelled = labelled.map(|corners| corners.map(|c| label.pixel(c)));
     let quad_px = labelled
         .or_else(|| sides.predicted_corners(label))
         .ok_or_else(|| sides.missing_corners(label))?;
     let sigma_px = corner_sigma_px(label);
-    let OrderedCorners {
-        corners,
-        mut warnings,
-    } = corners::check(quad_px, sigma_px, label.image_size(), options.order)?;
+    let mut used = corners::check(quad_px, sigma_px, label.image_size(), options.order)?;
     if labelled.is_none() {
-        warnings.extend(sides.span_warning(label));
+        used.warnings.extend(sides.span_warning(label));
     }
-    Ok((corners, warnings))
-}
-
-fn labelled_corners(label: &Label) -> Option<[Point2<f64>; 4]> {
-    let corners = label.surface.corners_px?;
-    Some(corners.map(|c| label.pixel(c)))
+    Ok(used)
 }
 
 fn corner_sigma_px(label: &Label) -> f64 {
@@ -170,8 +160,9 @@ impl SolverUnits {
     /// For a picture, with lengths in metres.
     fn for_picture(label: &Label) -> Self {
         let diagonal = Vector2::from(label.image_size().map(f64::from));
+        let stated = label.camera.principal_point_px;
         Self {
-            principal_px: expected_principal_px(label),
+            principal_px: stated.map_or(label.taken_center(), |px| label.pixel(px)),
             unit_px: diagonal.norm() / 2.0,
             unit: 1.0,
         }
@@ -192,27 +183,17 @@ impl SolverUnits {
         framing: Framing,
         priors: &Priors,
     ) -> (ParameterPriors, PriorSource) {
-        let (ln_focal, source) = self.focal_prior(label, framing, priors);
+        let (mut ln_focal, source) = focal::length_prior(label, framing, priors);
+        ln_focal.mean -= libm::log(self.unit_px);
         let lens = ParameterPriors {
             ln_focal,
             stretch_sigma: f64::INFINITY,
             principal_sigma: principal_sigma(label, framing, priors),
-            kappa: kappa_prior(label, priors),
+            // Where a coefficient is stated kappa follows the focal length, and is no unknown.
+            kappa: Prior::at_zero(label.camera.k1.map_or(priors.kappa_sigma, |_| 0.0)),
             ln_height: Prior::FLAT,
         };
         (lens, source)
-    }
-
-    /// Prior of the logarithm of the focal length.
-    fn focal_prior(
-        &self,
-        label: &Label,
-        framing: Framing,
-        priors: &Priors,
-    ) -> (Prior, PriorSource) {
-        let (mut ln_focal, source) = focal::length_prior(label, framing, priors);
-        ln_focal.mean -= libm::log(self.unit_px);
-        (ln_focal, source)
     }
 
     /// The rectangle as a camera without distortion would show it.
@@ -288,12 +269,6 @@ impl SolverUnits {
     }
 }
 
-/// As stated, or the middle of the picture as taken.
-fn expected_principal_px(label: &Label) -> Point2<f64> {
-    let stated = label.camera.principal_point_px;
-    stated.map_or(label.taken_center(), |px| label.pixel(px))
-}
-
 /// Standard deviation of a coordinate of the principal point, in the solver's units. Where a part of
 /// the picture was cut away matters no more once the principal point is stated.
 fn principal_sigma(label: &Label, framing: Framing, priors: &Priors) -> f64 {
@@ -305,16 +280,6 @@ fn principal_sigma(label: &Label, framing: Framing, priors: &Priors) -> f64 {
     let sigma_px = label.camera.principal_point_sigma_px;
     let unit_px = diagonal_px(label.image_size()) / 2.0;
     sigma_px.unwrap_or(default_px) / unit_px
-}
-
-fn diagonal_px(size: [u32; 2]) -> f64 {
-    libm::hypot(f64::from(size[0]), f64::from(size[1]))
-}
-
-/// Where a coefficient is stated kappa follows the focal length, and is no unknown.
-fn kappa_prior(label: &Label, priors: &Priors) -> Prior {
-    let stated = label.camera.k1.map(|_| 0.0);
-    Prior::at_zero(stated.unwrap_or(priors.kappa_sigma))
 }
 
 /// Prior of the logarithm of the camera's height above the surface, in the solver's units, which are

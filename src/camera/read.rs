@@ -3,7 +3,7 @@
 use super::error::SolveError;
 use super::focal::plausible_equivalents;
 use super::import::{self, Annotation};
-use super::label::{Label, LabelImage};
+use super::label::Label;
 use super::pinhole::Camera;
 use super::solution::Solution;
 use crate::bounds::{CAMERA, SURFACE, number};
@@ -123,11 +123,14 @@ pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec
 fn labels_of(
     path: &Path,
     text: &str,
-    annotations: Option<Vec<import::Annotation>>,
+    annotations: Option<Vec<Annotation>>,
     size: Option<[f64; 2]>,
 ) -> Result<Vec<LabelledPhoto>> {
     let labels = match annotations {
-        Some(annotations) => imported_labels(&annotations, path)?,
+        Some(annotations) => annotations
+            .iter()
+            .map(|annotation| imported_label(annotation, path))
+            .collect::<Result<Vec<_>>>()?,
         None => own_labels(text, path)?,
     };
     if labels.is_empty() {
@@ -138,13 +141,6 @@ fn labels_of(
         push_new(&mut found, completed(labelled, size)?)?;
     }
     Ok(found)
-}
-
-fn imported_labels(annotations: &[Annotation], path: &Path) -> Result<Vec<LabelledPhoto>> {
-    annotations
-        .iter()
-        .map(|annotation| imported_label(annotation, path))
-        .collect()
 }
 
 /// Reads the labels of a folder in order of name, ours whatever their files are called. Files that
@@ -293,35 +289,27 @@ fn parse_own_labels(text: &str, path: &Path) -> Result<Vec<LabelledPhoto>> {
         let label = io::parse_json(text)?;
         return Ok(vec![own_label(label, label_name(path), path)?]);
     }
-    io::parse_json::<Vec<Label>>(text)?
-        .into_iter()
-        .map(|label| listed_label(label, path))
+    let labels = io::parse_json::<Vec<Label>>(text)?.into_iter();
+    // Each of several in a file goes by its photo's name.
+    labels
+        .map(|label| {
+            let name = stem(Path::new(&label.image.file));
+            own_label(label, name, path)
+        })
         .collect()
 }
 
-/// One of several in a file, which goes by its photo's name.
-fn listed_label(label: Label, path: &Path) -> Result<LabelledPhoto> {
-    let name = stem(Path::new(&label.image.file));
-    own_label(label, name, path)
-}
-
+/// A label whose photo, where it names one, lies in or below its folder.
 fn own_label(label: Label, name: String, path: &Path) -> Result<LabelledPhoto> {
-    check_photo_path(&label)?;
+    if !label.image.file.is_empty() {
+        io::below("", &label.image.file).map_err(|e| e.within("image"))?;
+    }
     Ok(LabelledPhoto {
         label,
         source: path.into(),
         name,
         is_ours: true,
     })
-}
-
-/// A photo that is named lies in or below the folder of its label.
-fn check_photo_path(label: &Label) -> Result<()> {
-    let file = &label.image.file;
-    if file.is_empty() {
-        return Ok(());
-    }
-    io::below("", file).map(drop).map_err(|e| e.within("image"))
 }
 
 /// `bg0001` of `bg0001.label.json`, or of `bg0001.json`.
@@ -348,7 +336,8 @@ fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto>
         .and_then(|_| annotation.label())
         .map_err(|e| e.within(&file).in_file(path))?;
     if annotation.size.is_none() {
-        fill_in_size(&mut label.image, &path.with_file_name(&file))?;
+        let header = io::read_header(path.with_file_name(&file))?;
+        (label.image.width, label.image.height) = (header.width as u32, header.height as u32);
     }
     label.image.file = file;
     Ok(LabelledPhoto {
@@ -357,13 +346,6 @@ fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto>
         name,
         is_ours: false,
     })
-}
-
-/// Takes over the size of the label's photo.
-fn fill_in_size(image: &mut LabelImage, photo: &Path) -> Result<()> {
-    let header = io::read_header(photo)?;
-    (image.width, image.height) = (header.width as u32, header.height as u32);
-    Ok(())
 }
 
 /// The name of an annotation's photo: the first that is there, in or below the folder or directly
@@ -475,9 +457,14 @@ fn check_side(at: &str, metres: Option<f64>) -> Result<()> {
 /// That width and height are exchanged ([`Solution::misfit`]), where that is why it is so far; else
 /// [`Error::Value`] with the distance.
 pub fn check_distance(solution: &Solution) -> Result<()> {
-    let exchanged = || solution.misfit().filter(SolveError::is_exchange);
-    check_camera_distance(&solution.camera)
-        .map_err(|too_far| exchanged().map_or(too_far, Error::from))
+    check_camera_distance(&solution.camera).map_err(|too_far| match solution.misfit() {
+        Some(
+            misfit @ SolveError::NoFit {
+                exchanged: Some(_), ..
+            },
+        ) => misfit.into(),
+        _ => too_far,
+    })
 }
 
 /// The same of a camera alone, as a file stores it.
@@ -486,21 +473,13 @@ pub(crate) fn check_camera_distance(camera: &Camera) -> Result<()> {
     if CAMERA.contains(distance) {
         return Ok(());
     }
-    Err(implausible_distance(distance))
-}
-
-fn implausible_distance(distance: f64) -> Error {
     let metres = number((1e3 * distance).round() / 1e3);
-    let question = unit_question(distance);
-    let what = format!("the camera would be {metres} m away, expected {CAMERA}{question}");
-    Error::value("surface", what)
-}
-
-/// Asks for the unit of the size, where another one would explain the distance.
-fn unit_question(distance: f64) -> String {
-    CAMERA
+    // Another unit of the size may explain the distance.
+    let question = CAMERA
         .unit_meant(distance)
-        .map_or(String::new(), |unit| format!("; is the size in {unit}s?"))
+        .map_or(String::new(), |unit| format!("; is the size in {unit}s?"));
+    let what = format!("the camera would be {metres} m away, expected {CAMERA}{question}");
+    Err(Error::value("surface", what))
 }
 
 /// The picture of a label that was read from `path`, where it is there.
@@ -570,19 +549,14 @@ pub(super) mod tests {
     fn label_by_notes(notes: impl IntoIterator<Item = (Tag, Value)>) -> Label {
         let folder = tempfile::tempdir().unwrap();
         write_photo(&folder.path().join("a.jpg"), notes);
-        let mut label = Label::new([90, 60], [[0.0; 2]; 4], [0.6, 0.4]);
-        label.image.file = "a.jpg".into();
+        let [label] = labels_of_photos(["a.jpg"]);
         with_photo(label, folder.path().join("a.label.json")).unwrap()
     }
 
     #[test]
     fn two_photos_of_one_name_in_a_file_are_refused() {
         let folder = tempfile::tempdir().unwrap();
-        let labels = ["left", "right"].map(|side| {
-            let mut label = Label::new([90, 60], [[0.0; 2]; 4], [0.6, 0.4]);
-            label.image.file = format!("{side}/001.png");
-            label
-        });
+        let labels = labels_of_photos(["left/001.png", "right/001.png"]);
         let path = folder.path().join("all.label.json");
         io::write_json(&path, &labels).unwrap();
         let refusal = read_labels(&path, None).unwrap_err().to_string();

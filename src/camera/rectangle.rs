@@ -127,9 +127,11 @@ impl ProjectedRectangle {
     }
 }
 
-/// The depth components of two axes at right angles to each other, up to a sign of both.
+/// The depth components of two unit axes at right angles to each other, up to a sign of both, from
+/// their pictures and the squared length of an axis seen from the front.
 fn leanings(along: &Vector2<f64>, up: &Vector2<f64>, squared: f64) -> [f64; 2] {
-    let [lean, other] = [along, up].map(|axis| leaning(axis.norm_squared(), squared));
+    let [lean, other] =
+        [along, up].map(|axis| (1.0 - axis.norm_squared() / squared).max(0.0).sqrt());
     [lean, if along.dot(up) > 0.0 { -other } else { other }]
 }
 
@@ -154,12 +156,6 @@ fn rotation_between(x: &Vector3<f64>, y: &Vector3<f64>) -> Matrix3<f64> {
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let (x, y) = ((sum + difference) * half, (sum - difference) * half);
     Matrix3::from_columns(&[x, y, x.cross(&y)])
-}
-
-/// The depth component of a unit axis, from its squared length in the picture and that of an axis
-/// seen from the front.
-fn leaning(squared: f64, frontal_squared: f64) -> f64 {
-    (1.0 - squared / frontal_squared).max(0.0).sqrt()
 }
 
 /// The corners of a centred rectangle of this size, in label order.
@@ -224,9 +220,8 @@ mod tests {
     }
 
     fn project(pose: &ScaledPose) -> [Vector2<f64>; 4] {
-        let [x, y] = SIZE.map(|s| s / 2.0);
-        [[-x, y], [x, y], [x, -y], [-x, -y]].map(|[x, y]| {
-            let c = pose.rotation * Vector3::new(x, y, 0.0) + pose.translation(FOCAL);
+        corner_points(SIZE).map(|corner| {
+            let c = pose.rotation * corner.coords + pose.translation(FOCAL);
             c.xy() * FOCAL / c.z
         })
     }

@@ -59,15 +59,11 @@ fn map_size(size: [f64; 2], px_per_metre: f64) -> Result<[f64; 2]> {
     if width >= 1.0 && height >= 1.0 && width * height <= MAX_MAP_PIXELS {
         return Ok([width, height]);
     }
-    Err(unusable_scale(px_per_metre, [width, height]))
-}
-
-fn unusable_scale(px_per_metre: f64, pixels: [f64; 2]) -> Error {
-    let [w, h] = pixels.map(number);
+    let [w, h] = [width, height].map(number);
     let what = format!(
         "{px_per_metre} makes a map of {w} x {h} pixels, expected at most {MAX_MAP_PIXELS}"
     );
-    Error::value("px_per_metre", what)
+    Err(Error::value("px_per_metre", what))
 }
 
 /// The photo that the camera takes of a picture lying on the rectangle of `size` metres, bent by

@@ -81,7 +81,11 @@ impl Residuals {
             let (value, slope) = state.ln_height()?;
             normal.add(value - height.mean, &slope, height.information());
         }
-        normal.add_priors(&self.priors, state);
+        self.priors
+            .remove_fixed(&mut normal.information, &mut normal.slope);
+        normal.cost += self
+            .priors
+            .add_to(state, &mut normal.information, &mut normal.slope);
         Some(normal)
     }
 
@@ -114,7 +118,7 @@ impl Residuals {
         let mut descent = Descent::new(self, start, bar)?;
         while descent.iterations < max_iterations && descent.damping < MAX_DAMPING {
             descent.iterations += 1;
-            if descent.iterate()? == StepOutcome::Finished {
+            if descent.iterate()? {
                 break;
             }
         }
@@ -140,13 +144,6 @@ struct Descent<'a> {
     iterations: usize,
 }
 
-/// Whether a descent goes on.
-#[derive(PartialEq)]
-enum StepOutcome {
-    Continues,
-    Finished,
-}
-
 impl<'a> Descent<'a> {
     fn new(residuals: &'a Residuals, start: State, bar: f64) -> Option<Self> {
         Some(Self {
@@ -169,11 +166,12 @@ impl<'a> Descent<'a> {
         }
     }
 
-    /// Tries a damped step; none where it is taken and has no normal equations.
-    fn iterate(&mut self) -> Option<StepOutcome> {
+    /// Tries a damped step, and tells whether it was the last; none where it is taken and has no
+    /// normal equations.
+    fn iterate(&mut self) -> Option<bool> {
         let Some((step, length)) = self.normal.damped_step(self.damping) else {
             self.damping *= DAMPING_INCREASE;
-            return Some(StepOutcome::Continues);
+            return Some(false);
         };
         let next = self.residuals.stepped(&self.state, &step);
         let mut has_converged = length < STEP_TOLERANCE;
@@ -181,22 +179,13 @@ impl<'a> Descent<'a> {
         let cost = self.residuals.cost(&next).unwrap_or(f64::INFINITY);
         if cost < self.normal.cost {
             has_converged |= self.hardly_falls_to(cost);
-            self.move_to(next)?;
+            self.state = next;
+            self.normal = self.residuals.normal_equations(&next)?;
+            self.damping *= DAMPING_DECREASE;
         } else {
             self.damping *= DAMPING_INCREASE;
         }
-        Some(if has_converged {
-            StepOutcome::Finished
-        } else {
-            StepOutcome::Continues
-        })
-    }
-
-    fn move_to(&mut self, next: State) -> Option<()> {
-        self.state = next;
-        self.normal = self.residuals.normal_equations(&next)?;
-        self.damping *= DAMPING_DECREASE;
-        Some(())
+        Some(has_converged)
     }
 
     /// A step to a lower cost that is not worth another.
@@ -217,12 +206,6 @@ impl NormalEquations {
     }
 
     /// Adds both coordinates of an observation; none where its point would be behind the camera.
-    #[inline]
-    fn add_priors(&mut self, priors: &ParameterPriors, state: &State) {
-        priors.remove_fixed(&mut self.information, &mut self.slope);
-        self.cost += priors.add_to(state, &mut self.information, &mut self.slope);
-    }
-
     fn add_observation(&mut self, state: &State, observation: &Observation) -> Option<()> {
         let (seen, slope) = state.slope(&observation.point, observation.rigid)?;
         let off = seen - observation.seen;
@@ -251,11 +234,17 @@ impl NormalEquations {
         Some((step * (MAX_STEP / leap(&step)), length))
     }
 
+    /// An unknown without information stays where it is.
     #[inline]
     fn damped_information(&self, damping: f64) -> Square {
         let mut damped = self.information;
         for i in 0..UNKNOWNS {
-            damped[(i, i)] = damped_diagonal(damped[(i, i)], damping);
+            let own = damped[(i, i)];
+            damped[(i, i)] = if own > 0.0 {
+                own * (1.0 + damping)
+            } else {
+                1.0
+            };
         }
         damped
     }
@@ -267,16 +256,6 @@ fn leap(step: &Unknowns) -> f64 {
         .into_iter()
         .map(|i| step[i].abs())
         .fold(MAX_STEP, f64::max)
-}
-
-/// An unknown without information stays where it is.
-#[inline]
-fn damped_diagonal(own: f64, damping: f64) -> f64 {
-    if own > 0.0 {
-        own * (1.0 + damping)
-    } else {
-        1.0
-    }
 }
 
 /// Solves `a x = b` for a positive definite `a`, of which the lower half is read; none where it is

@@ -16,13 +16,6 @@ pub(crate) struct SearchResult {
     pub(crate) other: Option<Minimum>,
 }
 
-impl SearchResult {
-    /// Without a search for other poses.
-    fn only(best: Minimum) -> Self {
-        Self { best, other: None }
-    }
-}
-
 impl Problem {
     /// Refines from every start and keeps what stands above the surface; none where nothing does.
     pub(crate) fn search(&self) -> Option<SearchResult> {
@@ -51,20 +44,25 @@ impl Problem {
     }
 
     /// The closed form, where it stands above the surface, after at most `max_iterations`
-    /// iterations.
+    /// iterations; other poses are not searched for.
     pub(crate) fn closed_form(&self, max_iterations: usize) -> Option<SearchResult> {
-        let start = self.start(self.closed_form_or_prior_focal());
+        let measured = self.closed_form_focal().filter(|_| !self.has_fixed_focal());
+        let start = self.start(measured.unwrap_or_else(|| self.prior_focal()));
         self.residuals
             .refine_for(start, f64::INFINITY, max_iterations)
             .filter(is_above_surface)
-            .map(SearchResult::only)
+            .map(|best| SearchResult { best, other: None })
     }
 
     /// For each focal length the closed form and its mirror image; then the two poses without
     /// perspective.
     fn starts(&self) -> impl Iterator<Item = State> {
         let focals = self.focal_starts().into_iter().flatten();
-        let near = focals.flat_map(|focal| self.direct_and_mirrored(focal));
+        let near = focals.flat_map(|focal| {
+            let direct = self.start(focal);
+            let pose = direct.pose.mirrored(focal);
+            [direct, State { pose, ..direct }]
+        });
         let nominal = self.start(self.prior_focal());
         let distant = self.projected.distant_poses(self.unit_size());
         near.chain(distant.map(|pose| State { pose, ..nominal }))
@@ -83,17 +81,6 @@ impl Problem {
             Some(prior / 2.0),
             Some(prior * 3.0),
         ]
-    }
-
-    fn direct_and_mirrored(&self, focal: f64) -> [State; 2] {
-        let direct = self.start(focal);
-        let pose = direct.pose.mirrored(focal);
-        [direct, State { pose, ..direct }]
-    }
-
-    fn closed_form_or_prior_focal(&self) -> f64 {
-        let measured = self.closed_form_focal().filter(|_| !self.has_fixed_focal());
-        measured.unwrap_or_else(|| self.prior_focal())
     }
 
     fn has_fixed_focal(&self) -> bool {

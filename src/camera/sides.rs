@@ -160,10 +160,7 @@ fn points_on_surface(label: &Label, [w, h]: [f64; 2]) -> impl Iterator<Item = &L
 
 /// How far the points on a surface of this size reach along an axis, metres.
 fn point_span(label: &Label, size: [f64; 2], axis: usize) -> f64 {
-    span(points_on_surface(label, size).map(|p| p.xyz_m[axis]))
-}
-
-fn span(values: impl Iterator<Item = f64>) -> f64 {
+    let values = points_on_surface(label, size).map(|p| p.xyz_m[axis]);
     let [low, high] = values.fold([f64::MAX, f64::MIN], |[low, high], v| {
         [v.min(low), v.max(high)]
     });

@@ -161,17 +161,13 @@ impl Scenario {
 
     /// What a person would label who measured another ratio of the sides than there is.
     fn label(&self, corners_px: [[f64; 2]; 4], ln_ratio: f64) -> Label {
-        let mut label = Label::new(self.image, corners_px, self.measured_size(ln_ratio));
+        let half = libm::exp(ln_ratio / 2.0);
+        let measured = [self.size[0] * half, self.size[1] / half];
+        let mut label = Label::new(self.image, corners_px, measured);
         label.surface.corner_sigma_px =
             (self.corner_sigma_px > 0.0).then_some(self.corner_sigma_px);
         label.image.cropped = (self.off_center == 0.0).then_some(false);
         label
-    }
-
-    /// The sides as measured, with an error of their ratio.
-    fn measured_size(&self, ln_ratio: f64) -> [f64; 2] {
-        let half = libm::exp(ln_ratio / 2.0);
-        [self.size[0] * half, self.size[1] / half]
     }
 
     fn camera(&self, lens: &SharedLens, dice: &mut Dice) -> Camera {
@@ -236,19 +232,14 @@ impl Scenario {
         let [mut near, mut far] = [1.05 * nearest + 1e-4 * self.size[0], 1e5 * self.size[0]];
         for _ in 0..100 {
             let middle = (near * far).sqrt();
-            if self.filled_share(turned, middle, image) > self.fill {
+            let (low, high) = self.extent(turned, middle);
+            if (high - low).component_div(&image).max() > self.fill {
                 near = middle
             } else {
                 far = middle
             }
         }
         far
-    }
-
-    /// The part of the picture that the rectangle fills from a distance.
-    fn filled_share(&self, turned: &[Vector3<f64>; 4], distance: f64, image: Vector2<f64>) -> f64 {
-        let (low, high) = self.extent(turned, distance);
-        (high - low).component_div(&image).max()
     }
 
     /// Bounds of the corners in the picture when the rectangle's centre is on the axis, pixels.

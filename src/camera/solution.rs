@@ -7,13 +7,13 @@ use super::focal::FocalSource;
 use super::label::Framing;
 use super::model::{Observation, Square, State};
 use super::options::SolveOptions;
-use super::pinhole::{Camera, k1_from_kappa};
+use super::pinhole::{Camera, diagonal_px, k1_from_kappa};
 use super::problem::Problem;
 use super::rectangle::corner_points;
 use super::refine::Minimum;
 use super::uncertainty::{FocalShare, Uncertainty};
 use crate::diagnostic::{Code, Diagnostic, Severity};
-use crate::geom::{Point2, Point3, Vector2};
+use crate::geom::{Point2, Vector2};
 use nalgebra::{Matrix2, Matrix3};
 
 /// From this share of the information on, the focal length counts as measured; below the other, as
@@ -126,14 +126,6 @@ pub struct Sigma {
     pub covariance: Square,
 }
 
-impl SolveOptions {
-    /// Height of the objects on a rectangle of this size, metres.
-    fn height_of_objects(&self, size: [f64; 2]) -> f64 {
-        self.reference_height
-            .unwrap_or(REFERENCE_HEIGHT_SHARE * size[0].min(size[1]))
-    }
-}
-
 impl Problem {
     /// What a minimum means, in metres and pixels.
     pub(crate) fn solution(&self, minimum: &Minimum, options: &SolveOptions) -> Solution {
@@ -150,9 +142,11 @@ impl Problem {
     ) -> Solution {
         let camera = self.camera(minimum);
         let size = self.fitted_size(&minimum.state);
+        let default_height = REFERENCE_HEIGHT_SHARE * size[0].min(size[1]);
+        let height = options.reference_height.unwrap_or(default_height);
         let per_corner_px = self
             .has_labelled_corners
-            .then(|| self.corner_distances_px(minimum));
+            .then(|| self.corner_distances_px(&minimum.state));
         let distances_px =
             per_corner_px.map_or_else(|| self.point_distances_px(&minimum.state), Vec::from);
         let mut solution = Solution {
@@ -165,7 +159,7 @@ impl Problem {
             focal: self.focal_finding(&uncertainty.focal),
             rms_px: root_mean_square(&distances_px),
             fit: self.fit(minimum, &camera, per_corner_px, uncertainty.condition),
-            sigma: self.sigma(minimum, uncertainty, options.height_of_objects(size)),
+            sigma: self.sigma(minimum, uncertainty, height),
             warnings: self.warnings.clone(),
             alternative: None,
         };
@@ -196,17 +190,19 @@ impl Problem {
         }
     }
 
-    /// Distance of each corner from where the camera sees it, distortion included, pixels.
-    fn corner_distances_px(&self, minimum: &Minimum) -> [f64; 4] {
-        let points = corner_points(self.size);
+    /// Distance of each corner from where the camera sees it, distortion included, pixels; NaN
+    /// behind the camera.
+    fn corner_distances_px(&self, state: &State) -> [f64; 4] {
+        let points = corner_points(self.size).map(|corner| corner.coords / self.units.unit);
         [0, 1, 2, 3].map(|i| {
-            let seen_px = self.seen_px(&minimum.state, points[i]);
-            (seen_px - self.corners_px[i]).norm()
+            let seen = state.project(&points[i], false);
+            seen.map_or(f64::NAN, |u| {
+                (self.units.pixel(u) - self.corners_px[i]).norm()
+            })
         })
     }
 
-    /// Distance of each labelled point from where the camera sees it, distortion included, pixels;
-    /// NaN behind the camera.
+    /// The same of each labelled point.
     fn point_distances_px(&self, state: &State) -> Vec<f64> {
         let distance_px = |point: &Observation| {
             let seen = state.project(&point.point, point.rigid);
@@ -214,12 +210,6 @@ impl Problem {
         };
         let points = self.residuals.observations.iter();
         points.map(distance_px).collect()
-    }
-
-    /// Where a point of the rectangle, metres, is seen; NaN behind the camera.
-    fn seen_px(&self, state: &State, point: Point3<f64>) -> Point2<f64> {
-        let seen = state.project(&(point.coords / self.units.unit), false);
-        seen.map_or(Point2::from([f64::NAN; 2]), |u| self.units.pixel(u))
     }
 
     fn fit(
@@ -278,21 +268,12 @@ impl Problem {
             FocalSource::Fixed
         } else if prior.is_flat() && range.contains(&minimum.state.ln_focal) {
             FocalSource::Unbounded
+        } else if focal.share >= MEASURED_SHARE {
+            FocalSource::Measured
+        } else if focal.share >= PRIOR_SHARE {
+            FocalSource::Mixed
         } else {
-            FocalSource::from_share(focal.share)
-        }
-    }
-}
-
-impl FocalSource {
-    /// By the share of the information that comes from the picture.
-    fn from_share(share: f64) -> Self {
-        if share >= MEASURED_SHARE {
-            Self::Measured
-        } else if share >= PRIOR_SHARE {
-            Self::Mixed
-        } else {
-            Self::Prior
+            FocalSource::Prior
         }
     }
 }
@@ -352,19 +333,21 @@ impl Solution {
     /// Everything that a camera file holds is finite, but for standard deviations of what nothing
     /// is known of.
     pub(crate) fn is_finite(&self) -> bool {
-        let fit = &self.fit;
+        let (fit, camera) = (&self.fit, &self.camera);
         let values = [fit.chi2, fit.depth_ratio, fit.px_per_metre, self.rms_px];
-        let lens = [self.kappa, self.focal.prior_px, self.focal.share];
-        let mut all = values.iter().chain(&lens).chain(&self.size);
-        is_finite_camera(&self.camera) && all.all(|value| value.is_finite())
+        let [prior_px, share] = [self.focal.prior_px, self.focal.share];
+        let lens = [camera.focal_px.x, self.kappa, prior_px, share];
+        let center = camera.center();
+        let places = camera.principal_px.iter().chain(&center.coords);
+        let mut all = values.iter().chain(&lens).chain(&self.size).chain(places);
+        all.all(|value| value.is_finite())
     }
 
     /// From which error on objects at the reference height are worth a warning, pixels.
     pub(crate) fn height_limit_px(&self, options: &SolveOptions) -> f64 {
-        let [w, h] = self.camera.image.map(f64::from);
         options
             .max_height_sigma_px
-            .unwrap_or(HEIGHT_SIGMA_DIAGONALS * libm::hypot(w, h))
+            .unwrap_or(HEIGHT_SIGMA_DIAGONALS * diagonal_px(self.camera.image))
     }
 
     /// The warning about objects on the surface that may be projected to the wrong place.
@@ -414,28 +397,13 @@ impl Solution {
             "no camera fits ({:.1} px off, p = {p_value:.1e}): {MISFIT_CAUSES}",
             self.rms_px
         );
-        Some(Diagnostic::new(
-            Code::PoorFit,
-            misfit_severity(p_value),
-            what,
-        ))
+        let severity = if p_value < REFUSED_FIT_P {
+            Severity::Error
+        } else {
+            Severity::Warning
+        };
+        Some(Diagnostic::new(Code::PoorFit, severity, what))
     }
-}
-
-fn misfit_severity(p_value: f64) -> Severity {
-    if p_value < REFUSED_FIT_P {
-        Severity::Error
-    } else {
-        Severity::Warning
-    }
-}
-
-fn is_finite_camera(camera: &Camera) -> bool {
-    let numbers = camera.principal_px.iter().copied();
-    numbers
-        .chain(camera.center().iter().copied())
-        .chain([camera.focal_px.x])
-        .all(f64::is_finite)
 }
 
 fn root_mean_square(distances: &[f64]) -> f64 {

@@ -200,10 +200,7 @@ fn fits_exchanged_with_exif(label: &Label, options: &SolveOptions, chi2: f64) ->
 /// The label without what EXIF data say of the focal length, where that is what it goes by.
 pub(super) fn without_exif_focal(label: &Label) -> Label {
     let mut without = label.clone();
-    if label.camera.focal_px.is_none() {
-        (without.camera.focal_35mm, without.camera.focal_sigma) = (None, None);
-        without.camera.focal_fixed = false;
-    }
+    without.camera.forget_equivalent();
     without
 }
 
@@ -344,19 +341,15 @@ fn compare_without_height(
     if let Some(stated_m) = label.camera.height_m
         && labelled.misfit().is_some()
     {
-        let other = solve_without_wrong_exif(&without_height(label), options).ok();
+        let mut without = label.clone();
+        (without.camera.height_m, without.camera.height_sigma_m) = (None, None);
+        let other = solve_without_wrong_exif(&without, options).ok();
         labelled.fit.heights_m = other
             .filter(|other| other.misfit().is_none())
             .filter(|other| other.fit.chi2 + CHI2_99 < labelled.fit.chi2)
             .map(|other| [stated_m, other.camera.height_m()]);
     }
     labelled
-}
-
-fn without_height(label: &Label) -> Label {
-    let mut without = label.clone();
-    (without.camera.height_m, without.camera.height_sigma_m) = (None, None);
-    without
 }
 
 #[cfg(test)]

@@ -114,18 +114,14 @@ impl PhotoCamera {
     }
 
     fn solved(labelled: &LabelledPhoto, force: bool) -> Result<Self> {
-        usable_solution(&labelled.label, force)
+        let solved = solve(&labelled.label, &SolveOptions::default());
+        let usable = match force {
+            true => solved,
+            false => solved.and_then(Solution::fitting),
+        };
+        usable
             .map(Self::from)
             .map_err(|error| located_error(error, labelled))
-    }
-}
-
-/// A camera that fits, or with `force` any.
-fn usable_solution(label: &Label, force: bool) -> std::result::Result<Solution, SolveError> {
-    let solved = solve(label, &SolveOptions::default());
-    match force {
-        true => solved,
-        false => solved.and_then(Solution::fitting),
     }
 }
 
@@ -155,14 +151,10 @@ fn read_camera_file(labelled: &LabelledPhoto) -> Result<Option<CameraFile>> {
 
 /// The error of a camera file, with what to do about it.
 fn with_advice(error: Error, path: &Path) -> Error {
-    let what = message_without_path(&error.to_string(), path);
+    let (message, place) = (error.to_string(), format!("{}: ", path.display()));
+    let what = message.strip_prefix(&place).unwrap_or(&message);
     let what = format!("{what}; delete it, or run `petcomp camera solve` again");
     Error::file(path, what)
-}
-
-fn message_without_path(message: &str, path: &Path) -> String {
-    let place = format!("{}: ", path.display());
-    message.strip_prefix(&place).unwrap_or(message).to_owned()
 }
 
 fn checked_camera_file(path: &Path, labelled: &LabelledPhoto) -> Result<CameraFile> {
@@ -216,17 +208,14 @@ fn staleness(
     Some(format!("solved together with another version of {name}"))
 }
 
-/// The first label among those that were solved together which is not what it was then.
+/// The first label among those that were solved together which is there and has another checksum.
 fn changed_companion<'a>(from: &'a SolvedFrom, known: &LabelsByName<'_>) -> Option<&'a String> {
     let mut together = from.together.iter();
-    together
-        .find(|&(name, &crc)| is_known_otherwise(known, name, crc))
-        .map(|(name, _)| name)
-}
-
-/// A label of this name is there and has another checksum.
-fn is_known_otherwise(known: &LabelsByName<'_>, name: &str, crc: u32) -> bool {
-    known.get(name).is_some_and(|now| !has_checksum(now, crc))
+    let changed = together.find(|&(name, &crc)| {
+        let now = known.get(name.as_str());
+        now.is_some_and(|now| !has_checksum(now, crc))
+    });
+    changed.map(|(name, _)| name)
 }
 
 fn modified(path: &Path) -> Option<std::time::SystemTime> {

@@ -70,18 +70,14 @@ impl Uncertainty {
     pub(crate) fn tilt_sigma(&self, state: &State) -> f64 {
         let normal = state.pose.rotation.column(2);
         let sin = libm::hypot(normal.x, normal.y);
+        let c = &self.covariance;
         if sin < LEAST_TILT_SINE {
-            let c = &self.covariance;
             return ((c[(0, 0)] + c[(1, 1)]) / 2.0).sqrt();
         }
-        let variance = self.rotation_variance(normal.y / sin, -normal.x / sin);
+        // The axis of the tilt, in the picture's plane.
+        let (x, y) = (normal.y / sin, -normal.x / sin);
+        let variance = x * x * c[(0, 0)] + 2.0 * x * y * c[(0, 1)] + y * y * c[(1, 1)];
         variance.max(0.0).sqrt()
-    }
-
-    /// Variance of the rotation about an axis in the picture's plane.
-    fn rotation_variance(&self, x: f64, y: f64) -> f64 {
-        let c = &self.covariance;
-        x * x * c[(0, 0)] + 2.0 * x * y * c[(0, 1)] + y * y * c[(1, 1)]
     }
 
     /// Covariance of the camera's place over the rectangle.
@@ -191,25 +187,19 @@ fn covariance(information: &Square) -> (Square, f64) {
     inverse[(LN_FOCAL, LN_FOCAL)] = 0.0;
     let mut response = -(inverse * coupling);
     let own = f64::from(information[(LN_FOCAL, LN_FOCAL)] > 0.0);
-    let left = information_left(own, &coupling, &response);
+    // On the focal length, when all else answers to it.
+    let left = (own + coupling.dot(&response)).max(0.0);
     if own > 0.0 {
         response[LN_FOCAL] = 1.0;
         inverse += response * response.transpose() / left.max(ROUNDING_SHARE);
     }
-    clear_uninformed(&mut inverse, information);
+    for i in (0..UNKNOWNS).filter(|&i| information[(i, i)] == 0.0) {
+        clear_unknown(&mut inverse, i);
+    }
     (
-        unscaled(&inverse, &scale),
+        inverse.component_mul(&(scale * scale.transpose())),
         unscaled_information(left, scale[LN_FOCAL]),
     )
-}
-
-/// On the focal length, when all else answers to it.
-fn information_left(own: f64, coupling: &Unknowns, response: &Unknowns) -> f64 {
-    (own + coupling.dot(response)).max(0.0)
-}
-
-fn unscaled(covariance: &Square, scale: &Unknowns) -> Square {
-    covariance.component_mul(&(scale * scale.transpose()))
 }
 
 /// Information in an unknown's own unit; zero where there is only rounding.
@@ -236,13 +226,6 @@ fn inverse_or_rounded(matrix: &Square) -> Option<Square> {
         .cholesky()
         .or_else(|| (matrix + Square::identity() * ROUNDING_SHARE).cholesky())
         .map(|c| c.inverse())
-}
-
-/// No variance for unknowns without information.
-fn clear_uninformed(covariance: &mut Square, information: &Square) {
-    for i in (0..UNKNOWNS).filter(|&i| information[(i, i)] == 0.0) {
-        clear_unknown(covariance, i);
-    }
 }
 
 /// With a unit diagonal, also where there is no information.

@@ -2,7 +2,7 @@
 
 use super::recognise::refused;
 use super::solve::BlackAndWhite;
-use super::view::grey;
+use super::view::{grey, where_set};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::image::{Image, Mask};
@@ -113,9 +113,8 @@ pub(super) fn color_change(empty_white: &Image<LinearRgb>, free: &Mask) -> Optio
 
 /// The largest over the smallest value where a mask is set, less 1.
 fn change_where(image: &Image<f32>, mask: &Mask) -> f32 {
-    let pixels = image.pixels().iter().zip(mask.pixels());
-    let set = pixels.filter(|(_, set)| **set).map(|(v, _)| *v);
-    let [low, high] = set.fold([f32::MAX, 0.0], |[low, high], v| [v.min(low), v.max(high)]);
+    let [low, high] =
+        where_set(image, mask).fold([f32::MAX, 0.0], |[low, high], v| [v.min(low), v.max(high)]);
     high / low.max(f32::MIN_POSITIVE) - 1.0
 }
 
@@ -202,24 +201,14 @@ fn change_of_stripes(
 }
 
 fn root_mean_square(image: &Image<f32>, coverage: &Image<Coverage>) -> f64 {
-    let pixels = image.pixels().iter().zip(coverage.pixels());
-    let inside = pixels.filter(|(_, c)| c.0 > 0.5);
-    let (sum, count) = inside.fold((0.0, 0.0), |(sum, n), (v, _)| {
-        (sum + f64::from(v * v), n + 1.0)
-    });
+    let inside = coverage.map(|c| c.0 > 0.5);
+    let (sum, count) =
+        where_set(image, &inside).fold((0.0, 0.0), |(sum, n), v| (sum + f64::from(v * v), n + 1.0));
     (sum / f64::max(count, 1.0)).sqrt()
 }
 
 /// Sum of one picture over that of another, where a mask is set.
 fn ratio_where(a: &Image<f32>, b: &Image<f32>, mask: &Mask) -> f32 {
-    let pixels = a
-        .pixels()
-        .iter()
-        .zip(b.pixels())
-        .zip(mask.pixels())
-        .filter(|(_, set)| **set);
-    let (sum_a, sum_b) = pixels.fold((0.0_f64, 0.0_f64), |(p, q), ((a, b), _)| {
-        (p + f64::from(*a), q + f64::from(*b))
-    });
+    let [sum_a, sum_b] = [a, b].map(|v| where_set(v, mask).map(f64::from).sum::<f64>());
     (sum_a / sum_b.max(1e-9)) as f32
 }

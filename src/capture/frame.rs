@@ -28,31 +28,20 @@ pub struct Stripes {
 }
 
 impl Stripes {
-    /// All of them, in the order in which they are shown.
-    pub(super) const ALL: [Self; 4 * SHIFTS] = {
-        let mut all = [Self {
-            axis: 0,
-            is_fine: false,
-            shift: 0,
-        }; 4 * SHIFTS];
-        let mut i = 0;
-        while i < all.len() {
-            all[i] = Self::of_number(i);
-            i += 1;
-        }
-        all
-    };
+    /// How many there are.
+    pub(super) const COUNT: usize = 4 * SHIFTS;
 
-    /// Coarse ones first; of a period those along x first.
-    const fn of_number(i: usize) -> Self {
-        Self {
+    /// All of them, in the order in which they are shown: coarse ones first; of a period those
+    /// along x first.
+    pub(super) fn all() -> impl Iterator<Item = Self> {
+        (0..Self::COUNT).map(|i| Self {
             axis: i / SHIFTS % 2,
             is_fine: i >= 2 * SHIFTS,
             shift: i % SHIFTS,
-        }
+        })
     }
 
-    const fn number(self) -> usize {
+    fn number(self) -> usize {
         SHIFTS * (2 * self.is_fine as usize + self.axis) + self.shift
     }
 }
@@ -60,7 +49,7 @@ impl Stripes {
 impl Frame {
     /// Those that are shown, in their order.
     pub fn all(with_stripes: bool) -> impl Iterator<Item = Self> {
-        let stripes = Stripes::ALL.into_iter().filter(move |_| with_stripes);
+        let stripes = Stripes::all().filter(move |_| with_stripes);
         [Self::Black, Self::White]
             .into_iter()
             .chain(stripes.map(Self::Stripes))

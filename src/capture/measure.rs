@@ -9,7 +9,7 @@ use super::recognise::{FramePhoto, refused};
 use super::solve::{BlackAndWhite, FilmInput, NoiseModel};
 use super::stack::{Alignment, Photos, Stack};
 use super::stripes::SeenStripes;
-use super::view::{View, grey};
+use super::view::{View, grey, where_set};
 use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::filter;
@@ -63,10 +63,9 @@ pub fn measure(
     let all: Vec<&FramePhoto> = photos.recognised.iter().chain(empty.recognised).collect();
     let alignment = Alignment::new(display, *view, reference, &all);
     let stack = alignment.stack(photos)?;
-    let empty_stack = if empty.recognised.is_empty() {
-        None
-    } else {
-        Some(alignment.stack(empty)?)
+    let empty_stack = match empty.recognised {
+        [] => None,
+        _ => Some(alignment.stack(empty)?),
     };
     let mut diagnostics: Vec<Diagnostic> = photos.drifts(reference);
     diagnostics.extend(empty.drifts(reference));
@@ -173,17 +172,11 @@ impl<'a> CaptureScene<'a> {
     /// That of the photos, and of those of the empty display.
     fn noise(&self) -> NoiseModel {
         let frames = self.frames();
-        let noise = frames.noise(&self.free);
-        let white = grey(mean_where(frames.empty_white, &self.free));
-        let is_photographed = self.empty_stack.is_some();
-        NoiseModel {
-            empty: if is_photographed {
-                noise.of_white(white)
-            } else {
-                0.0
-            },
-            ..noise
+        let mut noise = frames.noise(&self.free);
+        if self.empty_stack.is_some() {
+            noise.empty = noise.of_white(grey(mean_where(frames.empty_white, &self.free)));
         }
+        noise
     }
 
     /// How much of the solution is kept: the object and a rim of blur.
@@ -278,12 +271,8 @@ fn fitted(photo: &Image<LinearRgb>, free: &Mask) -> Result<Image<LinearRgb>> {
 }
 
 fn mean_where(image: &Image<LinearRgb>, mask: &Mask) -> LinearRgb {
-    let pixels = image
-        .pixels()
-        .iter()
-        .zip(mask.pixels())
-        .filter(|(_, set)| **set);
-    let (sum, count) = pixels.fold(([0.0_f64; 3], 0.0), |(sum, n), (p, _)| {
+    let pixels = where_set(image, mask);
+    let (sum, count) = pixels.fold(([0.0_f64; 3], 0.0), |(sum, n), p| {
         let p = p.channels();
         ([0, 1, 2].map(|c: usize| sum[c] + f64::from(p[c])), n + 1.0)
     });
@@ -291,13 +280,8 @@ fn mean_where(image: &Image<LinearRgb>, mask: &Mask) -> LinearRgb {
 }
 
 fn unevenness(light: &Image<LinearRgb>, mask: &Mask) -> f32 {
-    let pixels = light
-        .pixels()
-        .iter()
-        .zip(mask.pixels())
-        .filter(|(_, set)| **set);
-    let ends = pixels.fold([f32::MAX, 0.0], |[low, high], (p, _)| {
-        [low.min(grey(*p)), high.max(grey(*p))]
+    let ends = where_set(light, mask).fold([f32::MAX, 0.0], |[low, high], p| {
+        [low.min(grey(p)), high.max(grey(p))]
     });
     (1.0 - ends[0] / ends[1].max(1e-6)).clamp(0.0, 1.0)
 }

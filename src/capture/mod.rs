@@ -40,6 +40,8 @@ pub use page::page;
 pub use recognise::FramePhoto;
 #[doc(hidden)]
 pub use stack::{Photos, Sources};
+#[cfg(all(test, feature = "markers"))]
+pub(crate) use tag::is_white as is_white_in_tag;
 #[doc(hidden)]
 pub use view::View;
 #[doc(hidden)]

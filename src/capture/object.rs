@@ -1,7 +1,7 @@
 //! Where the object is: where the display looks otherwise than empty.
 
 use super::recognise::refused;
-use super::view::grey;
+use super::view::{grey, where_set};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::{Image, Mask};
@@ -101,7 +101,9 @@ impl Object {
         };
         let is_speck = (other.count() as f64) < MIN_AREA * (w * h) as f64;
         // Dirt and reflections are large, but faint.
-        let [faint, strong] = [&other, &object].map(|piece| change_of(piece, evidence));
+        // By how much a piece changes the display's light, all its pixels together.
+        let [faint, strong] =
+            [&other, &object].map(|piece| where_set(evidence, piece).map(f64::from).sum::<f64>());
         if is_speck || faint < share * strong {
             return Ok(());
         }
@@ -114,19 +116,8 @@ impl Object {
     }
 }
 
-/// By how much a piece changes the display's light, all its pixels together.
-fn change_of(piece: &Mask, evidence: &Image<f32>) -> f64 {
-    let pixels = piece.pixels().iter().zip(evidence.pixels());
-    pixels
-        .filter(|(piece, _)| **piece)
-        .map(|(_, e)| f64::from(*e))
-        .sum()
-}
-
 fn threshold(evidence: &Image<f32>, free: &Mask) -> f32 {
-    let pixels = evidence.pixels().iter().zip(free.pixels());
-    let values = pixels.filter(|(_, free)| **free).map(|(e, _)| *e);
-    let typical = median(values, f32::total_cmp).unwrap_or_default();
+    let typical = median(where_set(evidence, free), f32::total_cmp).unwrap_or_default();
     MIN_EVIDENCE.max(EVIDENCE_MEDIANS * typical)
 }
 
@@ -193,14 +184,9 @@ fn place(set: &Mask) -> String {
 fn check_within(mask: &Mask, free: &Mask) -> Result<()> {
     let inner = filter::erode(free, 2.0);
     let beyond = mask.zip_map(&inner, |object, free| object && !free);
-    if beyond.count() == 0 {
+    let Some(i) = beyond.pixels().iter().position(|beyond| *beyond) else {
         return Ok(());
-    }
-    let i = beyond
-        .pixels()
-        .iter()
-        .position(|beyond| *beyond)
-        .unwrap_or(0);
+    };
     let (w, h) = mask.size();
     let side = match ((i % w) * 3 / w, (i / w) * 3 / h) {
         (0, _) => "left",

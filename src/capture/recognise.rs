@@ -99,7 +99,6 @@ pub(super) fn map_in_front(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<Homog
     Some(Homography(map.0 * depth.signum()))
 }
 
-/// The tags of a photo.
 fn tags(photo: &Image<LinearRgb>) -> Result<Vec<Marker>> {
     if cfg!(feature = "markers") {
         return Ok(any_markers(photo));
@@ -118,10 +117,8 @@ fn markers_of_frame(found: &[Marker]) -> Result<(Frame, BTreeMap<usize, Marker>)
     if markers.len() >= MIN_MARKERS {
         return Ok((frame, markers));
     }
-    let missing: Vec<_> = (0..CORNERS)
-        .filter(|corner| !markers.contains_key(corner))
-        .collect();
-    let names: Vec<_> = missing.iter().map(|&corner| CORNER_NAMES[corner]).collect();
+    let missing = (0..CORNERS).filter(|corner| !markers.contains_key(corner));
+    let names: Vec<_> = missing.map(|corner| CORNER_NAMES[corner]).collect();
     Err(refused(&format!(
         "{} of the 4 markers of a frame were found, expected at least {MIN_MARKERS} (missing: {}); \
          are they hidden, blurred or cut off?",

@@ -9,7 +9,7 @@
 //!
 //! [Smith and Blinn 1996]: https://doi.org/10.1145/237170.237263
 
-use super::view::clipped;
+use super::view::{clipped, where_set};
 use crate::filter::{self, Pyramid, sample_bilinear_clamped};
 use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, Film, LinearRgb, Mix, PremulRgba};
@@ -38,12 +38,9 @@ impl BlackAndWhite<'_> {
 
     /// Light of the display's brightest channel, where it is free.
     fn brightest(&self, free: &Mask) -> f32 {
-        let light = self.light();
-        let pixels = light.pixels().iter().zip(free.pixels());
-        let values = pixels
-            .filter(|(_, free)| **free)
-            .map(|(p, _)| p.max_channel());
-        median(values, f32::total_cmp).unwrap_or(1.0).max(DARKEST)
+        let light = self.light().map(LinearRgb::max_channel);
+        let middle = median(where_set(&light, free), f32::total_cmp);
+        middle.unwrap_or(1.0).max(DARKEST)
     }
 
     /// Least light of the display that a channel is divided by.
@@ -193,15 +190,11 @@ impl FilmInput<'_> {
         let above = self
             .stripes
             .zip3_map(frames.empty_black, &light, |mean, black, light| {
-                by_channel(mean, black, light, |mean, black, light| {
-                    (mean - black) / light.max(self.least_light)
-                })
+                let [mean, black, light] = [mean, black, light].map(LinearRgb::channels);
+                [0, 1, 2].map(|c: usize| (mean[c] - black[c]) / light[c].max(self.least_light))
             });
         let of = |channel: usize| {
-            let free = above.pixels().iter().zip(self.free.pixels());
-            let values = free
-                .filter(|(_, free)| **free)
-                .map(|(p, _)| p.channels()[channel]);
+            let values = where_set(&above, self.free).map(|above| above[channel]);
             median(values, f32::total_cmp).unwrap_or(0.5)
         };
         LinearRgb::from([0, 1, 2].map(of))
@@ -269,15 +262,6 @@ fn covered(film: Film, Coverage(c): Coverage) -> Film {
         color: film.color.scale(c),
         opacity: film.opacity.scale(c),
     }
-}
-
-fn by_channel(
-    a: LinearRgb,
-    b: LinearRgb,
-    c: LinearRgb,
-    f: impl Fn(f32, f32, f32) -> f32,
-) -> LinearRgb {
-    LinearRgb::new(f(a.r, b.r, c.r), f(a.g, b.g, c.g), f(a.b, b.b, c.b))
 }
 
 /// Variance that no photo is better than, where the display's brightest light is 1: that of 12 bits.

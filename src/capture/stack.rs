@@ -79,7 +79,7 @@ impl StripeStack {
         if self.is_empty() {
             self.mean = seen.map(|_| LinearRgb::BLACK);
         }
-        let share = 1.0 / Stripes::ALL.len() as f32;
+        let share = 1.0 / Stripes::COUNT as f32;
         self.mean = self.mean.zip_map(seen, |sum, p| sum.add_scaled(share, p));
         let axes = &mut self.light[usize::from(stripes.is_fine)];
         axes[stripes.axis][stripes.shift] = seen.map(grey);
@@ -210,7 +210,7 @@ impl<'a> Alignment<'a> {
         if !photos.missing_stripes().is_empty() {
             return Ok(stack);
         }
-        for stripes in Stripes::ALL {
+        for stripes in Stripes::all() {
             if let Some(seen) = self.frame(photos, Frame::Stripes(stripes))? {
                 stack.add(stripes, &seen.light);
             }
@@ -269,12 +269,12 @@ impl Photos<'_> {
     /// Exposures that differ much from that of the reference.
     pub(super) fn drifts(&self, reference: &FramePhoto) -> Vec<Diagnostic> {
         let photos = self.recognised.iter().zip(self.sources.names);
-        let factors = photos.map(|(photo, name)| (name, photo.exposure_to(reference)));
-        let drifts = factors.map(|(name, factors)| (name, largest_drift(factors)));
-        drifts
-            .filter(|(_, drift)| *drift > MAX_DRIFT)
-            .map(|(name, drift)| drift_warning(name, drift))
-            .collect()
+        let warnings = photos.filter_map(|(photo, name)| {
+            let drifts = photo.exposure_to(reference).map(|f| (f - 1.0).abs());
+            let drift = drifts.into_iter().fold(0.0, f32::max);
+            (drift > MAX_DRIFT).then(|| drift_warning(name, drift))
+        });
+        warnings.collect()
     }
 }
 
@@ -291,13 +291,6 @@ fn differing([a, b]: [&str; 2]) -> Error {
          photos without the object belong to empty (--empty)",
         100.0 * MAX_DIFFERENCE
     ))
-}
-
-fn largest_drift(factors: [f32; 3]) -> f32 {
-    factors
-        .into_iter()
-        .map(|f| (f - 1.0).abs())
-        .fold(0.0, f32::max)
 }
 
 fn drift_warning(photo: &str, drift: f32) -> Diagnostic {

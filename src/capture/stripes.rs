@@ -57,47 +57,34 @@ impl SeenStripes {
         let waves = light.each_ref().map(|axes| axes.each_ref().map(waves));
         let [x, y] = [0, 1].map(|axis| {
             let [coarse, fine] = [&waves[0][axis], &waves[1][axis]];
-            AxisPlaces::new(axis, coarse, fine, display, view)
+            places(axis, coarse, fine, display, view)
         });
         let [w, h] = display.size_px.map(f64::from);
-        let at_px = x.place.zip_map(&y.place, |x, y| [x, y]);
+        let at_px = x.zip_map(&y, |(x, _), (y, _)| [x, y]);
         let on_display = at_px.map(|[x, y]| (0.0..w).contains(&x) && (0.0..h).contains(&y));
         Self {
-            consistent: x
-                .consistent
-                .zip3_map(&y.consistent, &on_display, |x, y, on| x && y && on),
+            consistent: x.zip3_map(&y, &on_display, |(_, x), (_, y), on| x && y && on),
             at_px,
             waves,
         }
     }
 }
 
-/// Where lines of sight end along one axis.
-struct AxisPlaces {
-    place: Image<f64>,
-    consistent: Mask,
-}
-
-impl AxisPlaces {
-    fn new(
-        axis: usize,
-        coarse: &Image<Wave>,
-        fine: &Image<Wave>,
-        display: &Display,
-        view: &View,
-    ) -> Self {
-        let [long, short] = [false, true].map(|is_fine| display.period_px(is_fine));
-        let (w, h) = fine.size();
-        let places = Image::from_fn(w, h, |x, y| {
-            let rough = coarse[(x, y)].place_near(view.display_at(x, y)[axis], long);
-            let place = fine[(x, y)].place_near(rough, short);
-            (place, (place - rough).abs() <= MAX_DISAGREEMENT * short)
-        });
-        Self {
-            place: places.map(|(place, _)| place),
-            consistent: places.map(|(_, consistent)| consistent),
-        }
-    }
+/// Where lines of sight end along one axis, and whether coarse and fine stripes agree about it.
+fn places(
+    axis: usize,
+    coarse: &Image<Wave>,
+    fine: &Image<Wave>,
+    display: &Display,
+    view: &View,
+) -> Image<(f64, bool)> {
+    let [long, short] = [false, true].map(|is_fine| display.period_px(is_fine));
+    let (w, h) = fine.size();
+    Image::from_fn(w, h, |x, y| {
+        let rough = coarse[(x, y)].place_near(view.display_at(x, y)[axis], long);
+        let place = fine[(x, y)].place_near(rough, short);
+        (place, (place - rough).abs() <= MAX_DISAGREEMENT * short)
+    })
 }
 
 fn waves([a, b, c, d]: &[Image<f32>; SHIFTS]) -> Image<Wave> {

@@ -28,7 +28,7 @@ const ROW_AND_COLUMN: [u8; 36] = [
 ///
 /// # Panics
 /// For a number beyond the tags that frames use.
-pub(super) fn is_white(id: u32, row: usize, column: usize) -> bool {
+pub(crate) fn is_white(id: u32, row: usize, column: usize) -> bool {
     let cell = 10 * row + column;
     let mut bits = ROW_AND_COLUMN.iter();
     let bit = bits.position(|&at| usize::from(at) == cell);

@@ -38,6 +38,10 @@ const STILL: Conditions = Conditions {
     motion: |_| [0.0; 2],
     has_object: true,
 };
+const BARE: Conditions = Conditions {
+    has_object: false,
+    ..STILL
+};
 
 /// Place in the object, -1 to 1 across it.
 fn across([u, v]: [f64; 2]) -> [f64; 2] {
@@ -156,17 +160,21 @@ fn measured(
     empty: &[Frame],
     conditions: Conditions,
 ) -> crate::Result<(View, Measured)> {
-    let shots = |frames: &[Frame], with_object| -> Vec<Image<LinearRgb>> {
-        let conditions = Conditions {
-            has_object: with_object && conditions.has_object,
-            ..conditions
-        };
-        frames
-            .iter()
-            .map(|&frame| photo(frame, conditions))
-            .collect()
+    let bare = Conditions {
+        has_object: false,
+        ..conditions
     };
-    measured_of(&shots(frames, true), &shots(empty, false))
+    measured_of(&shots(frames, conditions), &shots(empty, bare))
+}
+
+fn shots(frames: &[Frame], conditions: Conditions) -> Vec<Image<LinearRgb>> {
+    let frames = frames.iter();
+    frames.map(|&frame| photo(frame, conditions)).collect()
+}
+
+/// A photo whose light ends at 1.
+fn limited(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
+    photo.map(|p| p.map(|v| v.min(1.0)))
 }
 
 fn measured_of(
@@ -368,13 +376,7 @@ fn what_is_wrong_with_a_capture_is_said() {
         drift.contains("photo 0: its exposure or colour is 60 % off that of the white frame"),
         "{drift}"
     );
-    let nothing = told(
-        &frames(false),
-        Conditions {
-            has_object: false,
-            ..STILL
-        },
-    );
+    let nothing = told(&frames(false), BARE);
     assert!(nothing.contains("nothing lies on the display"), "{nothing}");
 }
 
@@ -407,14 +409,8 @@ fn through_blue(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
 
 #[test]
 fn a_clear_coloured_sheet_has_no_haze_on_a_display_of_another_colour() {
-    let bare = Conditions {
-        has_object: false,
-        ..STILL
-    };
-    let photos: Vec<_> = frames(true)
-        .into_iter()
-        .map(|frame| through_blue(&photo(frame, bare)))
-        .collect();
+    let bare = shots(&frames(true), BARE);
+    let photos: Vec<_> = bare.iter().map(through_blue).collect();
     let (view, measured) = measured_of(&photos, &[]).unwrap();
     let paths = measured.refraction.unwrap().paths;
     let places = inner_places(&view);
@@ -425,10 +421,8 @@ fn a_clear_coloured_sheet_has_no_haze_on_a_display_of_another_colour() {
 
 #[test]
 fn a_display_whose_colour_changes_from_side_to_side_is_fitted() {
-    let photos: Vec<_> = frames(false)
-        .into_iter()
-        .map(|frame| aslant(&photo(frame, STILL)))
-        .collect();
+    let above = shots(&frames(false), STILL);
+    let photos: Vec<_> = above.iter().map(aslant).collect();
     let (view, measured) = measured_of(&photos, &[]).unwrap();
     let [v, _] = film_errors(&view, &measured);
     assert!(v < 0.015, "{v}");
@@ -436,16 +430,7 @@ fn a_display_whose_colour_changes_from_side_to_side_is_fitted() {
 
 #[test]
 fn photos_that_are_exchanged_with_those_of_the_empty_display_are_refused() {
-    let bare = Conditions {
-        has_object: false,
-        ..STILL
-    };
-    let [with, without] = [STILL, bare].map(|conditions| {
-        let photos = frames(false).into_iter();
-        photos
-            .map(|frame| photo(frame, conditions))
-            .collect::<Vec<_>>()
-    });
+    let [with, without] = [STILL, BARE].map(|conditions| shots(&frames(false), conditions));
     let error = measured_of(&without, &with).err().unwrap().to_string();
     assert!(error.contains("exchanged?"), "{error}");
 }
@@ -461,11 +446,7 @@ fn photos_of_a_frame_with_the_object_and_without_are_refused() {
         ];
         measured_of(&photos, &[]).map_err(|e| e.to_string())
     };
-    let bare = Conditions {
-        has_object: false,
-        ..STILL
-    };
-    let error = with(bare).err().unwrap();
+    let error = with(BARE).err().unwrap();
     assert!(
         error.contains("photo 1 and photo 2 show the same frame but differ"),
         "{error}"
@@ -481,20 +462,17 @@ fn photos_of_a_frame_with_the_object_and_without_are_refused() {
 
 #[test]
 fn a_photo_that_clips_is_named_where_the_others_do_not() {
-    let shots = |has_object, exposure| {
+    let limited_shots = |conditions, exposure| {
         let conditions = Conditions {
-            has_object,
             exposure,
-            ..STILL
+            ..conditions
         };
-        let photos = frames(false).into_iter();
-        photos
-            .map(|frame| photo(frame, conditions).map(|p| p.map(|v| v.min(1.0))))
-            .collect::<Vec<_>>()
+        let photos = shots(&frames(false), conditions);
+        photos.iter().map(limited).collect::<Vec<_>>()
     };
     let bright: fn(Frame) -> f32 = |_| 1.15;
     for [with, without] in [[STILL.exposure, bright], [bright, STILL.exposure]] {
-        let told = measured_of(&shots(true, with), &shots(false, without)).err();
+        let told = measured_of(&limited_shots(STILL, with), &limited_shots(BARE, without)).err();
         let told = told.unwrap().to_string();
         assert!(
             told.contains("photo 1: ") && told.contains("of the white frame is clipped"),
@@ -509,10 +487,8 @@ fn a_photo_that_clips_or_has_no_markers_is_refused() {
         exposure: |_| 1.6,
         ..STILL
     };
-    let photos: Vec<_> = frames(false)
-        .into_iter()
-        .map(|frame| photo(frame, bright).map(|p| p.map(|v| v.min(1.0))))
-        .collect();
+    let photos = shots(&frames(false), bright);
+    let photos: Vec<_> = photos.iter().map(limited).collect();
     let error = measured_of(&photos, &[]).err().unwrap().to_string();
     assert!(
         error.contains(

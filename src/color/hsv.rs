@@ -111,10 +111,6 @@ mod tests {
         })
     }
 
-    fn largest(c: LinearRgb) -> f32 {
-        c.r.max(c.g).max(c.b)
-    }
-
     fn distance(a: LinearRgb, b: LinearRgb) -> f32 {
         (a.r - b.r)
             .abs()
@@ -124,7 +120,7 @@ mod tests {
 
     #[test]
     fn the_way_to_hsv_and_back_changes_no_colour() {
-        for c in colors().filter(|&c| largest(c) != 0.0) {
+        for c in colors().filter(|c| c.max_channel() != 0.0) {
             let back = hsv_to_rgb(rgb_to_hsv(c));
             assert!(distance(back, c) < 4e-6, "{c:?} became {back:?}");
         }
@@ -150,25 +146,15 @@ mod tests {
 
     #[test]
     fn a_third_of_a_turn_moves_red_to_green_and_a_negative_one_to_blue() {
-        let red = LinearRgb::new(3.0, 0.0, 0.0);
-        assert!(
-            distance(
-                shift_hsv(red, 120.0, 1.0, 1.0),
-                LinearRgb::new(0.0, 3.0, 0.0)
-            ) < 1e-6
-        );
-        assert!(
-            distance(
-                shift_hsv(red, -120.0, 1.0, 1.0),
-                LinearRgb::new(0.0, 0.0, 3.0)
-            ) < 1e-6
-        );
-        assert!(
-            distance(
-                shift_hsv(red, 480.0, 1.0, 1.0),
-                LinearRgb::new(0.0, 3.0, 0.0)
-            ) < 2e-6
-        );
+        let [red, green, blue] =
+            [[3.0_f32, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 3.0]].map(LinearRgb::from);
+        for (hue_deg, expected, near) in [
+            (120.0, green, 1e-6),
+            (-120.0, blue, 1e-6),
+            (480.0, green, 2e-6),
+        ] {
+            assert!(distance(shift_hsv(red, hue_deg, 1.0, 1.0), expected) < near);
+        }
     }
 
     #[test]
@@ -193,7 +179,7 @@ mod tests {
     #[test]
     fn colours_without_negative_channels_agree_with_the_palette_crate() {
         use palette::{FromColor, Hsv as Theirs, LinSrgb, encoding::Linear, encoding::Srgb};
-        for c in colors().filter(|c| c.r.min(c.g).min(c.b) >= 0.0 && largest(*c) <= 1.0) {
+        for c in colors().filter(|c| c.r.min(c.g).min(c.b) >= 0.0 && c.max_channel() <= 1.0) {
             let theirs = Theirs::<Linear<Srgb>>::from_color(LinSrgb::new(c.r, c.g, c.b));
             let ours = rgb_to_hsv(c);
             assert!(

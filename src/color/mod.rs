@@ -2,8 +2,7 @@
 //!
 //! The library works in scene-linear light with Rec. 709 primaries and white D65
 //! ([`LinearRgb`](crate::LinearRgb)). Everything else is met at a border and converted there, once:
-//! display values by [`decode_srgb8`] and [`encode_srgb8`], other primaries by a [`ColorMatrix`],
-//! video by [`Ycbcr`].
+//! display values by [`decode_srgb8`] and [`encode_srgb8`], other primaries by a [`ColorMatrix`].
 //!
 //! Curves are computed through the `libm` crate in `f64` and rounded once, never through the
 //! system's own `powf`: the same input gives the same bytes on every machine. Matrices are derived
@@ -15,7 +14,6 @@ mod quantize;
 mod space;
 mod temperature;
 mod transfer;
-mod ycbcr;
 
 #[doc(hidden)]
 pub use albedo::Albedo;
@@ -31,5 +29,3 @@ pub use space::{ColorMatrix, bradford, rgb_from_rgb, xyz_from_rgb};
 #[doc(hidden)]
 pub use temperature::planckian;
 pub use transfer::{Curve, linear_to_srgb, srgb_to_linear};
-#[doc(hidden)]
-pub use ycbcr::{CodeRange, Ycbcr};

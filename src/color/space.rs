@@ -120,21 +120,6 @@ impl ColorMatrix {
         rgb_from_rgb(&RgbSpace::ACESCG, &RgbSpace::REC709).into()
     }
 
-    /// The library's working colours of ACEScg values.
-    pub fn linear_from_acescg() -> Self {
-        rgb_from_rgb(&RgbSpace::REC709, &RgbSpace::ACESCG).into()
-    }
-
-    /// CIE XYZ (white D65, Y of white 1) of the library's working colours.
-    pub fn xyz_from_linear() -> Self {
-        xyz_from_rgb(&RgbSpace::REC709).into()
-    }
-
-    /// The library's working colours of CIE XYZ (white D65, Y of white 1).
-    pub fn linear_from_xyz() -> Self {
-        rgb_from_xyz(&RgbSpace::REC709).into()
-    }
-
     /// The matrix times a column.
     #[inline(always)]
     pub fn apply(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
@@ -183,7 +168,7 @@ mod tests {
 
     #[test]
     fn the_middle_row_of_xyz_is_luminance() {
-        let [_, y, _] = ColorMatrix::xyz_from_linear().rows;
+        let [_, y, _] = ColorMatrix::from(xyz_from_rgb(&RgbSpace::REC709)).rows;
         let c = LinearRgb::new(0.3, 0.7, 1.9);
         let exact = y[0] * c.r + y[1] * c.g + y[2] * c.b;
         assert!(

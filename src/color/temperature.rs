@@ -1,6 +1,6 @@
 //! The colour of glowing bodies.
 
-use crate::color::ColorMatrix;
+use crate::color::{ColorMatrix, RgbSpace, rgb_from_xyz};
 use crate::pixel::LinearRgb;
 
 /// Light of a black body of `kelvin` (1667 to 25 000; clamped), scene-linear, of luminance 1: red
@@ -18,7 +18,8 @@ pub fn planckian(kelvin: f64) -> LinearRgb {
     let x = polynomial(x_spline, 1.0 / t);
     let y = polynomial(y_spline, x);
     let xyz = [x / y, 1.0, (1.0 - x - y) / y].map(|v| v as f32);
-    LinearRgb::from(ColorMatrix::linear_from_xyz().apply(xyz)).map(|v| v.max(0.0))
+    let linear_from_xyz = ColorMatrix::from(rgb_from_xyz(&RgbSpace::REC709));
+    LinearRgb::from(linear_from_xyz.apply(xyz)).map(|v| v.max(0.0))
 }
 
 /// Where the splines begin (Kang et al. 2002).

@@ -7,8 +7,6 @@
 /// formula.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Curve {
-    /// Encoded values are light.
-    Linear,
     /// IEC 61966-2-1: `12.92 x` up to 0.0031308, then `1.055 x^(1/2.4) - 0.055`.
     Srgb,
     /// ITU-R BT.709 camera curve: `4.5 x` below 0.018, then `1.099 x^0.45 - 0.099`.
@@ -33,7 +31,6 @@ impl Curve {
     /// [`encode`](Self::encode) without rounding to `f32`.
     pub(super) fn encode_f64(self, light: f64) -> f64 {
         mirrored(light, |x| match self {
-            Self::Linear => x,
             Self::Srgb if x <= SRGB_KNEE => SRGB_SLOPE * x,
             Self::Srgb => 1.055 * libm::pow(x, 1.0 / 2.4) - 0.055,
             Self::Rec709 if x < REC709_KNEE => REC709_SLOPE * x,
@@ -45,7 +42,6 @@ impl Curve {
     /// [`decode`](Self::decode) without rounding to `f32`.
     pub(super) fn decode_f64(self, value: f64) -> f64 {
         mirrored(value, |v| match self {
-            Self::Linear => v,
             Self::Srgb if v <= SRGB_SLOPE * SRGB_KNEE => v / SRGB_SLOPE,
             Self::Srgb => libm::pow((v + 0.055) / 1.055, 2.4),
             Self::Rec709 if v < REC709_KNEE_VALUE => v / REC709_SLOPE,
@@ -98,8 +94,7 @@ pub fn linear_to_srgb(light: f32) -> f32 {
 mod tests {
     use super::*;
 
-    const CURVES: [Curve; 5] = [
-        Curve::Linear,
+    const CURVES: [Curve; 4] = [
         Curve::Srgb,
         Curve::Rec709,
         Curve::Gamma(2.2),

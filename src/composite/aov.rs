@@ -56,21 +56,19 @@ impl Aov {
     ];
 }
 
-fn unknown_aov(name: &str) -> Error {
-    let names = Aov::ALL.map(|(n, _)| n).join(", ");
-    Error::value("aov", format!("\"{name}\", expected some of {names}"))
-}
-
 impl FromStr for Aov {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        by_name(&Self::ALL, name).ok_or_else(|| unknown_aov(name))
+        by_name(&Self::ALL, name).ok_or_else(|| {
+            let names = Self::ALL.map(|(n, _)| n).join(", ");
+            Error::value("aov", format!("\"{name}\", expected some of {names}"))
+        })
     }
 }
 
 /// Coverage above which an object owns a pixel: that of the reference renderer.
-pub(crate) const FRONT_ALPHA: f32 = 0.05;
+const FRONT_ALPHA: f32 = 0.05;
 
 /// The foremost object that covers more than `FRONT_ALPHA` of a pixel; none where that is wholly
 /// behind what of the place stands in front, as all that is farther away is too.
@@ -139,17 +137,13 @@ impl AovSource<'_> {
     }
 
     fn id_part(&self) -> Part {
-        let ids = ChannelSamples::Integer(self.front_ids().collect());
+        let ids = self.fronts().map(|(_, s)| s.map_or(0, |s| s.object.0));
+        let ids = ChannelSamples::Integer(ids.collect());
         plain_part("id", vec![("id".into(), ids)])
     }
 
-    /// Of the objects in front; 0 where there is none.
-    fn front_ids(&self) -> impl Iterator<Item = u32> {
-        self.fronts().map(|(_, s)| s.map_or(0, |s| s.object.0))
-    }
-
     fn layer_parts(&self) -> Vec<Part> {
-        let tinted = has_tints(self.deep);
+        let tinted = pixels_of(self.deep).any(|(x, y)| !self.deep.tints(x, y).is_empty());
         let ids = self.shot.cards.iter().map(|card| card.id);
         ids.map(|id| layer_part(self.deep, id, tinted)).collect()
     }
@@ -175,8 +169,11 @@ impl AovSource<'_> {
             .map(|(at, s)| s.map_or([f32::NAN; 3], |s| self.position_at(at, s)))
     }
 
+    /// The point of the world that a sample shows at its pixel's centre.
     fn position_at(&self, at: (usize, usize), sample: &DeepSample) -> [f32; 3] {
-        let point = self.world_point(at, sample);
+        let point = self
+            .bent_point(at, sample)
+            .map_or_else(|| self.plane_point(at, sample), |point| point.world);
         point.coords.map(|v| v as f32).into()
     }
 
@@ -200,12 +197,6 @@ impl AovSource<'_> {
             (p.x / quad.size[0] + 0.5) as f32,
             (0.5 - p.y / quad.size[1]) as f32,
         ])
-    }
-
-    /// The point of the world that a sample shows at its pixel's centre.
-    fn world_point(&self, at: (usize, usize), sample: &DeepSample) -> Point3<f64> {
-        self.bent_point(at, sample)
-            .map_or_else(|| self.plane_point(at, sample), |point| point.world)
     }
 
     /// The point of a curved card that a sample shows at its pixel's centre; none of a flat one.
@@ -266,11 +257,6 @@ impl<'a> BentCard<'a> {
             world: world_from_card * self.cylinder.point(&flat),
         })
     }
-}
-
-/// Whether there is film anywhere.
-fn has_tints(deep: &DeepImage) -> bool {
-    pixels_of(deep).any(|(x, y)| !deep.tints(x, y).is_empty())
 }
 
 /// What one object adds to the picture; with what it lets pass per channel where there is film.

@@ -62,18 +62,13 @@ fn ranked_objects(
 }
 
 fn most_visible_first(samples: &[DeepSample]) -> Vec<(ObjectId, f32)> {
-    let mut seen: Vec<_> = visible_coverage(samples).into_iter().collect();
-    // A stable sort: equally visible objects stay in the order of their ids.
-    seen.sort_by(|a, b| b.1.total_cmp(&a.1));
-    seen
-}
-
-/// What is seen of each object, by its id.
-fn visible_coverage(samples: &[DeepSample]) -> BTreeMap<ObjectId, f32> {
-    let mut seen = BTreeMap::new();
+    let mut seen = BTreeMap::<ObjectId, f32>::new();
     for s in samples.iter().filter(|s| s.visible > 0.0) {
         *seen.entry(s.object).or_default() += s.visible;
     }
+    let mut seen: Vec<_> = seen.into_iter().collect();
+    // A stable sort: equally visible objects stay in the order of their ids.
+    seen.sort_by(|a, b| b.1.total_cmp(&a.1));
     seen
 }
 
@@ -95,7 +90,6 @@ fn part_metadata<'a>(names: impl Iterator<Item = &'a String>) -> Vec<(String, St
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deep::DeepSample;
     use crate::image::Image;
     use crate::io::exr::ChannelSamples;
     use crate::pixel::{Depth, LinearRgb};

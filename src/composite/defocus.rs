@@ -14,6 +14,7 @@
 mod disc;
 
 use crate::camera::{Camera, RadialDistortion};
+use crate::composite::part::pixels_of;
 use crate::deep::{DeepImage, DeepSample};
 use crate::geom::{Plane, Point2};
 use crate::image::Image;
@@ -146,7 +147,9 @@ impl<'a> Focus<'a> {
         } else {
             Vec::new()
         };
-        let samples = pixels.into_iter().map(without_tints);
+        let samples = pixels
+            .into_iter()
+            .map(|pixel| pixel.into_iter().map(|(sample, _)| sample).collect());
         DeepImage::from_pixels(shadow, samples).with_tints(tints)
     }
 
@@ -303,20 +306,11 @@ impl Shadows {
     }
 }
 
-fn without_tints(pixel: Vec<(DeepSample, LinearRgb)>) -> Vec<DeepSample> {
-    pixel.into_iter().map(|(sample, _)| sample).collect()
-}
-
-fn places(deep: &DeepImage) -> impl Iterator<Item = [usize; 2]> {
-    let (width, height) = (deep.width(), deep.height());
-    (0..height).flat_map(move |y| (0..width).map(move |x| [x, y]))
-}
-
 /// Adds the samples of a picture, or of one with a margin around it: then those in the margin alone.
 fn add_samples(objects: &mut Objects, deep: &DeepImage, margin: usize) {
     let inside = [deep.width(), deep.height()].map(|side| margin..side - margin);
-    let is_inside = |[x, y]: [usize; 2]| inside[0].contains(&x) && inside[1].contains(&y);
-    for [x, y] in places(deep).filter(|at| margin == 0 || !is_inside(*at)) {
+    let is_inside = |x: usize, y: usize| inside[0].contains(&x) && inside[1].contains(&y);
+    for (x, y) in pixels_of(deep).filter(|&(x, y)| margin == 0 || !is_inside(x, y)) {
         let tints = deep.tints(x, y);
         for (i, sample) in deep.at(x, y).iter().enumerate() {
             let tint = tints.get(i).copied();

@@ -132,19 +132,15 @@ fn spread_colors(frame: &Image<PremulRgba>, corner_px: f64) -> Image<PremulRgba>
 
 /// Exposure and white balance.
 fn apply_gain(frame: Image<PremulRgba>, finish: &PostProcess) -> Image<PremulRgba> {
-    let gain = channel_gains(finish);
+    let brightening = libm::exp2(finish.exposure_ev) as f32;
+    let gain = finish.white_balance.scale(brightening);
+    // Finite, since an infinite gain would make NaN of black.
+    let gain = gain.map(|gain| gain.min(f32::MAX));
     if gain == LinearRgb::WHITE {
         return frame;
     }
     work::add(Kind::Filters, 1);
     frame.map(|p| with_color(p, p.color() * gain))
-}
-
-/// Finite, since an infinite gain would make NaN of black.
-fn channel_gains(finish: &PostProcess) -> LinearRgb {
-    let brightening = libm::exp2(finish.exposure_ev) as f32;
-    let gains = finish.white_balance.scale(brightening);
-    gains.map(|gain| gain.min(f32::MAX))
 }
 
 /// An unsharp mask.

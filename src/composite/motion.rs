@@ -267,7 +267,7 @@ mod tests {
     use crate::pixel::{ObjectId, PremulRgba};
     use crate::quality::Quality;
     use crate::render::render;
-    use crate::scene::{AreaLight, Blur, Card, LightShape, PostProcess};
+    use crate::scene::{AreaLight, Blur, Card, PostProcess};
     use std::sync::Arc;
 
     /// Where a shutter that opens at -1/2 and closes at 1/2 sees the card, as shares of its way.
@@ -289,14 +289,7 @@ mod tests {
             let texel = PremulRgba::new(0.7 * alpha, 0.2 * alpha, 0.1 * alpha, alpha);
             Card::new(ObjectId(id), quad, Image::filled(16, 8, texel))
         };
-        let light = AreaLight {
-            shape: LightShape::Rectangle,
-            position: [0.2, 0.4, 1.2],
-            target: [0.0; 3],
-            size: [0.1; 2],
-            power: 20.0,
-            color: LinearRgb::WHITE,
-        };
+        let light = AreaLight::new([0.2, 0.4, 1.2], [0.1; 2], 20.0);
         Shot::new(Camera::looking_down(1.0, 160.0, [80, 60]))
             .with_plate(Arc::new(plate))
             .with_light(light)

@@ -6,7 +6,7 @@ use crate::io::exr::{ChannelSamples, Part};
 /// Every pixel's column and row, in reading order.
 pub(super) fn pixels_of(deep: &DeepImage) -> impl Iterator<Item = (usize, usize)> + use<> {
     let (width, height) = (deep.width(), deep.height());
-    (0..width * height).map(move |i| (i % width, i / width))
+    (0..height).flat_map(move |y| (0..width).map(move |x| (x, y)))
 }
 
 /// A part of float channels from the pixels in reading order.

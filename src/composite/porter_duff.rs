@@ -5,25 +5,13 @@
 //!
 //! [Porter and Duff 1984]: https://doi.org/10.1145/800031.808606
 
-use crate::pixel::{Coverage, Film, Mix, PremulRgba};
+use crate::pixel::{Film, Mix, PremulRgba};
 
 impl PremulRgba {
     /// `self` in front of `behind`.
     #[inline(always)]
     pub fn over(self, behind: Self) -> Self {
         self.add_scaled(1.0 - self.a, behind)
-    }
-
-    /// `self` where `matte` is: the operator `in`.
-    #[inline(always)]
-    pub fn inside(self, matte: Self) -> Self {
-        self.masked(Coverage(matte.a))
-    }
-
-    /// `self` where `holdout` is not: the operator `out`.
-    #[inline(always)]
-    pub fn outside(self, holdout: Self) -> Self {
-        self.masked(Coverage(1.0 - holdout.a))
     }
 
     /// The sum of two pixels that share a place without hiding each other.
@@ -48,6 +36,7 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pixel::Coverage;
     use proptest::prelude::*;
 
     fn pixel() -> impl Strategy<Value = PremulRgba> {
@@ -83,13 +72,8 @@ mod tests {
         }
 
         #[test]
-        fn inside_and_outside_share_a_picture(a in pixel(), b in pixel()) {
-            prop_assert!(close(a.inside(b).plus(a.outside(b)), a));
-        }
-
-        #[test]
         fn over_is_a_plus_what_is_left_of_b(a in pixel(), b in pixel()) {
-            prop_assert!(close(a.over(b), a.plus(b.outside(a))));
+            prop_assert!(close(a.over(b), a.plus(b.masked(Coverage(1.0 - a.a)))));
         }
     }
 

@@ -72,11 +72,7 @@ pub(super) fn keep(
         .collect::<Result<_>>()?;
     let receipt = serde_json::to_vec_pretty(&Receipt { files });
     let receipt = receipt.map_err(|e| Error::value("receipt", e))?;
-    put_or_compare(store, &receipt_name(number), receipt)
-}
-
-fn receipt_name(number: u64) -> String {
-    format!("{RECEIPTS}/{number:06}.json")
+    put_or_compare(store, &format!("{RECEIPTS}/{number:06}.json"), receipt)
 }
 
 /// What is known of an archive that has arrived.

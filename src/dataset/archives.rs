@@ -6,6 +6,7 @@
 
 use crate::dataset::archive_store::{self, ArchiveStore};
 use crate::dataset::journal::{self, count_listed, lines_of};
+use crate::dataset::paths::folder_of;
 use crate::dataset::run::{Report, check_count};
 use crate::dataset::webdataset::{archive, is_whole, write_archive};
 use crate::dataset::{
@@ -13,7 +14,6 @@ use crate::dataset::{
 };
 use crate::error::{Error, Result};
 use crate::io;
-use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -88,10 +88,6 @@ fn check_range(range: SampleRange) -> Result<()> {
     }
 }
 
-fn parent(path: &Path) -> &Path {
-    path.parent().unwrap_or(path)
-}
-
 /// Which samples each archive of a dataset holds.
 struct ArchiveLayout<'a> {
     folder: &'a Path,
@@ -119,13 +115,12 @@ impl<'a> ArchiveLayout<'a> {
 
     fn of_identity(folder: &'a Path, identity: &Value) -> Result<Self> {
         let writers = identity["writers"].as_array().into_iter().flatten();
-        let archives = writers
-            .filter_map(|writer| writer.get("webdataset"))
-            .next_back();
+        let mut archives = writers.filter(|writer| writer.get("webdataset").is_some());
+        let last = archives.next_back().unwrap_or(&Value::Null);
         let layout = Self {
             folder,
-            archives: value_of("webdataset", archives)?,
-            count: value_of("count", identity.get("count"))?,
+            archives: folder::field(last, "webdataset")?,
+            count: folder::field(identity, "count")?,
             split: split_of(identity)?,
         };
         layout.archives.check()?;
@@ -188,13 +183,8 @@ fn split_of(identity: &Value) -> Result<Split> {
     let frames = &identity["recipe"]["scene"]["belt"]["frames"];
     Ok(Split {
         sequence: frames.as_u64().unwrap_or(1),
-        ..value_of("split", identity.get("split"))?
+        ..folder::field(identity, "split")?
     })
-}
-
-fn value_of<T: DeserializeOwned>(name: &str, value: Option<&Value>) -> Result<T> {
-    let value = value.cloned().unwrap_or_default();
-    serde_json::from_value(value).map_err(|e| Error::value(name, e))
 }
 
 /// What one run has done so far.
@@ -256,7 +246,7 @@ impl<'a> ArchiveRun<'a> {
             let present = archive_store::present(store)?;
             return Ok(self.numbers().filter(|n| present.contains(n)).collect());
         }
-        io::create_folder(parent(&archive(&self.plan.folder, Part::Train, 0)))?;
+        io::create_folder(folder_of(&archive(&self.plan.folder, Part::Train, 0)))?;
         let is_whole = |&number: &u64| self.layout.files(number).all(|file| file.path.exists());
         Ok(self.numbers().filter(is_whole).collect())
     }

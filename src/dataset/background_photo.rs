@@ -70,7 +70,7 @@ impl ReadPlate<'_> {
 }
 
 /// How labelled photos are opened.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct BackgroundOptions {
     /// Width and height of the pictures to be made, pixels.
     pub(crate) image: [u32; 2],
@@ -170,7 +170,7 @@ impl BackgroundPhoto {
                 size: seen.size,
                 camera: CameraSource::Known(camera),
                 k1: seen.k1,
-                shown_share: longer_side(kept) / f64::from(taken[0].max(taken[1])),
+                shown_share: kept.width.max(kept.height) as f64 / f64::from(taken[0].max(taken[1])),
                 albedo: labelled.label.surface.albedo,
                 wall: wall_of(labelled, seen.size),
             },
@@ -197,31 +197,25 @@ impl BackgroundPhoto {
 
     /// The part of the photo that pictures show.
     fn part(&self) -> f64 {
-        let kept = [self.kept.width as f64, self.kept.height as f64];
-        area(kept) / area(self.taken.map(f64::from))
+        let [w, h] = self.taken.map(f64::from);
+        self.kept.width as f64 * self.kept.height as f64 / (w * h)
     }
 
     /// That only a part of the photo fits into the pictures' shape, and what that leaves of its
     /// rectangle.
     fn shape_note(&self) -> Option<String> {
-        (self.part() != 1.0).then(|| self.describe_crop())
-    }
-
-    fn describe_crop(&self) -> String {
+        if self.part() == 1.0 {
+            return None;
+        }
         let [w, h] = self.taken;
         let Roi { width, height, .. } = self.kept;
-        format!(
-            "of {w} x {h} pixels the middle {width} x {height} are shown{}",
-            self.describe_cut()
-        )
-    }
-
-    fn describe_cut(&self) -> &'static str {
-        if self.cuts_off() {
-            ", without a part of the rectangle"
-        } else {
-            ""
-        }
+        let cut = match self.cuts_off() {
+            true => ", without a part of the rectangle",
+            false => "",
+        };
+        Some(format!(
+            "of {w} x {h} pixels the middle {width} x {height} are shown{cut}"
+        ))
     }
 
     /// A corner of the rectangle that the photo shows is not in the pictures.
@@ -243,14 +237,9 @@ impl BackgroundPhoto {
 
     /// The whole photo at the scale of the pictures, pixels.
     fn uncropped_size(&self) -> [f64; 2] {
-        let ([w, h], [across, down]) = (self.image.map(f64::from), self.taken_to_kept());
-        [w * across, h * down]
-    }
-
-    /// How many times the width and height of the kept part the photo has.
-    fn taken_to_kept(&self) -> [f64; 2] {
-        let [w, h] = self.taken.map(f64::from);
-        [w / self.kept.width as f64, h / self.kept.height as f64]
+        let ([w, h], [whole_w, whole_h]) = (self.image.map(f64::from), self.taken.map(f64::from));
+        let Roi { width, height, .. } = self.kept;
+        [w * (whole_w / width as f64), h * (whole_h / height as f64)]
     }
 
     fn surface_corners(&self) -> [Point3<f64>; 4] {
@@ -328,13 +317,9 @@ impl BackgroundPhoto {
         if [w, h] == self.taken.map(|side| side as usize) {
             return Ok(());
         }
-        Err(self.size_mismatch(path, w, h))
-    }
-
-    fn size_mismatch(&self, path: &Path, w: usize, h: usize) -> Error {
         let [label_w, label_h] = self.taken;
         let what = format!("{w} x {h} pixels, but its label says {label_w} x {label_h}");
-        Error::file(path, what)
+        Err(Error::file(path, what))
     }
 }
 
@@ -488,21 +473,9 @@ fn is_within_side(at: f64, size: f64, seen: f64) -> bool {
 fn cropped(camera: Camera, kept: Roi) -> Camera {
     Camera {
         image: [kept.width as u32, kept.height as u32],
-        principal_px: camera.principal_px - corner_of(kept),
+        principal_px: camera.principal_px - Vector2::new(kept.x as f64, kept.y as f64),
         ..camera
     }
-}
-
-fn corner_of(kept: Roi) -> Vector2<f64> {
-    Vector2::new(kept.x as f64, kept.y as f64)
-}
-
-fn longer_side(part: Roi) -> f64 {
-    part.width.max(part.height) as f64
-}
-
-fn area([w, h]: [f64; 2]) -> f64 {
-    w * h
 }
 
 #[cfg(test)]
@@ -622,41 +595,14 @@ mod tests {
     }
 
     #[test]
-    fn a_photo_of_the_picture_s_shape_is_kept_whole() {
-        assert_eq!(
-            middle_part([1280, 960], [640, 480]),
-            Roi {
-                x: 0,
-                y: 0,
-                width: 1280,
-                height: 960
-            }
-        );
-    }
-
-    #[test]
-    fn a_wider_photo_loses_its_sides() {
-        assert_eq!(
-            middle_part([1920, 960], [640, 480]),
-            Roi {
-                x: 320,
-                y: 0,
-                width: 1280,
-                height: 960
-            }
-        );
-    }
-
-    #[test]
-    fn a_portrait_photo_loses_top_and_bottom() {
-        assert_eq!(
-            middle_part([600, 1000], [640, 480]),
-            Roi {
-                x: 0,
-                y: 275,
-                width: 600,
-                height: 450
-            }
-        );
+    fn the_middle_of_a_photo_is_kept_in_the_picture_s_shape() {
+        for (photo, kept) in [
+            ([1280, 960], [0, 0, 1280, 960]),
+            ([1920, 960], [320, 0, 1280, 960]),
+            ([600, 1000], [0, 275, 600, 450]),
+        ] {
+            let part = middle_part(photo, [640, 480]);
+            assert_eq!([part.x, part.y, part.width, part.height], kept);
+        }
     }
 }

@@ -4,7 +4,7 @@ use crate::dataset::formats::is_exact;
 use crate::dataset::paths::{create_part_folders, remove_files};
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::{Error, Result};
-use crate::geom::{BBox, Point2};
+use crate::geom::BBox;
 use crate::io;
 use crate::label::{ObjectLabel, RleMask, trace};
 use serde::{Deserialize, Serialize};
@@ -175,15 +175,11 @@ impl Coco {
             .collect()
     }
 
-    fn picture_name(&self, k: u64) -> String {
-        format!("{k:06}.{}", self.pictures.extension())
-    }
-
     fn image_of(&self, entry: &Entry<'_>) -> CocoImage {
         let [width, height] = entry.sample.labels.image;
         CocoImage {
             id: entry.k,
-            file_name: self.picture_name(entry.k),
+            file_name: format!("{:06}.{}", entry.k, self.pictures.extension()),
             width,
             height,
             video_id: entry.belt().map(|belt| belt.sequence),
@@ -220,21 +216,17 @@ impl Coco {
     }
 
     fn segmentation(&self, mask: &RleMask, ignored: bool) -> Segmentation {
-        let polygons = self.polygons(mask, ignored);
-        // Readers do not take a list without polygons.
-        if polygons.is_empty() {
-            Segmentation::Runs(mask.clone())
-        } else {
-            Segmentation::Polygons(polygons.iter().map(|ring| coordinates_of(ring)).collect())
-        }
-    }
-
-    /// None of a mask that is written as runs.
-    fn polygons(&self, mask: &RleMask, ignored: bool) -> Vec<Vec<Point2<f64>>> {
-        match self.masks {
+        let polygons = match self.masks {
             CocoMask::Polygon if !ignored => trace::polygons(mask, self.simplify),
             _ => Vec::new(),
+        };
+        // Readers do not take a list without polygons.
+        if polygons.is_empty() {
+            return Segmentation::Runs(mask.clone());
         }
+        let rings = polygons.iter();
+        let rings = rings.map(|ring| ring.iter().flat_map(|p| [p.x, p.y]).collect());
+        Segmentation::Polygons(rings.collect())
     }
 }
 
@@ -250,10 +242,16 @@ fn visible_bbox(object: &ObjectLabel) -> Option<[f64; 4]> {
 }
 
 fn annotation_id(k: u64, object: u32) -> Result<u64> {
-    let id = u64::from(object);
-    unique_id(k, id)
-        .filter(|_| (1..IDS_PER_IMAGE).contains(&id))
-        .ok_or_else(|| unusable_id(object))
+    let own = u64::from(object);
+    let id = k
+        .checked_mul(IDS_PER_IMAGE)
+        .and_then(|first| first.checked_add(own));
+    id.filter(|_| (1..IDS_PER_IMAGE).contains(&own))
+        .ok_or_else(|| {
+            let most = IDS_PER_IMAGE - 1;
+            let what = format!("object {object}, expected 1 to {most} for COCO");
+            Error::value("labels.objects", what)
+        })
 }
 
 /// The number of an object in all pictures of its sequence; none without one.
@@ -261,22 +259,6 @@ fn instance_id(entry: &Entry<'_>, object: u32) -> Result<Option<u64>> {
     let belt = entry.belt();
     belt.map(|belt| annotation_id(belt.sequence, object))
         .transpose()
-}
-
-/// None where it would overflow.
-fn unique_id(k: u64, object: u64) -> Option<u64> {
-    k.checked_mul(IDS_PER_IMAGE)?.checked_add(object)
-}
-
-fn unusable_id(object: u32) -> Error {
-    let most = IDS_PER_IMAGE - 1;
-    let what = format!("object {object}, expected 1 to {most} for COCO");
-    Error::value("labels.objects", what)
-}
-
-/// x, y, x, y, ..
-fn coordinates_of(ring: &[Point2<f64>]) -> Vec<f64> {
-    ring.iter().flat_map(|p| [p.x, p.y]).collect()
 }
 
 /// Writes the document of a part, one image or annotation a line; holds one image's share at a

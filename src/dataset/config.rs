@@ -219,9 +219,14 @@ impl DatasetConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::settings::{ends, told_keys};
+    use crate::dataset::folder::field_path;
+    use crate::dataset::settings::told_keys;
     use crate::scene::{Blur, Range};
     use toml::{Table, Value};
+
+    fn parsed(text: &str, overrides: &[io::Override]) -> Result<DatasetConfig> {
+        DatasetConfig::parse(text, "recipe.toml".as_ref(), overrides)
+    }
 
     /// Whole numbers and broken ones that are equal are the same.
     fn same(a: &Value, b: &Value) -> bool {
@@ -240,13 +245,7 @@ mod tests {
 
     /// What one table says and the other does not.
     fn missing(from: &Table, all: &Table, at: &str) -> Vec<String> {
-        let key = |key: &String| {
-            if at.is_empty() {
-                key.clone()
-            } else {
-                format!("{at}.{key}")
-            }
-        };
+        let key = |key: &String| field_path(at, key);
         let of = |(name, value): (&String, &Value)| match (value, from.get(name)) {
             (Value::Table(all), Some(Value::Table(from))) => missing(from, all, &key(name)),
             (Value::Array(all), Some(Value::Array(from)))
@@ -304,7 +303,7 @@ mod tests {
         let told: Vec<_> = told_keys().collect();
         let told_value = |path: &str| {
             let key = told.iter().find(|told| told.path == path);
-            let comment = key.map_or("", |key| &key.comment);
+            let comment = key.map_or("", |key| &key.docs);
             let value = comment
                 .split_once("Preset \"real\": ")
                 .unwrap_or_default()
@@ -332,8 +331,8 @@ mod tests {
     /// Keys without a default, of which the template has an example: `path = value`.
     fn examples() -> Vec<String> {
         let mut examples: Vec<_> = told_keys()
-            .filter(|told| told.comment.contains("no default"))
-            .map(|told| format!("{} = {}", told.path, told.value))
+            .filter(|told| told.is_example)
+            .map(|told| format!("{} = {}", told.path, told.shown))
             .collect();
         examples.sort();
         examples
@@ -341,14 +340,11 @@ mod tests {
 
     #[test]
     fn an_example_in_the_template_is_taken_as_it_stands() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("recipe.toml");
         assert_eq!(examples().len(), 11);
         for example in examples() {
             // A key of a table that may be repeated.
             let example = example.replace("scene.lights[0].", "[[scene.lights]]\n");
-            io::write_text(&path, &example).unwrap();
-            let config = DatasetConfig::read(&path, &[]).unwrap();
+            let config = parsed(&example, &[]).unwrap();
             let (taken, told) = (Table::try_from(config).unwrap(), example.parse().unwrap());
             assert_eq!(missing(&taken, &told, ""), [""; 0]);
         }
@@ -357,28 +353,21 @@ mod tests {
     /// What the template says a key may be: its path, and the ends of "A to B" in its comment.
     fn told_bounds() -> Vec<(String, [f64; 2])> {
         told_keys()
-            .filter_map(|told| Some((told.path, ends(&told.comment)?)))
+            .filter_map(|told| Some((told.path, told.ends?)))
             .collect()
     }
 
     #[test]
     fn the_template_tells_the_bounds_that_are_checked() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("recipe.toml");
         let template = DatasetConfig::template().replace("#[[scene.lights]]", "[[scene.lights]]");
-        io::write_text(&path, &template).unwrap();
-        let with = |key: &str, value: f64| {
-            DatasetConfig::read(&path, &[format!("{key}={value}").parse().unwrap()])
-        };
+        let with =
+            |key: &str, value: f64| parsed(&template, &[format!("{key}={value}").parse().unwrap()]);
         let told = told_bounds();
         assert!(told.len() > 35, "{told:?}");
         for (key, [low, high]) in told {
             for end in [low, high] {
-                assert!(
-                    with(&key, end).is_ok(),
-                    "{key} = {end}: {:?}",
-                    with(&key, end)
-                );
+                let taken = with(&key, end);
+                assert!(taken.is_ok(), "{key} = {end}: {taken:?}");
             }
             let beyond = [
                 low - low.abs().clamp(1e-9, 1.0),
@@ -449,14 +438,10 @@ mod tests {
 
     #[test]
     fn a_wrong_key_is_answered_with_the_right_one() {
-        let dir = tempfile::tempdir().unwrap();
-        io::write_text(dir.path().join("recipe.toml"), "[scene]\nobject = 3\n").unwrap();
-        let told = DatasetConfig::read(dir.path().join("recipe.toml"), &[])
+        let told = parsed("[scene]\nobject = 3\n", &[])
             .unwrap_err()
             .to_string();
-        assert!(
-            told.ends_with("scene: unknown key \"object\", did you mean \"objects\"? (line 2)"),
-            "{told}"
-        );
+        let expected = "scene: unknown key \"object\", did you mean \"objects\"? (line 2)";
+        assert!(told.ends_with(expected), "{told}");
     }
 }

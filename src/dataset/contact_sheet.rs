@@ -5,7 +5,7 @@ use crate::dataset::folder;
 use crate::dataset::journal::lines_of;
 use crate::dataset::journal_line::JournalLine;
 use crate::dataset::{Labelling, SampleRecord};
-use crate::draw::{self, TextSize};
+use crate::draw;
 use crate::error::Result;
 use crate::filter::resize;
 use crate::image::Image;
@@ -29,60 +29,24 @@ const GAP_PX: usize = 16;
 /// Pixels between a picture and its caption.
 const CAPTION_GAP_PX: usize = 4;
 
-/// How a sheet is laid out.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ContactSheetOptions {
-    /// A line at the top. Default: none.
-    pub title: String,
-    /// Widest a picture may be, pixels; larger ones are made smaller. Default: 320.
-    pub picture_width: usize,
-    /// Pictures beside each other; 0 lets the sheet become about 3:2. Default: 0.
-    pub columns: usize,
-}
-
-impl Default for ContactSheetOptions {
-    fn default() -> Self {
-        Self {
-            title: String::new(),
-            picture_width: 320,
-            columns: 0,
-        }
-    }
-}
+/// Widest a picture may be, pixels; larger ones are made smaller.
+const PICTURE_WIDTH_PX: usize = 320;
 
 /// A picture of a sheet.
-#[derive(Clone, Debug)]
-pub struct ContactTile {
-    /// The picture, of any size.
-    pub picture: Image<LinearRgb>,
+struct ContactTile {
+    picture: Image<LinearRgb>,
     /// What is where in it, in pixels of the size that the labels name.
-    pub labels: Labels,
+    labels: Labels,
     /// Objects that are drawn with a box; the others get a thin grey outline.
-    pub labelled: Vec<ObjectId>,
+    labelled: Vec<ObjectId>,
     /// A line below the picture.
-    pub caption: String,
+    caption: String,
 }
 
 impl ContactTile {
-    /// A tile no wider than `width`, made smaller in linear light.
-    pub fn new(
-        picture: &Image<LinearRgb>,
-        labels: Labels,
-        labelled: Vec<ObjectId>,
-        caption: String,
-        width: usize,
-    ) -> Self {
-        Self {
-            picture: shrunk(picture, width),
-            labels,
-            labelled,
-            caption,
-        }
-    }
-
     /// Width of the wider of picture and caption.
     fn width(&self) -> usize {
-        let caption = TextSize::Small.width(&self.caption);
+        let caption = draw::text_width(&self.caption);
         self.picture.width().max(caption)
     }
 
@@ -96,7 +60,7 @@ impl ContactTile {
 }
 
 /// The picture no wider than `width`.
-fn shrunk(picture: &Image<LinearRgb>, width: usize) -> Image<LinearRgb> {
+pub(super) fn shrunk(picture: &Image<LinearRgb>, width: usize) -> Image<LinearRgb> {
     let (w, h) = picture.size();
     let width = width.clamp(1, w.max(1));
     if width >= w {
@@ -105,31 +69,15 @@ fn shrunk(picture: &Image<LinearRgb>, width: usize) -> Image<LinearRgb> {
     resize(picture, width, (h * width).div_ceil(w.max(1)).max(1))
 }
 
-/// Lays out pictures in rows, each with its boxes and a caption, under a title and a legend of the
-/// classes.
-pub fn contact_sheet(
-    tiles: &[ContactTile],
-    classes: &[String],
-    options: &ContactSheetOptions,
-) -> Image<Srgb8> {
-    let layout = SheetLayout::new(tiles, classes, options);
+/// Lays out pictures in rows, each with its boxes and a caption, under a legend of the classes.
+fn contact_sheet(tiles: &[ContactTile], classes: &[String]) -> Image<Srgb8> {
+    let layout = SheetLayout::new(tiles, classes);
     let mut sheet = Image::filled(layout.width, layout.height, PAPER);
-    let title_at = [MARGIN_PX as isize; 2];
-    draw::text(&mut sheet, title_at, &options.title, INK, TextSize::Large);
-    let legend_top = MARGIN_PX + title_height(&options.title);
-    draw_legend(&mut sheet, legend_top as isize, &layout.legend);
+    draw_legend(&mut sheet, &layout.legend);
     for (i, tile) in tiles.iter().enumerate() {
         layout.draw_tile(&mut sheet, i, tile);
     }
     sheet
-}
-
-/// Height of the title with the room below it.
-fn title_height(title: &str) -> usize {
-    match title {
-        "" => 0,
-        _ => TextSize::Large.height() + GAP_PX / 2,
-    }
 }
 
 /// The contact sheet of a dataset on disk: at most `most` of its pictures, evenly spread.
@@ -138,11 +86,7 @@ fn title_height(title: &str) -> usize {
 /// When the folder is no dataset or one of archives alone, or was written without the
 /// [`Pictures`](crate::dataset::Pictures) or the [`Sidecar`](crate::dataset::Sidecar) that the sheet
 /// is made from.
-pub fn contact_sheet_of(
-    folder: &Path,
-    most: usize,
-    options: &ContactSheetOptions,
-) -> Result<Image<Srgb8>> {
+pub fn contact_sheet_of(folder: &Path, most: usize) -> Result<Image<Srgb8>> {
     let identity = folder::identity_of_files(folder)?;
     let classes = folder::known_classes(&identity);
     let labelling = Labelling::of_identity(&identity);
@@ -150,26 +94,21 @@ pub fn contact_sheet_of(
     let shown = most.min(lines.len());
     let tiles: Vec<ContactTile> = (0..shown)
         .into_par_iter()
-        .map(|i| {
-            let line = &lines[i * lines.len() / shown];
-            read_tile(folder, line, labelling, options.picture_width)
-        })
+        .map(|i| read_tile(folder, &lines[i * lines.len() / shown], labelling))
         .collect::<Result<_>>()?;
-    Ok(contact_sheet(&tiles, &classes, options))
+    Ok(contact_sheet(&tiles, &classes))
 }
 
-fn read_tile(
-    folder: &Path,
-    line: &JournalLine,
-    labelling: Labelling,
-    width: usize,
-) -> Result<ContactTile> {
+fn read_tile(folder: &Path, line: &JournalLine, labelling: Labelling) -> Result<ContactTile> {
     let picture = io::read::<LinearRgb>(line.file(folder, "images/")?)?;
     let record: SampleRecord = io::read_json(line.file(folder, "scenes/")?)?;
     let record = record.into_labelled(labelling);
-    let caption = tile_caption(line, &record);
-    let (labels, labelled) = (record.labels, record.labelled);
-    Ok(ContactTile::new(&picture, labels, labelled, caption, width))
+    Ok(ContactTile {
+        picture: shrunk(&picture, PICTURE_WIDTH_PX),
+        caption: tile_caption(line, &record),
+        labels: record.labels,
+        labelled: record.labelled,
+    })
 }
 
 fn tile_caption(line: &JournalLine, record: &SampleRecord) -> String {
@@ -191,17 +130,16 @@ struct SheetLayout {
 }
 
 impl SheetLayout {
-    fn new(tiles: &[ContactTile], classes: &[String], options: &ContactSheetOptions) -> Self {
+    fn new(tiles: &[ContactTile], classes: &[String]) -> Self {
         let cell = cell_size(tiles);
-        let columns = options.columns_for(tiles.len(), cell);
+        let columns = pleasing_columns(tiles.len(), cell);
         let row = (columns * (cell[0] + GAP_PX)).saturating_sub(GAP_PX);
-        let content = row.max(TextSize::Large.width(&options.title));
-        let legend = legend_entries(classes, tiles, content);
+        let legend = legend_entries(classes, tiles, row);
         let [legend_width, legend_height] = legend_size(&legend);
-        let top = MARGIN_PX + title_height(&options.title) + legend_height + GAP_PX;
+        let top = MARGIN_PX + legend_height + GAP_PX;
         let rows = tiles.len().div_ceil(columns);
         Self {
-            width: content.max(legend_width) + 2 * MARGIN_PX,
+            width: row.max(legend_width) + 2 * MARGIN_PX,
             height: top + rows * (cell[1] + GAP_PX) + MARGIN_PX - GAP_PX,
             columns,
             cell,
@@ -214,32 +152,26 @@ impl SheetLayout {
     fn draw_tile(&self, sheet: &mut Image<Srgb8>, i: usize, tile: &ContactTile) {
         let [x, y] = self.place(i);
         draw::paste(sheet, [x, y], &tile.drawn());
-        let below = y + self.cell[1] - TextSize::Small.height();
+        let below = y + self.cell[1] - draw::LINE_PX;
         let at = [x as isize, below as isize];
-        draw::text(sheet, at, &tile.caption, PALE_INK, TextSize::Small);
+        draw::text(sheet, at, &tile.caption, PALE_INK);
     }
 
     /// Top left corner of a picture.
     fn place(&self, i: usize) -> [usize; 2] {
         let [column, row] = [i % self.columns, i / self.columns];
-        let [across, down] = self.cell_pitch();
+        let [across, down] = self.cell.map(|side| side + GAP_PX);
         [MARGIN_PX + column * across, self.top + row * down]
-    }
-
-    /// From a cell to the next one beside and below it.
-    fn cell_pitch(&self) -> [usize; 2] {
-        self.cell.map(|side| side + GAP_PX)
     }
 }
 
 /// Size of the largest picture with its caption.
 fn cell_size(tiles: &[ContactTile]) -> [usize; 2] {
-    let text = TextSize::Small;
     let widths = tiles.iter().map(ContactTile::width);
     let heights = tiles.iter().map(|tile| tile.picture.height());
     [
         widths.max().unwrap_or(0),
-        heights.max().unwrap_or(0) + CAPTION_GAP_PX + text.height(),
+        heights.max().unwrap_or(0) + CAPTION_GAP_PX + draw::LINE_PX,
     ]
 }
 
@@ -290,7 +222,7 @@ impl LegendEntry {
     }
 
     fn width(&self) -> usize {
-        MARK_PX + 8 + TextSize::Small.width(&self.text)
+        MARK_PX + 8 + draw::text_width(&self.text)
     }
 
     /// Where it ends, pixels from the margin.
@@ -302,10 +234,16 @@ impl LegendEntry {
 /// The legend's entries, in as many lines as they need within a width.
 fn legend_entries(classes: &[String], tiles: &[ContactTile], width: usize) -> Vec<LegendEntry> {
     let (labelled, unlabelled) = count_objects(classes.len(), tiles);
-    let mut entries = class_entries(classes, &labelled);
+    let named = classes.iter().zip(labelled);
+    let texts = named.map(|(name, count)| format!("{name} ({count})"));
+    let own = (0..).map(draw::class_color).zip(texts);
     let why = why_unlabelled(tiles);
-    entries.push((UNLABELLED, format!("no label, {why} ({unlabelled})")));
-    place_entries(entries, width)
+    let none = (UNLABELLED, format!("no label, {why} ({unlabelled})"));
+    let mut placed = Vec::new();
+    for (color, text) in own.chain([none]) {
+        placed.push(LegendEntry::after(placed.last(), color, text, width));
+    }
+    placed
 }
 
 /// Truncation takes a label only where it was measured.
@@ -318,20 +256,11 @@ fn why_unlabelled(tiles: &[ContactTile]) -> &'static str {
     }
 }
 
-fn class_entries(classes: &[String], counts: &[usize]) -> Vec<(Srgb8, String)> {
-    let named = classes.iter().zip(counts);
-    let texts = named.map(|(name, count)| format!("{name} ({count})"));
-    (0..).map(draw::class_color).zip(texts).collect()
-}
-
 /// Width and height of the legend, pixels.
 fn legend_size(entries: &[LegendEntry]) -> [usize; 2] {
     let width = entries.iter().map(LegendEntry::end).max();
-    [width.unwrap_or(0), line_count(entries) * LEGEND_LINE_PX]
-}
-
-fn line_count(entries: &[LegendEntry]) -> usize {
-    entries.last().map_or(0, |entry| entry.line + 1)
+    let lines = entries.last().map_or(0, |entry| entry.line + 1);
+    [width.unwrap_or(0), lines * LEGEND_LINE_PX]
 }
 
 /// Objects with a label for each class, and objects without one.
@@ -349,37 +278,19 @@ fn count_objects(class_count: usize, tiles: &[ContactTile]) -> (Vec<usize>, usiz
     (labelled, unlabelled)
 }
 
-/// Places entries beside each other, and in the next line where the width ends.
-fn place_entries(entries: Vec<(Srgb8, String)>, width: usize) -> Vec<LegendEntry> {
-    let mut placed = Vec::new();
-    for (color, text) in entries {
-        placed.push(LegendEntry::after(placed.last(), color, text, width));
-    }
-    placed
-}
-
-fn draw_legend(sheet: &mut Image<Srgb8>, top: isize, entries: &[LegendEntry]) {
+fn draw_legend(sheet: &mut Image<Srgb8>, entries: &[LegendEntry]) {
     for entry in entries {
         let x = (MARGIN_PX + entry.x) as isize;
-        let y = top + (entry.line * LEGEND_LINE_PX) as isize;
+        let y = (MARGIN_PX + entry.line * LEGEND_LINE_PX) as isize;
         draw_mark(sheet, [x, y], entry.color);
         let text = [x + MARK_PX as isize + 8, y];
-        draw::text(sheet, text, &entry.text, INK, TextSize::Small);
+        draw::text(sheet, text, &entry.text, INK);
     }
 }
 
 fn draw_mark(sheet: &mut Image<Srgb8>, [x, y]: [isize; 2], color: Srgb8) {
-    let mark = [x, y + ((TextSize::Small.height() - MARK_PX) / 2) as isize];
+    let mark = [x, y + ((draw::LINE_PX - MARK_PX) / 2) as isize];
     draw::fill(sheet, mark, [MARK_PX, MARK_PX], color);
-}
-
-impl ContactSheetOptions {
-    fn columns_for(&self, count: usize, cell: [usize; 2]) -> usize {
-        match self.columns {
-            0 => pleasing_columns(count, cell),
-            columns => columns.min(count.max(1)),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -396,24 +307,15 @@ mod tests {
 
     #[test]
     fn a_sheet_without_pictures_still_has_its_legend() {
-        let sheet = contact_sheet(&[], &["cap".into()], &ContactSheetOptions::default());
+        let sheet = contact_sheet(&[], &["cap".into()]);
         assert!(sheet.pixels().contains(&draw::class_color(0)));
     }
 
     #[test]
     fn a_small_picture_is_not_made_larger() {
         let picture = Image::filled(40, 30, LinearRgb::WHITE);
-        let tile = |width| {
-            ContactTile::new(
-                &picture,
-                Labels::default(),
-                Vec::new(),
-                String::new(),
-                width,
-            )
-            .picture
-        };
-        assert_eq!((tile(320).size(), tile(20).size()), ((40, 30), (20, 15)));
+        let size = |width| shrunk(&picture, width).size();
+        assert_eq!((size(320), size(20)), ((40, 30), (20, 15)));
     }
 
     #[test]

@@ -96,9 +96,21 @@ impl AddAssign for DatasetCounts {
 
 impl ClassCount {
     fn for_classes(names: &[String], lines: &[JournalLine]) -> Vec<Self> {
-        let counts = (0..).map(|class| count_class(lines, class));
-        let classes = names.iter().cloned().zip(counts);
-        classes.map(Self::from).collect()
+        let names = names.iter().enumerate();
+        names
+            .map(|(class, name)| Self::new(name, class, lines))
+            .collect()
+    }
+
+    /// Of the class with this name and number.
+    fn new(name: &str, class: usize, lines: &[JournalLine]) -> Self {
+        let counts = lines.iter().filter_map(|line| line.classes.get(class));
+        let [objects, labelled] = sum_by_part(counts.map(|counts| counts.map(u64::from)));
+        Self {
+            name: name.to_owned(),
+            objects,
+            labelled,
+        }
     }
 }
 
@@ -116,23 +128,7 @@ fn sum_of(lines: &[JournalLine], count: fn(&JournalLine) -> u32) -> u64 {
     lines.iter().map(|line| u64::from(count(line))).sum()
 }
 
-/// Objects of a class, and how many of them have a label.
-fn count_class(lines: &[JournalLine], class: usize) -> [u64; 2] {
-    let counts = lines.iter().filter_map(|line| line.classes.get(class));
-    sum_by_part(counts.map(|counts| counts.map(u64::from)))
-}
-
 /// The sums of counts by part.
 pub(super) fn sum_by_part(counts: impl Iterator<Item = [u64; 2]>) -> [u64; 2] {
     counts.fold([0; 2], |sums, counts| [0, 1].map(|i| sums[i] + counts[i]))
-}
-
-impl From<(String, [u64; 2])> for ClassCount {
-    fn from((name, [objects, labelled]): (String, [u64; 2])) -> Self {
-        Self {
-            name,
-            objects,
-            labelled,
-        }
-    }
 }

@@ -50,20 +50,13 @@ impl RunPace {
         let (began, before) = self.since;
         let elapsed = now.saturating_duration_since(began);
         let made = self.last.made.saturating_sub(before);
-        let run = LongRun::of(self.left(), made, elapsed, self.threads);
-        (elapsed >= self.min_elapsed() && run.seconds > LONG_RUN.as_secs_f64()).then_some(run)
-    }
-
-    fn left(&self) -> u64 {
-        self.last.count.saturating_sub(self.last.done)
-    }
-
-    fn min_elapsed(&self) -> Duration {
-        if self.is_warm {
-            MIN_ELAPSED
-        } else {
-            MIN_FIRST_ELAPSED
-        }
+        let left = self.last.count.saturating_sub(self.last.done);
+        let run = LongRun::of(left, made, elapsed, self.threads);
+        let min_elapsed = match self.is_warm {
+            true => MIN_ELAPSED,
+            false => MIN_FIRST_ELAPSED,
+        };
+        (elapsed >= min_elapsed && run.seconds > LONG_RUN.as_secs_f64()).then_some(run)
     }
 }
 

@@ -79,17 +79,13 @@ impl EvalTruth {
             return Err(Error::file(path, what));
         }
         let images = by_name(images);
-        if !images
-            .iter()
-            .any(|image| YoloSet::label_of(image).is_file())
-        {
+        let mut labels = images.iter().map(|image| YoloSet::label_of(image));
+        if !labels.any(|label| label.is_file()) {
             let what = "no label files of its images, expected NAME.txt in labels";
             return Err(Error::file(path, what));
         }
-        Ok(Self::of_yolo(
-            read_pose_truth_of(&images, keypoints)?,
-            place,
-        ))
+        let truth = read_pose_truth_of(&images, keypoints)?;
+        Ok(Self::of_yolo(truth, place))
     }
 
     fn of_yolo(truth: YoloTruth, place: PathBuf) -> Self {

@@ -27,11 +27,6 @@ impl Falls {
         Self { most, known }
     }
 
-    /// Whether it keeps any.
-    pub(crate) fn remembers(&self) -> bool {
-        self.most > 0
-    }
-
     /// The scene with its objects at rest, by `fall` where that is not known. What falls in several
     /// threads at once falls in one of them, and the others wait.
     pub(crate) fn settled(
@@ -40,7 +35,7 @@ impl Falls {
         options: &SettleOptions,
         fall: impl FnOnce(Scene) -> Result<Scene>,
     ) -> Result<Scene> {
-        if !self.remembers() {
+        if self.most == 0 {
             return fall(scene);
         }
         let known = self.fall_of(what_falls(&scene, options));

@@ -54,21 +54,14 @@ impl Finding {
     }
 }
 
-impl Finding {
-    fn fmt_place(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:", self.path.display())?;
-        match self.line {
-            Some(line) => write!(f, "{line}:"),
-            None => Ok(()),
-        }
-    }
-}
-
 /// As compilers print it: `labels/train/000001.txt:2: 4 columns, expected 5
 /// [dataset.bad_label_row]`.
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.fmt_place(f)?;
+        write!(f, "{}:", self.path.display())?;
+        if let Some(line) = self.line {
+            write!(f, "{line}:")?;
+        }
         write!(f, " {} [{}]", self.diagnostic, self.diagnostic.code)
     }
 }

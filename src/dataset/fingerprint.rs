@@ -101,12 +101,11 @@ fn front_files(places: &[BackgroundPhoto]) -> Vec<(String, &Path)> {
 
 /// The photos of backgrounds, by the names of their inputs.
 fn photo_files(places: &[BackgroundPhoto]) -> Vec<(String, &Path)> {
-    let names = places.iter().map(|place| &place.background.name);
-    let photos = places.iter().map(|place| &*place.photo);
-    names
-        .map(|name| format!("background {name}"))
-        .zip(photos)
-        .collect()
+    let photos = places.iter().map(|place| {
+        let name = format!("background {}", place.background.name);
+        (name, &*place.photo)
+    });
+    photos.collect()
 }
 
 fn of_place(place: &BackgroundPhoto, photo: u32, front: Option<u32>) -> Value {

@@ -4,6 +4,7 @@ use crate::dataset::times::RUNS;
 use crate::dataset::{Plan, SampleRange, Shard, SplitOrder, Writer};
 use crate::error::{Error, Result};
 use crate::io;
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
@@ -123,15 +124,10 @@ pub(crate) fn reclaim(folder: &Path) -> Result<FolderClaim> {
 
 /// What a dataset that was begun before is made from.
 pub(crate) fn begun(folder: &Path) -> Result<Value> {
-    let before = identity(folder)?.ok_or_else(|| not_begun(folder))?;
+    let before = known_identity(folder, "a dataset that was begun before")?;
     io::refuse_links(folder)?;
     of_this_format(&before, folder)?;
     Ok(before)
-}
-
-fn not_begun(folder: &Path) -> Error {
-    let what = format!("no {IDENTITY}, expected a dataset that was begun before");
-    Error::file(folder, what)
 }
 
 /// The folder was begun before every input was recorded and lines had checksums.
@@ -146,23 +142,16 @@ fn format_of(identity: &Value) -> u64 {
 /// Refuses what another petcomp recorded otherwise: nobody could tell whether its inputs are still
 /// the same.
 pub(crate) fn of_this_format(identity: &Value, folder: &Path) -> Result<()> {
-    let Some((what, others)) = other_petcomp(identity) else {
-        return Ok(());
+    let (what, others) = match format_of(identity) {
+        FORMAT_VERSION => return Ok(()),
+        ..FORMAT_VERSION => (
+            "was begun by an older petcomp, which did not record every input",
+            "older",
+        ),
+        _ => ("was begun by a newer petcomp", "newer"),
     };
     let what = format!("{what}: finish it with the {others} one, or begin a new folder");
     Err(Error::file(identity_file(folder), what))
-}
-
-/// Which petcomp began a dataset, where its format is not this one's.
-fn other_petcomp(identity: &Value) -> Option<(&'static str, &'static str)> {
-    match format_of(identity) {
-        FORMAT_VERSION => None,
-        ..FORMAT_VERSION => Some((
-            "was begun by an older petcomp, which did not record every input",
-            "older",
-        )),
-        _ => Some(("was begun by a newer petcomp", "newer")),
-    }
 }
 
 /// What a folder was made from; none where it is no dataset yet.
@@ -173,13 +162,18 @@ pub(crate) fn identity(folder: &Path) -> Result<Option<Value>> {
     }
 }
 
-/// What a dataset was made from.
+/// What a dataset, or whatever is expected, was made from.
 ///
 /// # Errors
-/// A folder that is no dataset.
-pub(crate) fn known_identity(folder: &Path) -> Result<Value> {
+/// A folder that is none.
+pub(crate) fn known_identity(folder: &Path, expected: &str) -> Result<Value> {
     let identity = identity(folder)?;
-    identity.ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset")))
+    identity.ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected {expected}")))
+}
+
+/// A field of what a dataset was made from.
+pub(super) fn field<T: DeserializeOwned>(document: &Value, name: &str) -> Result<T> {
+    serde_json::from_value(document[name].clone()).map_err(|e| Error::value(name, e))
 }
 
 /// What a dataset whose samples have files of their own was made from.
@@ -187,7 +181,7 @@ pub(crate) fn known_identity(folder: &Path) -> Result<Value> {
 /// # Errors
 /// As [`known_identity`]; a dataset of archives alone.
 pub(crate) fn identity_of_files(folder: &Path) -> Result<Value> {
-    let identity = known_identity(folder)?;
+    let identity = known_identity(folder, "a dataset")?;
     let has_files = [JOURNAL, "images"]
         .iter()
         .any(|name| folder.join(name).exists());
@@ -205,19 +199,16 @@ fn has_archives(identity: &Value) -> bool {
 
 /// The names of the classes that an identity records.
 pub(crate) fn known_classes(identity: &Value) -> Vec<String> {
-    serde_json::from_value(identity["classes"].clone()).unwrap_or_default()
+    field(identity, "classes").unwrap_or_default()
 }
 
 fn holds_something(folder: &Path) -> Result<bool> {
     if !folder.exists() {
         return Ok(false);
     }
-    let mut entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    Ok(entries.any(|entry| entry.is_ok_and(|entry| !is_hidden(&entry.file_name()))))
-}
-
-fn is_hidden(name: &OsStr) -> bool {
-    name.to_string_lossy().starts_with('.')
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let mut names = entries.flatten().map(|entry| entry.file_name());
+    Ok(names.any(|name| !name.to_string_lossy().starts_with('.')))
 }
 
 fn lock(folder: &Path) -> Result<File> {
@@ -317,10 +308,7 @@ fn same_entries(a: &[Value], b: &[Value], at: &str) -> FieldComparison {
             _ => same(before, now, &format!("{at}[{i}]"))?,
         }
     }
-    same_length(a.len(), b.len(), at)
-}
-
-fn same_length(before: usize, now: usize, at: &str) -> FieldComparison {
+    let (before, now) = (a.len(), b.len());
     if before == now {
         return Ok(());
     }
@@ -362,7 +350,7 @@ fn same_keys(a: &Map<String, Value>, b: &Map<String, Value>, at: &str) -> FieldC
     Ok(())
 }
 
-fn field_path(at: &str, key: &str) -> String {
+pub(super) fn field_path(at: &str, key: &str) -> String {
     match at {
         "" => key.to_owned(),
         _ => format!("{at}.{key}"),
@@ -378,30 +366,31 @@ mod tests {
         let asset = |name: &str, mass: f64| json!({ "mass": mass, "name": name });
         let before = json!({ "assets": [asset("b0", 0.1), asset("b1", 0.2)] });
         let differs = |now: Value| same(&before, &json!({ "assets": now }), "").unwrap_err();
-        let (at, what) = differs(json!([asset("b0", 0.1), asset("b1", 0.3)]));
-        assert_eq!(
-            (at.as_str(), what.as_str()),
+        for (now, expected) in [
             (
-                "assets[b1].mass",
-                "the dataset was begun with 0.2, this run has 0.3"
-            )
-        );
-        let (at, what) = differs(json!([asset("b0", 0.1), asset("a", 0.4)]));
-        assert_eq!(
-            (at.as_str(), what.as_str()),
+                json!([asset("b0", 0.1), asset("b1", 0.3)]),
+                [
+                    "assets[b1].mass",
+                    "the dataset was begun with 0.2, this run has 0.3",
+                ],
+            ),
             (
-                "assets[1]",
-                "the dataset was begun with \"b1\", this run has \"a\""
-            )
-        );
-        let (at, what) = differs(json!([asset("b0", 0.1)]));
-        assert_eq!(
-            (at.as_str(), what.as_str()),
+                json!([asset("b0", 0.1), asset("a", 0.4)]),
+                [
+                    "assets[1]",
+                    "the dataset was begun with \"b1\", this run has \"a\"",
+                ],
+            ),
             (
-                "assets",
-                "the dataset was begun with 2 entries, this run has 1"
-            )
-        );
+                json!([asset("b0", 0.1)]),
+                [
+                    "assets",
+                    "the dataset was begun with 2 entries, this run has 1",
+                ],
+            ),
+        ] {
+            assert_eq!(<[String; 2]>::from(differs(now)), expected);
+        }
         let (_, what) = differs(json!("x".repeat(500)));
         assert!(what.len() < 260 && what.ends_with(".."), "{what}");
     }

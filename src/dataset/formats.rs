@@ -2,14 +2,10 @@
 
 use crate::bounds::Bounds;
 use crate::dataset::label_table::LabelTable;
-use crate::dataset::{
-    Coco, Layers, Mot, Obstructed, PictureFormat, Pictures, Voc, WebDataset, Writer, Yolo,
-};
+use crate::dataset::{Coco, Layers, Mot, Obstructed, Pictures, Voc, WebDataset, Writer, Yolo};
 use crate::error::{Error, Result};
 use crate::geom::BBox;
-use crate::label::{
-    AmodalBox, LabelOptions, ObjectLabel, ObstructionRule, OutlineKind, RleMask,
-};
+use crate::label::{AmodalBox, LabelOptions, ObjectLabel, ObstructionRule, OutlineKind, RleMask};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -188,8 +184,15 @@ impl LabelConfig {
 
     fn writer(&self, format: Format, pictures: &Pictures) -> Arc<dyn Writer> {
         match format {
-            Format::Yolo => Arc::new(self.yolo_writer()),
-            Format::Coco => Arc::new(self.coco_writer(pictures.format)),
+            Format::Yolo => Arc::new(Yolo {
+                simplify: self.simplify,
+                ..self.yolo
+            }),
+            Format::Coco => Arc::new(Coco {
+                pictures: pictures.format,
+                simplify: self.simplify,
+                ..self.coco
+            }),
             Format::Voc => Arc::new(Voc {
                 pictures: pictures.format,
                 ..self.voc
@@ -203,21 +206,6 @@ impl LabelConfig {
                 ..self.layers
             }),
             Format::WebDataset => Arc::new(self.webdataset),
-        }
-    }
-
-    fn yolo_writer(&self) -> Yolo {
-        Yolo {
-            simplify: self.simplify,
-            ..self.yolo
-        }
-    }
-
-    fn coco_writer(&self, pictures: PictureFormat) -> Coco {
-        Coco {
-            pictures,
-            simplify: self.simplify,
-            ..self.coco
         }
     }
 }

@@ -203,13 +203,9 @@ fn check_object_classes(sample: &Sample, count: usize) -> Result<()> {
     for (i, object) in sample.labels.objects.iter().enumerate() {
         let class = object.class;
         if class as usize >= count {
-            return Err(unknown_class(i, class, count));
+            let what = format!("{class}, but there are {count} classes");
+            return Err(Error::value(format!("labels.objects[{i}].class"), what));
         }
     }
     Ok(())
-}
-
-fn unknown_class(object: usize, class: u32, count: usize) -> Error {
-    let what = format!("{class}, but there are {count} classes");
-    Error::value(format!("labels.objects[{object}].class"), what)
 }

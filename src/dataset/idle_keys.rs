@@ -12,18 +12,13 @@ impl Pipeline {
     /// What the recipe says that changes nothing in the dataset, and why.
     #[doc(hidden)]
     pub fn idle_keys(&self) -> Vec<String> {
-        let mut idle = idle_labels(&self.config().labels);
-        idle.extend(self.idle_light_direction());
-        idle.extend(idle_partners(&self.config().scene));
-        idle
-    }
-
-    /// Why the recipe's `scene.light_direction` leaves light where it is drawn, and in which places;
-    /// none where it does not.
-    fn idle_light_direction(&self) -> Option<String> {
         let recipe = &self.config().scene;
         let places = recipe.narrowed().viewpoints.slice_of(self.places());
-        idle_light_direction(recipe, places.iter().map(|place| &place.background))
+        let backgrounds = places.iter().map(|place| &place.background);
+        let mut idle = idle_labels(&self.config().labels);
+        idle.extend(idle_light_direction(recipe, backgrounds));
+        idle.extend(idle_partners(recipe));
+        idle
     }
 }
 
@@ -118,6 +113,8 @@ fn idle_surroundings(environment: &EnvironmentRanges) -> Vec<String> {
     .collect()
 }
 
+/// Why the recipe's `scene.light_direction` leaves light where it is drawn, and in which places;
+/// none where it does not.
 fn idle_light_direction<'a>(
     recipe: &Recipe,
     backgrounds: impl Iterator<Item = &'a Background>,
@@ -164,6 +161,7 @@ fn some_of(names: &[&str]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::tilted_camera;
     use crate::scene::{CameraSource, LightDirectionSource, WallRanges};
 
     fn place(name: &str, wall: Option<f64>) -> Background {
@@ -177,11 +175,7 @@ mod tests {
                 height,
                 slope_deg: 0.0,
             }),
-            camera: CameraSource::Rectangle {
-                corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
-                photo: [60, 40],
-                focal_px: Some(55.0),
-            },
+            camera: CameraSource::Known(tilted_camera()),
         }
     }
 

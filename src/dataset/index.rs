@@ -2,6 +2,7 @@
 //! somebody asks.
 
 pub use crate::dataset::page::labelled_pictures::ShareBox;
+pub use crate::dataset::page::outlier::Outlier;
 
 use crate::dataset::folder;
 use crate::dataset::journal::lines_of;
@@ -87,15 +88,6 @@ pub struct ObjectFacts {
     pub bbox: [f32; 4],
 }
 
-/// A picture that is unlike the others.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct UnlikePicture {
-    /// Its place in the index.
-    pub row: usize,
-    /// By what: `objects 17, as a rule 8`.
-    pub why: String,
-}
-
 impl DatasetIndex {
     /// Lists a dataset of petcomp's, a YOLO dataset, or a folder of images.
     ///
@@ -107,10 +99,8 @@ impl DatasetIndex {
         }
         let (classes, images) = listed_images(folder)?;
         if images.is_empty() {
-            return Err(Error::file(
-                folder,
-                "no images, expected a dataset or a folder of images",
-            ));
+            let what = "no images, expected a dataset or a folder of images";
+            return Err(Error::file(folder, what));
         }
         Ok(Self {
             folder: folder.into(),
@@ -121,7 +111,7 @@ impl DatasetIndex {
     }
 
     fn of_journal(folder: &Path) -> Result<Self> {
-        let identity = folder::known_identity(folder)?;
+        let identity = folder::known_identity(folder, "a dataset")?;
         let lines = lines_of(folder)?;
         let pictures = lines.into_iter().map(IndexedPicture::from_line);
         Ok(Self {
@@ -187,17 +177,8 @@ impl DatasetIndex {
 
     /// The pictures that are unlike the others, the strangest first, by what the list and `facts`
     /// say.
-    pub fn unlike<'f>(
-        &self,
-        facts: impl Fn(usize) -> Option<&'f PictureFacts>,
-    ) -> Vec<UnlikePicture> {
-        let unlike = outliers(&self.features(facts)).into_iter();
-        unlike
-            .map(|outlier| UnlikePicture {
-                row: outlier.row,
-                why: outlier.why,
-            })
-            .collect()
+    pub fn unlike<'f>(&self, facts: impl Fn(usize) -> Option<&'f PictureFacts>) -> Vec<Outlier> {
+        outliers(&self.features(facts))
     }
 
     /// What pictures are compared by.
@@ -389,7 +370,7 @@ impl BriefRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::journal_line::WrittenFile;
+    use crate::dataset::journal_line::test_line;
 
     const RECORD: &str = r#"{ "labelled": [2], "drawn": { "plate": "tray" }, "more": [1, 2],
         "labels": { "image": [8, 6], "objects": [
@@ -398,22 +379,14 @@ mod tests {
               "amodal_box": { "x0": 1.0, "y0": 1.0, "x1": 3.0, "y1": 4.0 } } ] } }"#;
 
     fn line(k: u64, objects: u32) -> JournalLine {
-        let file = |path: String| WrittenFile {
-            bytes: 10,
-            crc32: 0,
-            path,
-        };
+        let files = [
+            format!("images/train/{k}.png"),
+            format!("scenes/train/{k}.json"),
+        ];
         JournalLine {
-            k,
-            part: Part::Train,
             classes: vec![[objects, 0], [1, 1]],
             obstructed: 1,
-            knotted: 0,
-            retries: 0,
-            files: vec![
-                file(format!("images/train/{k}.png")),
-                file(format!("scenes/train/{k}.json")),
-            ],
+            ..test_line(k, &files.each_ref().map(String::as_str))
         }
     }
 

@@ -79,7 +79,8 @@ impl Inputs {
     fn look(&self, name: &str, path: &Path, now: SystemTime) -> Result<Input> {
         let meta = std::fs::metadata(path).map_err(|e| Error::file(path, e))?;
         let stamp = stamp(&meta);
-        if let Some(known) = self.known(name, &stamp) {
+        let known = self.before.get(name);
+        if let Some(known) = known.filter(|input| input.stamp == stamp) {
             return Ok(known.clone());
         }
         Ok(Input {
@@ -87,11 +88,6 @@ impl Inputs {
             crc32: Checksum::from_file(path)?.crc32,
             is_settled: is_settled(&meta, now),
         })
-    }
-
-    /// The input as it was read before, where its file has not changed since.
-    fn known(&self, name: &str, stamp: &str) -> Option<&Input> {
-        self.before.get(name).filter(|input| input.stamp == stamp)
     }
 
     /// Keeps the checksums for the next run. They only save time: a folder without room for them is
@@ -141,14 +137,10 @@ fn stamp(meta: &Metadata) -> String {
 }
 
 fn is_settled(meta: &Metadata, now: SystemTime) -> bool {
-    let age = last_change(meta).and_then(|latest| now.duration_since(latest).ok());
-    age.is_some_and(|age| age > SETTLED_AGE)
-}
-
-/// When the file's content or its entry changed last.
-fn last_change(meta: &Metadata) -> Option<SystemTime> {
     let times = [meta.modified().ok(), changed(meta)];
-    times.into_iter().flatten().max()
+    let latest = times.into_iter().flatten().max();
+    let age = latest.and_then(|latest| now.duration_since(latest).ok());
+    age.is_some_and(|age| age > SETTLED_AGE)
 }
 
 /// When a file's content or its names changed last: a time that nobody can set back.

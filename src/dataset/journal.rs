@@ -47,8 +47,8 @@ impl Journal {
         let syncing = sync(&file, &path)?;
         let read = read_journal(&file, &path, false)?;
         let count = read.len();
-        let known = whole_lines(read, &path, "their samples are made again");
-        let lines = lines_with_files(known, folder);
+        warn_of_damage(&read, &path, "their samples are made again");
+        let lines = lines_with_files(undamaged(read).collect(), folder);
         if lines.len() < count {
             // Or new lines would push those that are forgotten out of what the next run compares.
             write_lines(&path, lines.values())?;
@@ -91,15 +91,11 @@ impl Journal {
         if self.unsynced == UNSYNCED_LINES {
             self.sync()?;
         }
-        self.append(&line.text())?;
+        let written = self.file.write_all(line.text().as_bytes());
+        written.map_err(|e| Error::file(&self.path, e))?;
         self.unsynced += 1;
         self.lines.insert(line.k, line);
         Ok(())
-    }
-
-    fn append(&mut self, text: &str) -> Result<()> {
-        let written = self.file.write_all(text.as_bytes());
-        written.map_err(|e| Error::file(&self.path, e))
     }
 
     /// Number of finished samples below `count` that are wanted.
@@ -135,31 +131,23 @@ fn sync(journal: &File, path: &Path) -> Result<Syncing> {
     match io::sync_file_system(journal) {
         Ok(true) => Ok(Syncing::Together),
         Ok(false) => Ok(Syncing::Alone),
-        Err(e) => Err(not_on_disk(path, &e)),
+        Err(e) => {
+            let what = format!(
+                "the last samples cannot be put on the disk: {e}; the same command compares them and goes on"
+            );
+            Err(Error::file(path, what))
+        }
     }
 }
 
-fn not_on_disk(path: &Path, e: &std::io::Error) -> Error {
-    let what = format!(
-        "the last samples cannot be put on the disk: {e}; the same command compares them and goes on"
-    );
-    Error::file(path, what)
-}
-
-/// The last line has no end: what follows would be read as a part of it.
-fn is_torn(file: &File) -> std::io::Result<bool> {
-    Ok(file.metadata()?.len() > 0 && last_byte(file)? != b'\n')
-}
-
-fn last_byte(mut file: &File) -> std::io::Result<u8> {
-    let mut last = [0];
-    file.seek(SeekFrom::End(-1))?;
-    file.read_exact(&mut last)?;
-    Ok(last[0])
-}
-
+/// Ends a last line without an end: what follows would be read as a part of it.
 fn end_last_line(file: &mut File) -> std::io::Result<()> {
-    if is_torn(file)? {
+    let mut last = *b"\n";
+    if file.metadata()?.len() > 0 {
+        file.seek(SeekFrom::End(-1))?;
+        file.read_exact(&mut last)?;
+    }
+    if last != *b"\n" {
         file.write_all(b"\n")?;
     }
     Ok(())
@@ -198,16 +186,12 @@ pub fn repair(folder: &Path) -> Result<(usize, usize)> {
     let read = read_journal(&file, &path, false)?;
     let all = read.len();
     let lines = by_number(read);
-    let good = lines_with_same_bytes(&lines, folder);
-    write_lines(&path, good.iter().copied())?;
-    Ok((good.len(), all - good.len()))
-}
-
-fn lines_with_same_bytes<'a>(lines: &'a [JournalLine], folder: &Path) -> Vec<&'a JournalLine> {
-    lines
+    let good: Vec<&JournalLine> = lines
         .par_iter()
         .filter(|line| line.has_same_bytes(folder))
-        .collect()
+        .collect();
+    write_lines(&path, good.iter().copied())?;
+    Ok((good.len(), all - good.len()))
 }
 
 /// The whole lines of a folder's journal, in order of number.
@@ -248,11 +232,6 @@ fn read_journal(file: &File, path: &Path, is_older: bool) -> Result<NumberedLine
 }
 
 /// The lines that are not damaged, in the order of the file.
-fn whole_lines(read: NumberedLines, path: &Path, consequence: &str) -> Vec<JournalLine> {
-    warn_of_damage(&read, path, consequence);
-    undamaged(read).collect()
-}
-
 fn undamaged(read: NumberedLines) -> impl Iterator<Item = JournalLine> {
     read.into_iter().filter_map(|(_, line)| line.ok())
 }
@@ -262,12 +241,8 @@ fn by_number(read: NumberedLines) -> Vec<JournalLine> {
     keyed_by_number(undamaged(read)).into_values().collect()
 }
 
-fn count_damaged(read: &NumberedLines) -> usize {
-    read.iter().filter(|(_, line)| line.is_err()).count()
-}
-
 fn warn_of_damage(read: &NumberedLines, path: &Path, consequence: &str) {
-    let damaged = count_damaged(read);
+    let damaged = read.iter().filter(|(_, line)| line.is_err()).count();
     if damaged > 0 {
         log::warn!("{}: {damaged} damaged lines, {consequence}", path.display());
     }
@@ -314,34 +289,17 @@ fn write_lines<'a>(path: &Path, mut lines: impl Iterator<Item = &'a JournalLine>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::Part;
-    use crate::dataset::journal_line::WrittenFile;
-
-    fn line(k: u64, files: Vec<WrittenFile>) -> JournalLine {
-        JournalLine {
-            k,
-            part: Part::Train,
-            classes: Vec::new(),
-            obstructed: 0,
-            knotted: 0,
-            retries: 0,
-            files,
-        }
-    }
+    #[cfg(target_os = "linux")]
+    use crate::dataset::journal_line::test_line;
 
     /// Other systems put each file on the disk by itself.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_forgotten_sample_has_no_line_and_one_that_has_is_put_on_the_disk_first() {
         let dir = tempfile::tempdir().unwrap();
-        let lost = WrittenFile {
-            path: "labels/lost.txt".into(),
-            bytes: 3,
-            crc32: 7,
-        };
         let mut journal = Journal::open(dir.path()).unwrap();
-        journal.add(line(0, Vec::new())).unwrap();
-        journal.add(line(1, vec![lost])).unwrap();
+        journal.add(test_line(0, &[])).unwrap();
+        journal.add(test_line(1, &["labels/lost.txt"])).unwrap();
         let journal = Journal::open(dir.path()).unwrap();
         assert_eq!([0, 1].map(|k| journal.has(k)), [true, false]);
         let syncing = [0, 1].map(|k| journal.syncing(k));
@@ -352,11 +310,7 @@ mod tests {
     #[test]
     fn a_line_without_an_end_is_no_journal() {
         let zeros = std::io::repeat(0).take(MAX_LINE_BYTES + 1);
-        assert!(
-            read_lines(BufReader::new(zeros), false)
-                .unwrap_err()
-                .to_string()
-                .contains("line 1 is longer than")
-        );
+        let refused = read_lines(BufReader::new(zeros), false).unwrap_err();
+        assert!(refused.to_string().contains("line 1 is longer than"));
     }
 }

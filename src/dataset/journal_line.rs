@@ -8,7 +8,7 @@ use crate::dataset::folder::{IDENTITY, JOURNAL};
 use crate::dataset::{Entry, Part, Written};
 use crate::error::{Error, Result};
 use crate::io::{self, Checksum};
-use crate::label::{ObjectLabel, cyclic_overlaps};
+use crate::label::cyclic_overlaps;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -50,14 +50,18 @@ impl JournalLine {
     /// The line of a sample whose files have just been written.
     pub(crate) fn new(entry: &Entry<'_>, folder: &Path, files: &[PathBuf]) -> Result<Self> {
         let objects = &entry.sample.labels.objects;
+        let obstructed = objects.iter().filter(|object| !object.is_topmost());
+        let files = files
+            .iter()
+            .map(|path| WrittenFile::read_back(folder, path));
         Ok(Self {
             k: entry.k,
             part: entry.part,
             classes: count_by_class(entry),
-            obstructed: count_obstructed(objects),
+            obstructed: obstructed.count() as u32,
             knotted: cyclic_overlaps(objects).len() as u32,
             retries: entry.sample.rejected_scenes() as u32,
-            files: read_back_all(folder, files)?,
+            files: files.collect::<Result<_>>()?,
         })
     }
 
@@ -113,27 +117,15 @@ impl JournalLine {
         files.all(|file| file.difference(folder).is_none())
     }
 
-    /// Every file is there in its full size.
-    fn has_same_sizes(&self, folder: &Path) -> bool {
-        self.files
-            .iter()
-            .all(|file| file.length(folder) == Some(file.bytes))
-    }
-
     /// Every file is there: in its full size where it is on the disk for sure, else with its very
     /// bytes.
     pub(crate) fn has_files(&self, folder: &Path, is_synced: bool) -> bool {
-        if is_synced {
-            self.has_same_sizes(folder)
-        } else {
-            self.has_same_bytes(folder)
+        if !is_synced {
+            return self.has_same_bytes(folder);
         }
+        let mut files = self.files.iter();
+        files.all(|file| file.length(folder) == Some(file.bytes))
     }
-}
-
-fn count_obstructed(objects: &[ObjectLabel]) -> u32 {
-    let obstructed = objects.iter().filter(|object| !object.is_topmost());
-    obstructed.count() as u32
 }
 
 /// For each class its objects in the picture, and how many of them have a label that is not to be
@@ -150,18 +142,12 @@ fn count_by_class(entry: &Entry<'_>) -> Vec<[u32; 2]> {
     classes
 }
 
-fn read_back_all(folder: &Path, files: &[PathBuf]) -> Result<Vec<WrittenFile>> {
-    let files = files.iter();
-    files
-        .map(|path| WrittenFile::read_back(folder, path))
-        .collect()
-}
-
 impl WrittenFile {
     /// Its path below the dataset's folder, as this system writes it.
     fn local_path(&self) -> PathBuf {
         self.path.split('/').collect()
     }
+
     /// Reads the file back: what counts is what is on the disk.
     pub(crate) fn read_back(folder: &Path, path: &Path) -> Result<Self> {
         let Checksum { bytes, crc32 } = Checksum::from_file(io::inside(folder, path)?)?;
@@ -209,11 +195,10 @@ impl WrittenFile {
     /// dataset as a whole.
     fn check_path(&self) -> std::result::Result<(), String> {
         io::below("", &self.path).map_err(|e| e.to_string())?;
-        if is_reserved(&self.path) {
-            return Err(format!(
-                "file: \"{}\", expected a file of a sample",
-                self.path
-            ));
+        let path = self.path.as_str();
+        let is_hidden = path.split('/').any(|step| step.starts_with('.'));
+        if is_hidden || [JOURNAL, IDENTITY].contains(&path) {
+            return Err(format!("file: \"{path}\", expected a file of a sample"));
         }
         Ok(())
     }
@@ -222,28 +207,15 @@ impl WrittenFile {
 /// What stands before a line's checksum.
 const SEAL: &str = ",\"crc32\":";
 
-/// A line without its checksum, if that is the checksum of its bytes.
-fn unsealed((body, crc32): (&[u8], u32)) -> std::result::Result<Vec<u8>, String> {
-    if crc32fast::hash(body) == crc32 {
-        Ok([body, b"}"].concat())
-    } else {
-        Err("has other bytes than when it was written".into())
-    }
-}
-
-/// The line without its seal, which lines of older datasets do not have.
+/// The line without its seal, if that is the checksum of its bytes; lines of older datasets have
+/// none.
 fn without_seal(text: &[u8], is_older: bool) -> std::result::Result<Vec<u8>, String> {
     match split_seal(text) {
-        Some(sealed) => unsealed(sealed),
+        Some((body, crc32)) if crc32fast::hash(body) == crc32 => Ok([body, b"}"].concat()),
+        Some(_) => Err("has other bytes than when it was written".into()),
         None if is_older => Ok(text.to_vec()),
         None => Err("has no checksum, or is torn".into()),
     }
-}
-
-/// Hidden, or a file of the dataset itself.
-fn is_reserved(path: &str) -> bool {
-    let is_hidden = path.split('/').any(|step| step.starts_with('.'));
-    is_hidden || [JOURNAL, IDENTITY].contains(&path)
 }
 
 /// The part of a line that its checksum is of, and the checksum.
@@ -255,25 +227,35 @@ fn split_seal(text: &[u8]) -> Option<(&[u8], u32)> {
     Some((body.as_bytes(), crc32.parse().ok()?))
 }
 
+/// A line of a sample with these files.
+#[cfg(test)]
+pub(crate) fn test_line(k: u64, files: &[&str]) -> JournalLine {
+    let files = files.iter().map(|path| WrittenFile {
+        path: (*path).into(),
+        bytes: 3,
+        crc32: 7,
+    });
+    JournalLine {
+        k,
+        part: Part::Train,
+        classes: Vec::new(),
+        obstructed: 0,
+        knotted: 0,
+        retries: 0,
+        files: files.collect(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn line() -> JournalLine {
-        let file = WrittenFile {
-            path: "labels/val/000000.txt".into(),
-            bytes: 3,
-            crc32: 7,
-        };
-        let classes = vec![[2, 1], [1, 0]];
         JournalLine {
-            k: 0,
             part: Part::Val,
-            classes,
+            classes: vec![[2, 1], [1, 0]],
             obstructed: 2,
-            knotted: 0,
-            retries: 0,
-            files: vec![file],
+            ..test_line(0, &["labels/val/000000.txt"])
         }
     }
 
@@ -311,19 +293,18 @@ mod tests {
     #[test]
     fn lines_of_older_datasets_have_no_checksum() {
         let older = r#"{"k":0,"part":"val","classes":[[2,1],[1,0]],"knotted":0,"retries":0,"files":[{"path":"labels/val/000000.txt","bytes":3,"crc32":7}]}"#;
-        assert_eq!(
-            whole(older, true),
-            [JournalLine {
-                obstructed: 0,
-                ..line()
-            }]
-        );
+        let expected = JournalLine {
+            obstructed: 0,
+            ..line()
+        };
+        assert_eq!(whole(older, true), [expected]);
         assert_eq!(whole(older, false), []);
     }
 
     #[test]
     fn a_line_names_files_of_its_sample_alone() {
         let text = line().text();
+        let renamed = |name| whole(&resealed(&text, "labels/val/000000.txt", name), false);
         for bad in [
             "../evil.sh",
             "/etc/passwd",
@@ -334,31 +315,15 @@ mod tests {
             "dataset.json",
             "",
         ] {
-            assert_eq!(
-                whole(&resealed(&text, "labels/val/000000.txt", bad), false),
-                [],
-                "{bad}"
-            );
+            assert_eq!(renamed(bad), [], "{bad}");
         }
-        assert_eq!(
-            whole(
-                &resealed(&text, "labels/val/000000.txt", "labels/val/0.txt"),
-                false
-            )
-            .len(),
-            1
-        );
+        assert_eq!(renamed("labels/val/0.txt").len(), 1);
     }
 
     #[test]
     fn counts_that_no_picture_has_are_refused() {
         let text = line().text();
-        assert_eq!(
-            whole(
-                &resealed(&text, "[[2,1]", "[[18446744073709551615,1]"),
-                false
-            ),
-            []
-        );
+        let odd = resealed(&text, "[[2,1]", "[[18446744073709551615,1]");
+        assert_eq!(whole(&odd, false), []);
     }
 }

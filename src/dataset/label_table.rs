@@ -1,7 +1,7 @@
 //! The table `[labels]` as files have it: one rule, of which each variant has a key of its own.
 
 use crate::dataset::{Coco, Format, LabelConfig, Layers, Mot, Obstructed, Voc, WebDataset, Yolo};
-use crate::label::{AmodalBox, ObstructionRule, OutlineKind, RuleInFile};
+use crate::label::{AmodalBox, OutlineKind, RuleInFile};
 use serde::{Deserialize, Serialize};
 
 /// A [`LabelConfig`] by the keys of a file.
@@ -73,8 +73,12 @@ impl TryFrom<LabelTable> for LabelConfig {
     type Error = String;
 
     fn try_from(table: LabelTable) -> Result<Self, String> {
+        let rule = RuleInFile {
+            overlap_iou: table.overlap_iou,
+            min_visible: table.min_visible,
+        };
         Ok(Self {
-            obstruction: table.rule()?,
+            obstruction: rule.try_into()?,
             obstructed: table.obstructed,
             max_truncation: table.max_truncation,
             alpha_threshold: table.alpha_threshold,
@@ -92,21 +96,12 @@ impl TryFrom<LabelTable> for LabelConfig {
     }
 }
 
-impl LabelTable {
-    fn rule(&self) -> Result<ObstructionRule, String> {
-        let rule = RuleInFile {
-            overlap_iou: self.overlap_iou,
-            min_visible: self.min_visible,
-        };
-        rule.try_into()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::dataset::DatasetConfig;
     use crate::io;
+    use crate::label::ObstructionRule;
 
     fn written(config: &LabelConfig) -> String {
         toml::to_string(config).unwrap()
@@ -137,12 +132,9 @@ mod tests {
     }
 
     fn error_of(labels: &str, overrides: &[io::Override]) -> String {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("recipe.toml");
-        io::write_text(&path, &format!("[labels]\n{labels}\n")).unwrap();
-        DatasetConfig::read(&path, overrides)
-            .unwrap_err()
-            .to_string()
+        let recipe = format!("[labels]\n{labels}\n");
+        let read = DatasetConfig::parse(&recipe, "recipe.toml".as_ref(), overrides);
+        read.unwrap_err().to_string()
     }
 
     #[test]

@@ -6,7 +6,6 @@ use crate::dataset::{Entry, Sample, Writer};
 use crate::deep::{DeepImage, DeepSample};
 use crate::error::{Error, Result};
 use crate::image::Image;
-
 use crate::io::exr::write_channels;
 use crate::label::LabelOptions;
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
@@ -90,17 +89,12 @@ impl Writer for Layers {
 }
 
 /// The name of an object, or of a distractor, which has no class.
-fn name(id: ObjectId, class: Option<u32>, classes: &[String]) -> String {
+fn name(id: ObjectId, class: Option<u32>, entry: &Entry<'_>) -> String {
     let what = class.map_or_else(
         || Role::Distractor.to_string(),
-        |class| class_name(class, classes),
+        |class| entry.class_name(class),
     );
     format!("object{:03}_{what}", id.0)
-}
-
-fn class_name(class: u32, classes: &[String]) -> String {
-    let name = classes.get(class as usize).cloned();
-    name.unwrap_or_else(|| class.to_string())
 }
 
 /// What the file says of where it comes from.
@@ -155,12 +149,8 @@ const SHADOW_CHANNELS: [Channel<LinearRgb>; 3] = [
 fn channels_of<P: Copy>(image: &Image<P>, channels: &[Channel<P>]) -> Vec<NamedChannel> {
     let channels = channels.iter();
     channels
-        .map(|(name, value)| ((*name).into(), values_of(image, value)))
+        .map(|(name, value)| ((*name).into(), image.pixels().iter().map(value).collect()))
         .collect()
-}
-
-fn values_of<P: Copy>(image: &Image<P>, value: &fn(&P) -> f32) -> Vec<f32> {
-    image.pixels().iter().map(value).collect()
 }
 
 fn borrowed(channels: &[NamedChannel]) -> Vec<(&str, &[f32])> {
@@ -181,7 +171,7 @@ fn object_names(entry: &Entry<'_>) -> Vec<(ObjectId, String)> {
     let distractors = labels.distractors.iter().map(|d| (d.id, None));
     let faint = labels.faint.iter().copied();
     let all = objects.chain(distractors).chain(faint);
-    all.map(|(id, class)| (id, name(id, class, entry.classes)))
+    all.map(|(id, class)| (id, name(id, class, entry)))
         .collect()
 }
 
@@ -193,72 +183,27 @@ fn nearest(samples: &[DeepSample], threshold: f32) -> f32 {
         .map_or(f32::INFINITY, |sample| sample.depth.0)
 }
 
-/// One channel of an object.
-struct ObjectChannel {
-    layer: &'static str,
-    name: &'static str,
-    value: fn(&DeepSample) -> f32,
-    /// Where the object is not.
-    none: f32,
-}
+/// A channel of an object: its layer and name, how a sample gives its value, and what it is where
+/// the object is not.
+type ObjectChannel = (&'static str, &'static str, fn(&DeepSample) -> f32, f32);
 
-/// The channels of an object.
 const OBJECT_CHANNELS: [ObjectChannel; 6] = [
-    ObjectChannel {
-        layer: "object",
-        name: "R",
-        value: |s| s.light.r,
-        none: 0.0,
-    },
-    ObjectChannel {
-        layer: "object",
-        name: "G",
-        value: |s| s.light.g,
-        none: 0.0,
-    },
-    ObjectChannel {
-        layer: "object",
-        name: "B",
-        value: |s| s.light.b,
-        none: 0.0,
-    },
-    ObjectChannel {
-        layer: "object",
-        name: "A",
-        value: |s| s.visible,
-        none: 0.0,
-    },
-    ObjectChannel {
-        layer: "object",
-        name: "Z",
-        value: |s| s.depth.0,
-        none: f32::INFINITY,
-    },
-    ObjectChannel {
-        layer: "amodal",
-        name: "A",
-        value: |s| s.alpha,
-        none: 0.0,
-    },
+    ("object", "R", |s| s.light.r, 0.0),
+    ("object", "G", |s| s.light.g, 0.0),
+    ("object", "B", |s| s.light.b, 0.0),
+    ("object", "A", |s| s.visible, 0.0),
+    ("object", "Z", |s| s.depth.0, f32::INFINITY),
+    ("amodal", "A", |s| s.alpha, 0.0),
 ];
 
-fn object_channels(deep: &DeepImage, id: ObjectId) -> Vec<NamedChannel> {
-    let channels = OBJECT_CHANNELS.iter();
-    channels
-        .map(|channel| (channel.name_for(id), channel.plane(deep, id)))
-        .collect()
-}
-
-impl ObjectChannel {
-    fn name_for(&self, id: ObjectId) -> String {
-        format!("{}{:03}.{}", self.layer, id.0, self.name)
-    }
-    fn plane(&self, deep: &DeepImage, id: ObjectId) -> Vec<f32> {
-        value_per_pixel(deep, |samples| {
+fn object_channels(deep: &DeepImage, id: ObjectId) -> [NamedChannel; 6] {
+    OBJECT_CHANNELS.map(|(layer, name, value, none)| {
+        let plane = value_per_pixel(deep, |samples| {
             let own = samples.iter().find(|s| s.object == id);
-            own.map_or(self.none, self.value)
-        })
-    }
+            own.map_or(none, value)
+        });
+        (format!("{layer}{:03}.{name}", id.0), plane)
+    })
 }
 
 /// One value for each pixel.

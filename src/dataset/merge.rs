@@ -1,15 +1,14 @@
 //! Joins the shards of a dataset: the folder that a single run would have made.
 
-use crate::dataset::folder::{self, IDENTITY, JOURNAL};
+use crate::dataset::folder::{self, JOURNAL, field};
 use crate::dataset::journal::numbered_lines;
 use crate::dataset::journal_line::{JournalLine, WrittenFile};
 use crate::dataset::run::{Progress, check_count, run};
 use crate::dataset::times::Times;
-use crate::dataset::{
-    DatasetCounts, Inputs, LabelConfig, Pictures, Plan, SampleRange, Shard, Sidecar, Writer,
-};
+use crate::dataset::{DatasetCounts, LabelConfig, Pictures, Plan, Shard, Sidecar, Writer};
 use crate::error::{Error, Result};
 use crate::io::{self, Syncing};
+use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -43,7 +42,7 @@ pub fn merge(
         let what = format!("sample {k} is missing: finish this shard first");
         return Err(Error::file(shard, what));
     }
-    let plan = merged_plan(dataset.document, dataset.count, folder)?;
+    let plan = merged_plan(&dataset.document, dataset.count, folder)?;
     let write = |k: u64, syncing: Syncing| syncing.during(|| copy_sample(&lines[&k], folder));
     run(&plan, write, progress, stop)
 }
@@ -92,7 +91,7 @@ fn own_line(
 /// What all shards say of themselves.
 struct ShardedDataset {
     /// What the dataset was made from, without the shard.
-    document: Map<String, Value>,
+    document: Value,
     count: u64,
     /// Which share each of them is.
     shares: Vec<Shard>,
@@ -101,7 +100,8 @@ struct ShardedDataset {
 impl ShardedDataset {
     /// Opens shards, which must be all of one dataset.
     fn open(folders: &[PathBuf]) -> Result<Self> {
-        let opened = open_shards(folders)?;
+        let opened = folders.iter().map(|folder| open_shard(folder));
+        let opened = opened.collect::<Result<Vec<_>>>()?;
         let Some((first, ShardShare { shard, count })) = opened.first() else {
             return Err(Error::value("shards", "none, expected their folders"));
         };
@@ -111,7 +111,7 @@ impl ShardedDataset {
         let shares: Vec<Shard> = opened.iter().map(|(_, share)| share.shard).collect();
         check_complete(folders, &shares, shard.of)?;
         Ok(Self {
-            document: first.as_object().cloned().unwrap_or_default(),
+            document: first.clone(),
             count: *count,
             shares,
         })
@@ -148,14 +148,12 @@ fn check_complete(folders: &[PathBuf], shares: &[Shard], of: u64) -> Result<()> 
         }
     }
     match (1..=of).find(|index| !places.contains_key(index)) {
-        Some(index) => Err(missing_shard(index, of)),
+        Some(index) => Err(Error::value(
+            "shards",
+            format!("shard {index}/{of} is missing"),
+        )),
         None => Ok(()),
     }
-}
-
-fn missing_shard(index: u64, of: u64) -> Error {
-    let what = format!("shard {index}/{of} is missing");
-    Error::value("shards", what)
 }
 
 /// Fails on the first field in which a shard's dataset is not the first shard's.
@@ -172,7 +170,7 @@ fn check_same_dataset(
 }
 
 /// What the folder of a shard says of its share.
-#[derive(serde::Deserialize)]
+#[derive(Deserialize)]
 struct ShardShare {
     #[serde(flatten)]
     shard: Shard,
@@ -180,26 +178,18 @@ struct ShardShare {
 }
 
 impl ShardShare {
+    /// Fails where there can be no such share.
     fn from_value(value: Value) -> Result<Self> {
         let share: Self = serde_json::from_value(value).map_err(|e| Error::value("shard", e))?;
-        share.check()
+        Shard::new(share.shard.index, share.shard.of)?;
+        check_count(share.count)?;
+        Ok(share)
     }
-
-    /// Fails where there can be no such share.
-    fn check(self) -> Result<Self> {
-        Shard::new(self.shard.index, self.shard.of)?;
-        check_count(self.count)?;
-        Ok(self)
-    }
-}
-
-fn open_shards(folders: &[PathBuf]) -> Result<Vec<(Value, ShardShare)>> {
-    folders.iter().map(|folder| open_shard(folder)).collect()
 }
 
 /// What a shard's folder was made from, and which share it is.
 fn open_shard(path: &Path) -> Result<(Value, ShardShare)> {
-    let mut document = folder::identity(path)?.ok_or_else(|| no_identity(path))?;
+    let mut document = folder::known_identity(path, "a shard")?;
     let share = document.as_object_mut().and_then(|map| map.remove("shard"));
     let share = share.ok_or_else(|| Error::file(path, "is a whole dataset, expected a shard"))?;
     folder::of_this_format(&document, path)?;
@@ -208,26 +198,15 @@ fn open_shard(path: &Path) -> Result<(Value, ShardShare)> {
     Ok((document, share))
 }
 
-fn no_identity(folder: &Path) -> Error {
-    let what = format!("no {IDENTITY}, expected a shard");
-    Error::file(folder, what)
-}
-
 /// The plan that a dataset was made with, but for where its samples come from.
-fn merged_plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> Result<Plan> {
+fn merged_plan(document: &Value, count: u64, folder: &Path) -> Result<Plan> {
     Ok(Plan {
-        folder: folder.into(),
-        count,
-        range: SampleRange::All,
-        writers: writers_of(field(&mut document, "writers")?)?,
-        seed: field(&mut document, "seed")?,
-        recipe: field(&mut document, "recipe")?,
-        classes: field(&mut document, "classes")?,
-        split: field(&mut document, "split")?,
-        obstructed: field(&mut document, "obstructed")?,
-        archives: None,
-        store: None,
-        inputs: Inputs::default(),
+        writers: writers_of(field(document, "writers")?)?,
+        seed: field(document, "seed")?,
+        recipe: field(document, "recipe")?,
+        split: field(document, "split")?,
+        obstructed: field(document, "obstructed")?,
+        ..Plan::new(folder, count, field(document, "classes")?)
     })
 }
 
@@ -241,18 +220,11 @@ fn writers_of(settings: Vec<Map<String, Value>>) -> Result<Vec<Arc<dyn Writer>>>
 }
 
 fn pictures_of(settings: &[Map<String, Value>]) -> Result<Pictures> {
-    match settings.iter().find(|map| map.contains_key("pictures")) {
-        Some(map) => field(&mut map.clone(), "pictures"),
-        None => Ok(Pictures::default()),
-    }
-}
-
-fn field<T: serde::de::DeserializeOwned>(
-    document: &mut Map<String, Value>,
-    name: &str,
-) -> Result<T> {
-    serde_json::from_value(document.remove(name).unwrap_or_default())
-        .map_err(|e| Error::value(name, e))
+    let pictures = settings.iter().find_map(|map| map.get("pictures"));
+    let pictures = pictures.map(Pictures::deserialize).transpose();
+    Ok(pictures
+        .map_err(|e| Error::value("pictures", e))?
+        .unwrap_or_default())
 }
 
 /// The writer of a name and settings, as [`Writer::settings`] told them.

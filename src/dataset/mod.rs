@@ -86,7 +86,7 @@ pub use coco::Coco;
 pub use coco::CocoMask;
 pub use config::DatasetConfig;
 #[doc(hidden)]
-pub use contact_sheet::{ContactSheetOptions, ContactTile, contact_sheet, contact_sheet_of};
+pub use contact_sheet::contact_sheet_of;
 #[doc(hidden)]
 pub use counts::ClassCount;
 pub use counts::DatasetCounts;
@@ -210,14 +210,6 @@ impl Sample {
         }
     }
 
-    /// The same with its provenance changed, where it has one.
-    fn with_origin(self, change: impl FnOnce(Provenance) -> Provenance) -> Self {
-        Self {
-            provenance: self.provenance.map(change),
-            ..self
-        }
-    }
-
     /// Scenes that were rejected before this one.
     pub(crate) fn rejected_scenes(&self) -> usize {
         self.provenance
@@ -258,13 +250,14 @@ impl Entry<'_> {
 
     /// Path below the dataset's folder: `images/train/000012.png`.
     pub fn path(&self, kind: &str, extension: &str) -> PathBuf {
-        [
-            kind,
-            self.part.name(),
-            &format!("{:06}.{extension}", self.k),
-        ]
-        .iter()
-        .collect()
+        let name = format!("{:06}.{extension}", self.k);
+        Path::new(kind).join(self.part.name()).join(name)
+    }
+
+    /// The name of a class; its number where it has none.
+    pub(crate) fn class_name(&self, class: u32) -> String {
+        let name = self.classes.get(class as usize).cloned();
+        name.unwrap_or_else(|| class.to_string())
     }
 }
 
@@ -287,14 +280,9 @@ impl Written {
     /// When there is none.
     pub fn file(&self, kind: &str) -> std::io::Result<&Path> {
         let found = self.files.iter().find(|file| file.starts_with(kind));
-        found
-            .map(PathBuf::as_path)
-            .ok_or_else(|| self.no_file(kind))
-    }
-
-    fn no_file(&self, kind: &str) -> std::io::Error {
-        let k = self.k;
-        std::io::Error::other(format!("sample {k} has no file in {kind}"))
+        found.map(PathBuf::as_path).ok_or_else(|| {
+            std::io::Error::other(format!("sample {} has no file in {kind}", self.k))
+        })
     }
 }
 

@@ -70,10 +70,12 @@ impl Writer for Mot {
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let belt = entry.belt().ok_or_else(no_sequence)?;
         let path = entry.path(SHARES_FOLDER, "json");
+        let labels = entry.labelled.iter();
+        let lines = labels.filter_map(|label| self.line(belt.frame + 1, label));
         let share = FrameShare {
             belt,
             image: entry.sample.labels.image,
-            lines: self.lines(&belt, entry.labelled),
+            lines: lines.collect(),
         };
         io::write_json(folder.join(&path), &share)?;
         Ok(vec![path])
@@ -119,12 +121,6 @@ fn sequences<'a>(
 }
 
 impl Mot {
-    fn lines(&self, belt: &Belt, labelled: &[LabelledObject<'_>]) -> Vec<String> {
-        let number = belt.frame + 1;
-        let lines = labelled.iter().filter_map(|label| self.line(number, label));
-        lines.collect()
-    }
-
     /// None for an object without a box.
     fn line(&self, frame: u64, label: &LabelledObject<'_>) -> Option<String> {
         let (b, _) = self.boxes.of(label.object);

@@ -199,12 +199,7 @@ fn grey_code(p: &Srgb8) -> u8 {
 #[inline]
 fn squared_error(a: &[u8], b: &[u8]) -> u64 {
     let pairs = a.iter().zip(b);
-    pairs.map(|(a, b)| squared_difference(*a, *b)).sum()
-}
-
-#[inline]
-fn squared_difference(a: u8, b: u8) -> u64 {
-    u64::from(a.abs_diff(b)).pow(2)
+    pairs.map(|(a, b)| u64::from(a.abs_diff(*b)).pow(2)).sum()
 }
 
 #[cfg(test)]

@@ -166,6 +166,7 @@ mod tests {
     use super::*;
     use crate::label::Truncation;
     use crate::pixel::ObjectId;
+    use serde_json::json;
 
     fn pair() -> Labels {
         let amodal_box = BBox {
@@ -245,21 +246,18 @@ mod tests {
 
     #[test]
     fn the_boxes_of_a_dataset_are_those_of_yolo_before_others() {
-        let extent = |writers: Value| extent_of(&serde_json::json!({ "writers": writers }));
-        let coco = serde_json::json!({ "coco": { "boxes": "visible" } });
-        let yolo = serde_json::json!({ "yolo": { "boxes": "amodal" } });
-        let pictures = serde_json::json!({ "pictures": {} });
-        assert_eq!(extent(serde_json::json!([pictures, coco])), Extent::Visible);
-        assert_eq!(extent(serde_json::json!([coco, yolo])), Extent::Amodal);
+        let coco = json!({ "coco": { "boxes": "visible" } });
+        let yolo = json!({ "yolo": { "boxes": "amodal" } });
+        let extent = |writers: [&Value; 2]| extent_of(&json!({ "writers": writers }));
+        assert_eq!(extent([&json!({ "pictures": {} }), &coco]), Extent::Visible);
+        assert_eq!(extent([&coco, &yolo]), Extent::Amodal);
         assert_eq!(extent_of(&Value::Null), Extent::Amodal);
     }
 
     #[test]
     fn a_class_that_is_there_already_is_not_added() {
-        assert!(Obstructed::Class.classes(&[OBSTRUCTED.to_owned()]).is_err());
-        assert_eq!(
-            Obstructed::Keep.classes(&[OBSTRUCTED.to_owned()]).unwrap(),
-            [OBSTRUCTED]
-        );
+        let classes = [OBSTRUCTED.to_owned()];
+        assert!(Obstructed::Class.classes(&classes).is_err());
+        assert_eq!(Obstructed::Keep.classes(&classes).unwrap(), classes);
     }
 }

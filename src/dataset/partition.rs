@@ -45,9 +45,7 @@ impl Group {
             Self::Selection => "selection",
         }
     }
-}
 
-impl Group {
     /// What a scene has in common with the others of its group; none where nothing is chosen.
     fn key_of(self, scene: &Scene) -> Option<String> {
         match self {
@@ -62,7 +60,10 @@ impl FromStr for Group {
 
     fn from_str(text: &str) -> Result<Self> {
         let known = Self::ALL.into_iter().find(|group| group.name() == text);
-        known.ok_or_else(|| unknown_group(text))
+        known.ok_or_else(|| {
+            let what = format!("\"{text}\", expected background or selection");
+            Error::value("group", what)
+        })
     }
 }
 
@@ -171,17 +172,13 @@ fn groups_for_validation(groups: &[String], wanted: usize, seed: u64) -> BTreeSe
 
 /// Groups and their sizes, in a random order.
 fn shuffled_groups(groups: &[String], seed: u64) -> Vec<(&str, usize)> {
-    let mut order: Vec<_> = group_sizes(groups).into_iter().collect();
-    order.sort_by_key(|(group, _)| Draws::new(seed, 0).bits(&format!("split.{group}")));
-    order
-}
-
-fn group_sizes(groups: &[String]) -> BTreeMap<&str, usize> {
     let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
     for group in groups {
         *sizes.entry(group).or_default() += 1;
     }
-    sizes
+    let mut order: Vec<_> = sizes.into_iter().collect();
+    order.sort_by_key(|(group, _)| Draws::new(seed, 0).bits(&format!("split.{group}")));
+    order
 }
 
 fn check_ratio(ratio: f64) -> Result<()> {
@@ -194,16 +191,11 @@ fn check_ratio(ratio: f64) -> Result<()> {
 
 /// The photos of a scene's objects, in an order of their own; none without objects.
 fn selection_of(scene: &Scene) -> Option<String> {
-    let mut photos = photos_of(scene);
+    let photos = scene.objects.iter();
+    let photos = photos.map(|object| format!("{}/{}", object.asset, object.photo));
+    let mut photos: Vec<String> = photos.collect();
     photos.sort();
     (!photos.is_empty()).then(|| photos.join(" "))
-}
-
-fn photos_of(scene: &Scene) -> Vec<String> {
-    let objects = scene.objects.iter();
-    objects
-        .map(|object| format!("{}/{}", object.asset, object.photo))
-        .collect()
 }
 
 /// The first images, and those behind the ones that are left out.
@@ -215,11 +207,6 @@ fn consecutive(images: &[PathBuf], train: usize, guard: usize) -> [Vec<PathBuf>;
 /// A group for each image.
 fn numbers_to(count: usize) -> Vec<String> {
     (0..count).map(|i| i.to_string()).collect()
-}
-
-fn unknown_group(name: &str) -> Error {
-    let what = format!("\"{name}\", expected background or selection");
-    Error::value("group", what)
 }
 
 #[cfg(test)]
@@ -236,17 +223,19 @@ mod tests {
         }
     }
 
+    /// So many images, four fifths of them for training.
+    fn cut(n: usize, guard: usize) -> YoloSet {
+        let how = Partition::Consecutive { guard };
+        listing(n).partitioned(how, 0.8, 0).unwrap()
+    }
+
     #[test]
     fn the_paper_s_series_is_cut_once() {
-        let cut = listing(2031)
-            .partitioned(Partition::Consecutive { guard: 0 }, 0.8, 0)
-            .unwrap();
+        let series = cut(2031, 0);
         // 80 % of 2031 is 1624.8; the paper says 1624 or, rounded, 1625.
-        assert_eq!((cut.train.len(), cut.val.len()), (1625, 406));
-        assert!(cut.train.last() < cut.val.first());
-        let guarded = listing(100)
-            .partitioned(Partition::Consecutive { guard: 5 }, 0.8, 0)
-            .unwrap();
+        assert_eq!((series.train.len(), series.val.len()), (1625, 406));
+        assert!(series.train.last() < series.val.first());
+        let guarded = cut(100, 5);
         assert_eq!((guarded.train.len(), guarded.val.len()), (80, 15));
     }
 
@@ -291,11 +280,7 @@ mod tests {
 
     #[test]
     fn the_head_is_taken_of_both_parts() {
-        let split = listing(100)
-            .partitioned(Partition::Consecutive { guard: 0 }, 0.8, 0)
-            .unwrap()
-            .head(0.25)
-            .unwrap();
+        let split = cut(100, 0).head(0.25).unwrap();
         assert_eq!((split.train.len(), split.val.len()), (20, 5));
         assert!(
             listing(3).head(1.5).is_err()

@@ -32,20 +32,12 @@ pub struct Pictures {
 
 impl Default for Pictures {
     fn default() -> Self {
-        let format = PictureFormat::default();
         Self {
-            format,
+            format: PictureFormat::default(),
             jpeg_quality: Range::fixed(WriteOptions::default().jpeg_quality.into()),
             jpeg_chroma: Vec::new(),
             exr: false,
         }
-    }
-}
-
-impl Pictures {
-    pub(crate) fn check(&self) -> Result<()> {
-        let bounds = Bounds::new(1.0, 100.0, "a JPEG's quality");
-        self.jpeg_quality.check_count("jpeg_quality", &bounds)
     }
 }
 
@@ -70,6 +62,11 @@ impl PictureFormat {
 }
 
 impl Pictures {
+    pub(crate) fn check(&self) -> Result<()> {
+        let bounds = Bounds::new(1.0, 100.0, "a JPEG's quality");
+        self.jpeg_quality.check_count("jpeg_quality", &bounds)
+    }
+
     fn write_options(&self, seed: u64, k: u64) -> WriteOptions {
         WriteOptions {
             jpeg_quality: self.quality(seed, k),
@@ -120,36 +117,6 @@ impl Pictures {
             n => self.jpeg_chroma[Draws::new(seed, k).choose("pictures.jpeg_chroma", n)],
         }
     }
-}
-
-impl Writer for Pictures {
-    fn settings(&self) -> serde_json::Value {
-        serde_json::json!({ "pictures": self })
-    }
-
-    fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
-        let mut kinds = self.kinds().iter();
-        kinds.try_for_each(|kind| create_part_folders(folder, kind))
-    }
-
-    fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
-        let mut paths = vec![self.write_displayed(folder, entry)?];
-        if self.exr {
-            paths.push(write_exr(folder, entry)?);
-        }
-        Ok(paths)
-    }
-}
-
-impl Pictures {
-    /// The folders of the dataset that it writes to.
-    fn kinds(&self) -> &'static [&'static str] {
-        if self.exr {
-            &["images", "exr"]
-        } else {
-            &["images"]
-        }
-    }
 
     fn write_displayed(&self, folder: &Path, entry: &Entry<'_>) -> Result<PathBuf> {
         let path = entry.path("images", self.format.extension());
@@ -163,10 +130,28 @@ impl Pictures {
     }
 }
 
-fn write_exr(folder: &Path, entry: &Entry<'_>) -> Result<PathBuf> {
-    let path = entry.path("exr", "exr");
-    io::write(folder.join(&path), &entry.sample.frame)?;
-    Ok(path)
+impl Writer for Pictures {
+    fn settings(&self) -> serde_json::Value {
+        serde_json::json!({ "pictures": self })
+    }
+
+    fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
+        create_part_folders(folder, "images")?;
+        if self.exr {
+            create_part_folders(folder, "exr")?;
+        }
+        Ok(())
+    }
+
+    fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
+        let mut paths = vec![self.write_displayed(folder, entry)?];
+        if self.exr {
+            let path = entry.path("exr", "exr");
+            io::write(folder.join(&path), &entry.sample.frame)?;
+            paths.push(path);
+        }
+        Ok(paths)
+    }
 }
 
 #[cfg(test)]

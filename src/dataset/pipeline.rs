@@ -9,7 +9,7 @@ use crate::dataset::environment_maps::EnvironmentMaps;
 use crate::dataset::falls::Falls;
 use crate::dataset::fingerprint::fingerprint;
 use crate::dataset::{
-    DatasetConfig, Inputs, Plan, Provenance, Sample, SampleRange, Sidecar, Split, Times, Writer,
+    DatasetConfig, Inputs, Plan, Provenance, Sample, Sidecar, Split, Times, Writer,
 };
 use crate::deep::DeepImage;
 use crate::error::{Error, Result};
@@ -264,21 +264,25 @@ impl Pipeline {
         let (scene, labels) = (&self.config.scene, &self.config.labels);
         self.check_room_with(scene)?;
         self.library.warn_of_size();
-        let folder = folder.into();
+        let folder: PathBuf = folder.into();
         let mut inputs = Inputs::kept(&folder);
+        let recipe = fingerprint(
+            &self.config,
+            &self.library,
+            &self.places,
+            &self.surroundings,
+            &mut inputs,
+        )?;
+        let classes = labels.obstructed.classes(&self.library.classes)?;
         Ok(Plan {
-            folder,
-            count,
-            range: SampleRange::All,
             seed,
-            recipe: self.fingerprint(&mut inputs)?,
-            classes: labels.obstructed.classes(&self.library.classes)?,
+            recipe,
             split: self.split(),
             obstructed: labels.obstructed,
             writers: self.writers(),
             archives: labels.archives(),
-            store: None,
             inputs,
+            ..Plan::new(folder, count, classes)
         })
     }
 
@@ -289,16 +293,6 @@ impl Pipeline {
             sequence: belt.map_or(1, |belt| belt.frames),
             ..self.config.split
         }
-    }
-
-    fn fingerprint(&self, inputs: &mut Inputs) -> Result<serde_json::Value> {
-        fingerprint(
-            &self.config,
-            &self.library,
-            &self.places,
-            &self.surroundings,
-            inputs,
-        )
     }
 
     fn writers(&self) -> Vec<Arc<dyn Writer>> {
@@ -365,12 +359,16 @@ impl Pipeline {
             let (scene, draws) = self.explain(scene_seed, k)?;
             match self.take_within(scene, &allowance) {
                 Ok(sample) => {
-                    return Ok(sample.with_origin(|provenance| Provenance {
+                    let provenance = sample.provenance.map(|provenance| Provenance {
                         rejected,
                         draws,
                         scene_seed,
                         ..provenance
-                    }));
+                    });
+                    return Ok(Sample {
+                        provenance,
+                        ..sample
+                    });
                 }
                 Err(Error::Unsettled { what })
                     if rejected.len() < MAX_RESAMPLES && !allowance.is_spent() =>
@@ -565,12 +563,9 @@ impl Pipeline {
     }
 
     fn unknown_plate(&self, name: &str) -> Error {
-        let known = self.background_names().join(", ");
+        let known = self.backgrounds.iter().map(|b| b.name.as_str());
+        let known = known.collect::<Vec<_>>().join(", ");
         Error::value("plate", format!("\"{name}\", expected one of {known}"))
-    }
-
-    fn background_names(&self) -> Vec<&str> {
-        self.backgrounds.iter().map(|b| b.name.as_str()).collect()
     }
 }
 
@@ -597,14 +592,7 @@ fn background_options(config: &DatasetConfig) -> BackgroundOptions {
 
 /// Whether two configs take the same photos in the same way.
 fn has_same_places(a: &DatasetConfig, b: &DatasetConfig) -> bool {
-    let taken = |config: &DatasetConfig| {
-        (
-            config.scene.image,
-            config.surface_size,
-            config.force_cameras,
-        )
-    };
-    a.backgrounds == b.backgrounds && taken(a) == taken(b)
+    a.backgrounds == b.backgrounds && background_options(a) == background_options(b)
 }
 
 /// The seed of the `n`-th try of scene `k`: the first is the dataset's own. On a belt all pictures

@@ -66,21 +66,11 @@ fn fill_in(table: &mut Table, below: Table) {
 mod tests {
     use super::*;
     use crate::dataset::DatasetConfig;
-    use crate::io;
     use crate::scene::Range;
 
     fn read(text: &str, overrides: &[&str]) -> crate::Result<DatasetConfig> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("recipe.toml");
-        io::write_text(&path, text).unwrap();
         let overrides: Vec<_> = overrides.iter().map(|o| o.parse().unwrap()).collect();
-        let config = DatasetConfig::read(path, &overrides)?;
-        Ok(DatasetConfig {
-            folder: Default::default(),
-            assets: Default::default(),
-            backgrounds: Default::default(),
-            ..config
-        })
+        DatasetConfig::parse(text, "recipe.toml".as_ref(), &overrides)
     }
 
     #[test]
@@ -97,16 +87,11 @@ mod tests {
 
     #[test]
     fn a_key_goes_before_the_other_one_that_the_preset_has_in_its_place() {
-        let config = read("preset = 'real'\n[labels]\noverlap_iou = 0.1", &[]).unwrap();
-        assert_eq!(
-            config.labels,
-            read("[labels]\noverlap_iou = 0.1", &[]).unwrap().labels
-        );
-        let own = read("preset = 'real'\n[labels]\nmin_visible = 0.5", &[]).unwrap();
-        assert_eq!(
-            own.labels,
-            read("[labels]\nmin_visible = 0.5", &[]).unwrap().labels
-        );
+        for labels in ["overlap_iou = 0.1", "min_visible = 0.5"] {
+            let alone = read(&format!("[labels]\n{labels}"), &[]).unwrap();
+            let over = read(&format!("preset = 'real'\n[labels]\n{labels}"), &[]).unwrap();
+            assert_eq!(over.labels, alone.labels);
+        }
     }
 
     #[test]

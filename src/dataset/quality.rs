@@ -182,13 +182,11 @@ impl std::str::FromStr for Quality {
 
     fn from_str(name: &str) -> Result<Self> {
         let known = Self::ALL.into_iter().find(|q| q.name() == name);
-        known.ok_or_else(|| unknown_quality(name))
+        known.ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            Error::value("quality", format!("\"{name}\", expected one of {names}"))
+        })
     }
-}
-
-fn unknown_quality(name: &str) -> Error {
-    let names = Quality::ALL.map(Quality::name).join(", ");
-    Error::value("quality", format!("\"{name}\", expected one of {names}"))
 }
 
 #[cfg(test)]

@@ -39,14 +39,6 @@ impl Progress {
         self.done >= self.count
     }
 
-    fn check_is_done(&self, folder: &Path) -> Result<()> {
-        if self.is_done() {
-            return Ok(());
-        }
-        let what = self.describe(folder);
-        Err(Error::Interrupted { what })
-    }
-
     pub(super) fn describe(&self, folder: &Path) -> String {
         let (done, asked, folder) = (self.done, self.count, folder.display());
         format!("{done} of {asked} samples are in {folder}; the same command goes on")
@@ -91,7 +83,7 @@ pub(super) fn check_count(count: u64) -> Result<()> {
 pub(super) fn run(
     plan: &Plan,
     write: impl Fn(u64, Syncing) -> Result<(JournalLine, Times)> + Sync,
-    progress: &(dyn Fn(Progress) + Sync),
+    progress: Report,
     stop: &AtomicBool,
 ) -> Result<DatasetCounts> {
     check_count(plan.count)?;
@@ -156,7 +148,7 @@ struct DatasetRun<'a, F> {
     /// Samples of the whole dataset.
     count: u64,
     write: F,
-    progress: &'a (dyn Fn(Progress) + Sync),
+    progress: Report<'a>,
     stop: &'a AtomicBool,
     state: Mutex<RunState>,
     began: Instant,
@@ -293,7 +285,10 @@ impl RunState {
             return Err(error);
         }
         let lines = closed?;
-        now.check_is_done(&plan.folder)?;
+        if !now.is_done() {
+            let what = now.describe(&plan.folder);
+            return Err(Error::Interrupted { what });
+        }
         Ok(lines)
     }
 

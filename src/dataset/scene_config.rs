@@ -63,7 +63,7 @@ impl DatasetConfig {
     pub fn from_settings(settings: &SceneSettings, overrides: &[io::Override]) -> Result<Self> {
         overrides.iter().try_for_each(check_override)?;
         overrides.iter().try_for_each(check_counts)?;
-        Self::from_scene_table(settings.to_table(), overrides).map_err(|e| e.within("settings"))
+        Self::from_scene_table(settings.0.clone(), overrides).map_err(|e| e.within("settings"))
     }
 
     fn from_scene_table(mut table: Table, overrides: &[io::Override]) -> Result<Self> {
@@ -81,21 +81,20 @@ impl DatasetConfig {
     }
 
     fn with_scene_folders(mut self, scene: &Scene, path: &Path) -> Result<Self> {
-        let files = scene.files.as_ref().ok_or_else(no_files)?;
+        let files = scene.files.as_ref().ok_or_else(|| {
+            let what = "missing, expected a table that names the folders of assets and backgrounds, or a recipe beside the scene";
+            Error::value("files", what)
+        })?;
         let folder = folder_of(path);
         self.assets = below(folder, required(&files.assets, "assets", "the assets")?);
         self.backgrounds = backgrounds_folder(files, &scene.plate, folder)?;
         self.folder = folder.into();
         if let Some(environments) = &files.environments {
-            self.use_environments(scene, below(folder, environments));
+            self.folder = below(folder, environments);
+            let maps = scene.environment.iter();
+            self.scene.environment.files = maps.map(|map| map.file.clone()).collect();
         }
         Ok(self)
-    }
-
-    fn use_environments(&mut self, scene: &Scene, folder: PathBuf) {
-        self.folder = folder;
-        let maps = scene.environment.iter();
-        self.scene.environment.files = maps.map(|map| map.file.clone()).collect();
     }
 
     /// A scene of this config with all that it takes to render it from a file at `path` alone.
@@ -135,7 +134,7 @@ impl DatasetConfig {
             }
         }
         leave_out_formats(&mut settings);
-        Ok(SceneSettings::from_table(settings))
+        Ok(SceneSettings(settings))
     }
 }
 
@@ -212,11 +211,6 @@ fn required<'a>(folder: &'a Option<PathBuf>, key: &str, content: &str) -> Result
     })
 }
 
-fn no_files() -> Error {
-    let what = "missing, expected a table that names the folders of assets and backgrounds, or a recipe beside the scene";
-    Error::value("files", what)
-}
-
 fn as_table(config: &DatasetConfig) -> Result<Table> {
     Table::try_from(config).map_err(|e| Error::value("settings", e.to_string()))
 }
@@ -251,19 +245,16 @@ fn insert(table: &mut Table, path: &str, value: Value) {
 fn difference(value: Option<&Value>, default: Option<&Value>) -> Option<Value> {
     match (value?, default) {
         (Value::Table(own), Some(Value::Table(defaults))) => {
-            let table = table_difference(own, defaults);
+            let own = own.iter().filter_map(|(key, value)| {
+                let value = difference(Some(value), defaults.get(key))?;
+                Some((key.clone(), value))
+            });
+            let table: Table = own.collect();
             (!table.is_empty()).then_some(Value::Table(table))
         }
         (value, default) if Some(value) == default => None,
         (value, _) => Some(value.clone()),
     }
-}
-
-fn table_difference(own: &Table, defaults: &Table) -> Table {
-    let entries = own.iter();
-    entries
-        .filter_map(|(key, value)| Some((key.clone(), difference(Some(value), defaults.get(key))?)))
-        .collect()
 }
 
 /// The folder with a scene's plate; a scene without one needs none.
@@ -298,6 +289,18 @@ mod tests {
         }
     }
 
+    /// Lit by a picture of the surroundings.
+    fn scene_under(file: &str) -> Scene {
+        Scene {
+            environment: Some(Environment {
+                file: file.into(),
+                rotation_deg: 0.0,
+                strength: 1.0,
+            }),
+            ..scene()
+        }
+    }
+
     #[test]
     fn a_scene_brings_the_setup_that_it_was_written_with() {
         let mut config = DatasetConfig {
@@ -310,16 +313,8 @@ mod tests {
         config.scene.settle.attempts = 3;
         config.labels.obstruction = ObstructionRule::Visibility { min_visible: 0.97 };
         config.scene.image = [64, 48];
-        let map = Environment {
-            file: "../sky.exr".into(),
-            rotation_deg: 0.0,
-            strength: 1.0,
-        };
-        config.scene.environment.files = vec![map.file.clone()];
-        let scene = Scene {
-            environment: Some(map),
-            ..scene()
-        };
+        config.scene.environment.files = vec!["../sky.exr".into()];
+        let scene = scene_under("../sky.exr");
         let written = config.with_files(scene, "out/scene.toml").unwrap();
         let text = toml::to_string(&written).unwrap();
         let read: Scene = toml::from_str(&text).unwrap();
@@ -341,16 +336,8 @@ mod tests {
             backgrounds: ".".into(),
             ..DatasetConfig::default()
         };
-        let map = Environment {
-            file: "sky.exr".into(),
-            rotation_deg: 0.0,
-            strength: 1.0,
-        };
-        let scene = Scene {
-            environment: Some(map),
-            ..scene()
-        };
-        let written = config.with_files(scene, "scene.toml").unwrap();
+        let written = config.with_files(scene_under("sky.exr"), "scene.toml");
+        let written = written.unwrap();
         let older = Scene {
             files: Some(SceneFiles {
                 assets: Some("".into()),
@@ -387,7 +374,7 @@ mod tests {
         for counts in ["scene.settle.attempts=3", "pictures.jpeg_quality=5"] {
             assert!(given(counts).is_ok(), "{counts}");
         }
-        let settings = SceneSettings::from_table("[scene]\ngain_ev = 5\n".parse().unwrap());
+        let settings = SceneSettings("[scene]\ngain_ev = 5\n".parse().unwrap());
         let told = DatasetConfig::from_settings(&settings, &[]).unwrap_err();
         assert_eq!(told.to_string(), format!("settings.{expected}"));
     }
@@ -395,7 +382,7 @@ mod tests {
     #[test]
     fn what_does_nothing_in_a_scene_is_refused() {
         let told = |settings: &str| {
-            let settings = SceneSettings::from_table(settings.parse().unwrap());
+            let settings = SceneSettings(settings.parse().unwrap());
             DatasetConfig::from_settings(&settings, &[])
                 .map_or_else(|e| e.to_string(), |_| "".into())
         };
@@ -419,7 +406,7 @@ mod tests {
         config.labels.formats.push(Format::Mot);
         assert!(config.scene_settings().unwrap().is_empty());
         let older = toml::from_str("[labels]\nformats = [\"mot\"]\nsimplify = 5.0\n").unwrap();
-        let read = DatasetConfig::from_settings(&SceneSettings::from_table(older), &[]).unwrap();
+        let read = DatasetConfig::from_settings(&SceneSettings(older), &[]).unwrap();
         assert_eq!(read.labels.formats, DatasetConfig::default().labels.formats);
         assert_ne!(read.labels, DatasetConfig::default().labels);
     }

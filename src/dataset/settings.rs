@@ -1,12 +1,13 @@
 //! The settings of a recipe, as the template tells them: so that nothing is said twice.
 
+use crate::dataset::folder::field_path;
 use crate::dataset::{DatasetConfig, Preset};
 use crate::io::Override;
 use serde::Serialize;
 use toml::{Table, Value};
 
 /// A table of the template.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SettingGroup {
     /// Its path: `scene.start`; empty for the file's own keys.
     pub table: String,
@@ -31,6 +32,9 @@ pub struct Setting {
     pub ends: Option<[f64; 2]>,
     /// What kinds of values it takes.
     pub takes: Kinds,
+    /// The value as the template shows it.
+    #[serde(skip)]
+    pub(super) shown: &'static str,
 }
 
 /// What kinds of values a setting takes: as many of them as a recipe is read with.
@@ -94,7 +98,7 @@ pub(crate) fn told_value(path: &str) -> Option<&'static str> {
     let generic = of_first_entry(path);
     told_keys()
         .find(|told| told.path == generic)
-        .map(|told| told.value)
+        .map(|told| told.shown)
 }
 
 /// The path with every index 0, as the template has it.
@@ -107,51 +111,32 @@ fn of_first_entry(path: &str) -> String {
     })
 }
 
-/// A key as the template tells it.
-pub(super) struct ToldKey {
-    pub(super) path: String,
-    pub(super) value: &'static str,
-    pub(super) comment: String,
+/// Every key of the template, but for the kinds of values that it takes.
+pub(super) fn told_keys() -> impl Iterator<Item = Setting> {
+    let groups = told_groups().into_iter();
+    groups.flat_map(|group| group.settings)
 }
 
-/// Every key of the template.
-pub(super) fn told_keys() -> impl Iterator<Item = ToldKey> {
-    told_sections().into_iter().flat_map(|section| section.keys)
-}
-
-/// A table of the template, line by line.
-#[derive(Default)]
-struct ToldSection {
-    table: String,
-    docs: String,
-    keys: Vec<ToldKey>,
-}
-
-fn told_sections() -> Vec<ToldSection> {
-    let (mut sections, mut comment) = (vec![ToldSection::default()], String::new());
+/// The groups of the template, line by line.
+fn told_groups() -> Vec<SettingGroup> {
+    let (mut groups, mut comment) = (vec![SettingGroup::default()], String::new());
     for line in DatasetConfig::template().lines() {
-        let here = sections.last_mut().expect("begins with one");
+        let here = groups.last_mut().expect("begins with one");
         if let Some(table) = table_of(line) {
-            let (docs, keys) = (std::mem::take(&mut comment), Vec::new());
-            sections.push(ToldSection { table, docs, keys });
-        } else if let Some(key) = key_and_value(line) {
-            here.add(key, std::mem::take(&mut comment));
+            groups.push(SettingGroup {
+                table,
+                docs: std::mem::take(&mut comment),
+                settings: Vec::new(),
+            });
+        } else if let Some((key, value)) = key_and_value(line) {
+            let path = field_path(&here.table, key);
+            let docs = std::mem::take(&mut comment);
+            here.settings.push(Setting::told(path, value, docs));
         } else {
             comment = continued(&comment, line);
         }
     }
-    sections
-}
-
-impl ToldSection {
-    fn add(&mut self, (key, value): (&str, &'static str), comment: String) {
-        let path = joined(&self.table, key);
-        self.keys.push(ToldKey {
-            path,
-            value,
-            comment,
-        });
-    }
+    groups
 }
 
 /// A comment and its next line; an empty line ends it.
@@ -181,38 +166,6 @@ fn key_and_value(line: &'static str) -> Option<(&'static str, &'static str)> {
     is_key.then_some((key, value))
 }
 
-fn joined(table: &str, key: &str) -> String {
-    if table.is_empty() {
-        key.to_owned()
-    } else {
-        format!("{table}.{key}")
-    }
-}
-
-fn told_groups() -> Vec<SettingGroup> {
-    let sections = told_sections().into_iter();
-    sections
-        .map(|section| SettingGroup {
-            table: section.table,
-            docs: section.docs,
-            settings: section.keys.into_iter().map(Setting::from).collect(),
-        })
-        .collect()
-}
-
-impl From<ToldKey> for Setting {
-    fn from(told: ToldKey) -> Self {
-        Self {
-            is_example: told.comment.contains("no default"),
-            ends: ends(&told.comment),
-            path: told.path,
-            docs: told.comment,
-            value: value_of(told.value),
-            takes: Kinds::default(),
-        }
-    }
-}
-
 fn value_of(text: &str) -> Value {
     let table = format!("value = {text}").parse::<Table>();
     let value = table.ok().and_then(|mut table| table.remove("value"));
@@ -220,7 +173,7 @@ fn value_of(text: &str) -> Value {
 }
 
 /// The ends of the last "A to B" in a comment.
-pub(super) fn ends(comment: &str) -> Option<[f64; 2]> {
+fn ends(comment: &str) -> Option<[f64; 2]> {
     let words: Vec<&str> = comment
         .split_whitespace()
         .map(|word| word.trim_end_matches([',', '.', ';', ':']))
@@ -267,6 +220,19 @@ fn kept(words: &[String], is_kept: impl Fn(&String) -> bool) -> Vec<String> {
 }
 
 impl Setting {
+    /// A key with its value and its comment.
+    fn told(path: String, shown: &'static str, docs: String) -> Self {
+        Self {
+            is_example: docs.contains("no default"),
+            ends: ends(&docs),
+            path,
+            docs,
+            value: value_of(shown),
+            takes: Kinds::default(),
+            shown,
+        }
+    }
+
     /// Two numbers within its ends, whole where there is room, and one between them that is not.
     fn some_numbers(&self) -> [f64; 3] {
         let [low, high] = self.ends.unwrap_or([1.0, 2.0]);

@@ -287,10 +287,6 @@ fn check_first_task(first: u64) -> Result<()> {
     Err(Error::value("SLURM_ARRAY_TASK_MIN", what))
 }
 
-fn are_all_tasks(count: u64, first: u64, last: u64, step: u64) -> bool {
-    count > 0 && last.checked_sub(first) == (count - 1).checked_mul(step)
-}
-
 fn tasks_before(id: u64, first: u64) -> Result<u64> {
     id.checked_sub(first).ok_or_else(|| {
         let what = format!("{id}, expected at least {first}");
@@ -300,7 +296,7 @@ fn tasks_before(id: u64, first: u64) -> Result<u64> {
 
 /// An array with holes makes no whole dataset.
 fn check_all_tasks(count: u64, first: u64, last: u64, step: u64) -> Result<()> {
-    if are_all_tasks(count, first, last, step) {
+    if count > 0 && last.checked_sub(first) == (count - 1).checked_mul(step) {
         return Ok(());
     }
     let what =
@@ -350,32 +346,14 @@ mod tests {
         ] {
             for count in [0, 1, 7, 8, 50] {
                 let wanted: Vec<u64> = (0..count).filter(|&k| numbers.contains(k)).collect();
-                assert_eq!(
-                    numbers.below(count).collect::<Vec<_>>(),
-                    wanted,
-                    "{numbers:?} below {count}"
-                );
-                assert_eq!(
-                    numbers.count_below(count),
-                    wanted.len() as u64,
-                    "{numbers:?} below {count}"
-                );
+                let at = format!("{numbers:?} below {count}");
+                assert_eq!(numbers.count_below(count), wanted.len() as u64, "{at}");
+                assert_eq!(numbers.below(count).collect::<Vec<_>>(), wanted, "{at}");
             }
         }
-        assert_eq!(
-            SampleRange::One(u64::MAX - 1)
-                .below(u64::MAX)
-                .collect::<Vec<_>>(),
-            [u64::MAX - 1]
-        );
-        assert_eq!(
-            SampleRange::Shard(Shard {
-                index: 2,
-                of: u64::MAX
-            })
-            .count_below(u64::MAX),
-            1
-        );
+        let last = SampleRange::One(u64::MAX - 1).below(u64::MAX);
+        assert_eq!(last.collect::<Vec<_>>(), [u64::MAX - 1]);
+        assert_eq!(shard(2, u64::MAX).count_below(u64::MAX), 1);
     }
 
     #[test]
@@ -389,21 +367,12 @@ mod tests {
     #[test]
     fn a_shard_is_given_by_hand() {
         assert_eq!(within("3/8", &[]).unwrap(), "3/8");
-        assert_eq!(
-            within("0/8", &[]).unwrap_err(),
-            "shard: 0/8, expected 1/8 to 8/8"
-        );
-        assert_eq!(
-            within("9/8", &[]).unwrap_err(),
-            "shard: 9/8, expected at most 8/8"
-        );
+        let refused = |text| within(text, &[]).unwrap_err();
+        assert_eq!(refused("0/8"), "shard: 0/8, expected 1/8 to 8/8");
+        assert_eq!(refused("9/8"), "shard: 9/8, expected at most 8/8");
         for wrong in ["3", "3/", "a/b", "auto/x", ""] {
-            assert!(
-                within(wrong, &[])
-                    .unwrap_err()
-                    .contains("expected I/N, auto or auto/N"),
-                "{wrong}"
-            );
+            let expected = "expected I/N, auto or auto/N";
+            assert!(refused(wrong).contains(expected), "{wrong}");
         }
     }
 
@@ -427,16 +396,10 @@ mod tests {
         assert_eq!(array("3", "1", "4", "1", "4").unwrap(), "3/4");
         assert_eq!(array("0", "0", "6", "2", "4").unwrap(), "1/4");
         assert_eq!(array("6", "0", "6", "2", "4").unwrap(), "4/4");
-        assert!(
-            array("7", "0", "7", "1", "3")
-                .unwrap_err()
-                .contains("tasks are missing")
-        );
-        assert!(
-            array("x", "0", "7", "1", "8")
-                .unwrap_err()
-                .contains("\"x\", expected a number")
-        );
+        let holes = array("7", "0", "7", "1", "3").unwrap_err();
+        assert!(holes.contains("tasks are missing"), "{holes}");
+        let wrong = array("x", "0", "7", "1", "8").unwrap_err();
+        assert!(wrong.contains("\"x\", expected a number"), "{wrong}");
     }
 
     #[test]
@@ -470,22 +433,12 @@ mod tests {
         assert_eq!(within("auto/8", &pod).unwrap(), "1/8");
         assert!(within("auto", &pod).unwrap_err().contains("say auto/N"));
         assert!(within("auto/4", &[("JOB_COMPLETION_INDEX", "4")]).is_err());
-        let most = u64::MAX.to_string();
-        assert!(within("auto/4", &[("JOB_COMPLETION_INDEX", &most)]).is_err());
-        assert!(within("auto/4", &[("SLURM_ARRAY_TASK_ID", &most)]).is_err());
         assert!(within("auto", &[]).unwrap_err().contains("none of"));
-        let last = [("JOB_COMPLETION_INDEX", "18446744073709551615")];
-        assert!(
-            within("auto/4", &last)
-                .unwrap_err()
-                .contains("expected at most 4/4")
-        );
-        let last = [("SLURM_ARRAY_TASK_ID", "18446744073709551615")];
-        assert!(
-            within("auto/4", &last)
-                .unwrap_err()
-                .contains("expected at most 4/4")
-        );
+        let most = u64::MAX.to_string();
+        for variable in ["JOB_COMPLETION_INDEX", "SLURM_ARRAY_TASK_ID"] {
+            let refused = within("auto/4", &[(variable, &most)]).unwrap_err();
+            assert!(refused.contains("expected at most 4/4"), "{refused}");
+        }
     }
 
     #[test]

@@ -72,7 +72,6 @@ impl SampleRecord {
     /// Everything known of an entry.
     fn new(entry: &Entry<'_>, provenance: &Provenance) -> Self {
         let labels = &entry.sample.labels;
-
         Self {
             petcomp: env!("CARGO_PKG_VERSION").to_owned(),
             recipe_hash: entry.recipe_hash.to_owned(),
@@ -90,9 +89,7 @@ impl SampleRecord {
             scene: provenance.scene.clone(),
         }
     }
-}
 
-impl SampleRecord {
     /// With the classes and boxes that objects are labelled with: the `amodal_box` of one with a
     /// label is its label's, whatever that is around. Those that are to be ignored, or have no such
     /// box, are among the objects without a label.

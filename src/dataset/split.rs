@@ -128,33 +128,31 @@ mod tests {
         }
     }
 
-    fn count(split: Split, n: u64) -> usize {
-        (0..n).filter(|&k| split.part(k, n) == Part::Val).count()
+    fn val_of(split: Split, n: u64) -> Vec<u64> {
+        let val = (0..n).filter(|&k| split.part(k, n) == Part::Val);
+        val.collect()
+    }
+
+    /// So many percent for validation, of so many samples.
+    fn count(val_percent: u8, order: SplitOrder, n: u64) -> usize {
+        let split = Split {
+            val_percent,
+            order,
+            ..Split::default()
+        };
+        val_of(split, n).len()
     }
 
     #[test]
     fn five_thousand_samples_give_four_thousand_to_train_on() {
         for order in [SplitOrder::Interleaved, SplitOrder::Consecutive] {
-            assert_eq!(
-                count(
-                    Split {
-                        val_percent: 20,
-                        order,
-                        ..Split::default()
-                    },
-                    5000
-                ),
-                1000
-            );
+            assert_eq!(count(20, order, 5000), 1000);
         }
     }
 
     #[test]
     fn every_fifth_sample_is_for_validation() {
-        let val: Vec<_> = (0..20)
-            .filter(|&k| Split::default().part(k, 20) == Part::Val)
-            .collect();
-        assert_eq!(val, [0, 5, 10, 15]);
+        assert_eq!(val_of(Split::default(), 20), [0, 5, 10, 15]);
     }
 
     #[test]
@@ -163,49 +161,22 @@ mod tests {
             sequence: 4,
             ..Split::default()
         };
-        let val: Vec<_> = (0..40)
-            .filter(|&k| split.part(k, 40) == Part::Val)
-            .collect();
-        assert_eq!(val, [0, 1, 2, 3, 20, 21, 22, 23]);
+        assert_eq!(val_of(split, 40), [0, 1, 2, 3, 20, 21, 22, 23]);
     }
 
     #[test]
     fn a_consecutive_split_cuts_once_and_like_the_paper() {
         let split = Split {
-            val_percent: 20,
             order: SplitOrder::Consecutive,
             ..Split::default()
         };
-        let parts: Vec<_> = (0..2031).map(|k| split.part(k, 2031)).collect();
-        assert_eq!(parts.iter().filter(|&&p| p == Part::Val).count(), 407);
-        assert!(parts.is_sorted_by_key(|p| p.name()));
+        assert!(val_of(split, 2031).into_iter().eq(2031 - 407..2031));
     }
 
     #[test]
     fn none_or_all_may_be_for_validation() {
         for order in [SplitOrder::Interleaved, SplitOrder::Consecutive] {
-            assert_eq!(
-                count(
-                    Split {
-                        val_percent: 0,
-                        order,
-                        ..Split::default()
-                    },
-                    7
-                ),
-                0
-            );
-            assert_eq!(
-                count(
-                    Split {
-                        val_percent: 100,
-                        order,
-                        ..Split::default()
-                    },
-                    7
-                ),
-                7
-            );
+            assert_eq!([0, 100].map(|percent| count(percent, order, 7)), [0, 7]);
         }
     }
 }

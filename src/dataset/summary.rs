@@ -137,7 +137,8 @@ impl Summary {
     pub fn read(folder: &Path) -> Result<Self> {
         let mut summary = Self::empty(folder)?;
         let lines = lines_of(folder)?;
-        summary.images = Part::ALL.map(|part| count_in_part(&lines, part));
+        summary.images =
+            Part::ALL.map(|part| lines.iter().filter(|line| line.part == part).count());
         let labelling = Labelling::of_identity(&summary.identity);
         // In batches, so that no more records are in memory than threads can read at a time.
         for batch in lines.chunks(RECORDS_PER_BATCH) {
@@ -302,14 +303,18 @@ impl SampleSummary {
             files,
         } = sample;
         let labelled = labelled_objects(&record);
+        let visible = labelled.iter().map(|object| object.visible_fraction);
+        let labels = labelled
+            .iter()
+            .map(|object| (object.class, object.amodal_box));
         Self {
             index: k,
             part,
             files,
             image: record.labels.image,
             objects: record.labels.objects.len(),
-            labels: boxes_of(&labelled),
-            least_visible: least_visible(&labelled),
+            labels: labels.collect(),
+            least_visible: visible.fold(1.0, f64::min),
             rejected: record.rejected.len(),
         }
     }
@@ -332,7 +337,10 @@ impl ReadSample {
             k: line.k,
             part: line.part,
             record: record.into_labelled(labelling),
-            files: own_files(folder, line)?,
+            files: [
+                line.file_name(folder, "images/")?.to_owned(),
+                line.file_name(folder, "scenes/")?.to_owned(),
+            ],
         })
     }
 }
@@ -368,10 +376,6 @@ fn labelled_objects(record: &SampleRecord) -> Vec<&ObjectLabel> {
         .collect()
 }
 
-fn count_in_part(lines: &[JournalLine], part: Part) -> usize {
-    lines.iter().filter(|line| line.part == part).count()
-}
-
 /// The first and the last of ascending numbers.
 fn ends_of(numbers: &[Value]) -> Option<[f64; 2]> {
     Some([numbers.first()?.as_f64()?, numbers.last()?.as_f64()?])
@@ -380,18 +384,6 @@ fn ends_of(numbers: &[Value]) -> Option<[f64; 2]> {
 /// `/objects/2/hue` of `objects[2].hue`.
 fn json_pointer(key: &str) -> String {
     format!("/{}", key.replace(['.', '['], "/").replace(']', ""))
-}
-
-fn boxes_of(objects: &[&ObjectLabel]) -> Vec<(u32, BBox)> {
-    let boxes = objects.iter();
-    boxes
-        .map(|object| (object.class, object.amodal_box))
-        .collect()
-}
-
-fn least_visible(objects: &[&ObjectLabel]) -> f64 {
-    let visible = objects.iter().map(|object| object.visible_fraction);
-    visible.fold(1.0, f64::min)
 }
 
 fn read_samples(
@@ -403,12 +395,6 @@ fn read_samples(
         .par_iter()
         .map(|line| ReadSample::read(folder, line, labelling))
         .collect()
-}
-
-/// Picture and record of a sample.
-fn own_files(folder: &Path, line: &JournalLine) -> Result<[String; 2]> {
-    let picture = line.file_name(folder, "images/")?.to_owned();
-    Ok([picture, line.file_name(folder, "scenes/")?.to_owned()])
 }
 
 #[cfg(test)]

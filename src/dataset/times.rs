@@ -85,10 +85,7 @@ impl RunTimes {
 /// The runs that wrote a folder.
 pub(crate) fn runs_of(folder: &Path) -> Vec<RunTimes> {
     let text = io::inside(folder, RUNS).and_then(io::read_text);
-    parse_runs(&text.unwrap_or_default())
-}
-
-fn parse_runs(text: &str) -> Vec<RunTimes> {
+    let text = text.unwrap_or_default();
     let lines = text.lines().map(serde_json::from_str);
     lines.filter_map(|line| line.ok()).collect()
 }

@@ -87,13 +87,14 @@ impl Voc {
         if b.is_empty() {
             return String::new();
         }
-        let name = class_name(entry, label.class);
+        let name = escaped(&entry.class_name(label.class));
         let claims = [
             ("truncated", is_truncated(label.object, &b, entry)),
             ("difficult", label.ignored),
             ("occluded", !label.object.is_topmost()),
         ];
-        let (claims, sides) = (claims.map(claim_element).concat(), side_elements(&b));
+        let claims = claims.map(claim_element).concat();
+        let sides = pixels(&b).map(side_element).concat();
         format!(
             "  <object>\n    <name>{name}</name>\n    <pose>Unspecified</pose>\n{claims}    <bndbox>\n{sides}    </bndbox>\n  \
              </object>\n"
@@ -104,34 +105,19 @@ impl Voc {
 /// The first and last pixels that a box touches, counted from 1.
 fn pixels(b: &BBox) -> [(&'static str, u64); 4] {
     [
-        ("xmin", first_pixel(b.x0)),
-        ("ymin", first_pixel(b.y0)),
-        ("xmax", last_pixel(b.x1)),
-        ("ymax", last_pixel(b.y1)),
+        ("xmin", libm::floor(b.x0) as u64 + 1),
+        ("ymin", libm::floor(b.y0) as u64 + 1),
+        ("xmax", libm::ceil(b.x1) as u64),
+        ("ymax", libm::ceil(b.y1) as u64),
     ]
-}
-
-fn first_pixel(edge: f64) -> u64 {
-    libm::floor(edge) as u64 + 1
-}
-
-fn last_pixel(edge: f64) -> u64 {
-    libm::ceil(edge) as u64
-}
-
-fn class_name(entry: &Entry<'_>, class: u32) -> String {
-    let name = entry.classes.get(class as usize);
-    name.map_or_else(|| class.to_string(), |name| escaped(name))
 }
 
 fn claim_element((claim, is_so): (&str, bool)) -> String {
     format!("    <{claim}>{}</{claim}>\n", u8::from(is_so))
 }
 
-fn side_elements(b: &BBox) -> String {
-    pixels(b)
-        .map(|(side, at)| format!("      <{side}>{at}</{side}>\n"))
-        .concat()
+fn side_element((side, at): (&str, u64)) -> String {
+    format!("      <{side}>{at}</{side}>\n")
 }
 
 /// By its outline, where that was measured.

@@ -1,11 +1,11 @@
 //! Labels for YOLO: one text file per image, one line per object, and `data.yaml`.
 
 use crate::dataset::formats::is_exact;
+use crate::dataset::page::labelled_pictures::shares_of;
 use crate::dataset::paths::create_part_folders;
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::dataset::{Entry, Extent, LabelledObject, Writer};
 use crate::error::{Error, Result};
-use crate::geom::BBox;
 use crate::geom::Point2;
 use crate::io;
 use crate::label::{ObjectLabel, trace};
@@ -119,18 +119,10 @@ impl Yolo {
     ) -> Option<String> {
         let (chosen, mask) = self.boxes.of(object);
         self.has_label_of(object).then(|| match self.task {
-            YoloTask::Detect => box_row(class, &chosen, image),
+            YoloTask::Detect => row(class, shares_of(&chosen, image)),
             YoloTask::Segment => ring_row(class, &trace::polygon(mask, self.simplify), image),
         })
     }
-}
-
-fn box_row(class: u32, b: &BBox, [w, h]: [f64; 2]) -> String {
-    let center = b.center();
-    row(
-        class,
-        [center.x / w, center.y / h, b.width() / w, b.height() / h],
-    )
 }
 
 fn ring_row(class: u32, ring: &[Point2<f64>], [w, h]: [f64; 2]) -> String {

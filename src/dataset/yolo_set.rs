@@ -37,9 +37,9 @@ impl YoloSet {
         let yaml = read_yaml(&folder)?;
         let root = yaml.root(&folder);
         let [train, val] = Part::ALL.map(|part| images_of(&root, yaml.folders(part)));
-        let test = yaml.test().iter().map(|place| place_of(&root, place));
+        let test = yaml.test.iter().map(|place| place_of(&root, place));
         Ok(Self {
-            classes: yaml.names().to_vec(),
+            classes: yaml.names,
             train: train?,
             val: val?,
             test: test.collect(),
@@ -55,7 +55,7 @@ impl YoloSet {
         let yaml = read_yaml(&folder)?;
         let root = yaml.root(&folder);
         let parts = Part::ALL.map(|part| yaml.folders(part));
-        let places = parts.into_iter().flatten().chain(yaml.test());
+        let places = parts.into_iter().flatten().chain(&yaml.test);
         let places = places.map(|place| place_of(&root, place));
         let lists = places.filter(|place| is_list(place));
         Ok(lists.chain([folder.join("data.yaml")]).collect())
@@ -138,7 +138,10 @@ impl YoloSet {
     /// # Errors
     /// A share that is not in `0..=1`.
     pub fn head(&self, share: f64) -> Result<Self> {
-        check_share(share)?;
+        if !(0.0..=1.0).contains(&share) {
+            let what = format!("{share}, expected a share, 0 to 1");
+            return Err(Error::value("head", what));
+        }
         Ok(self.with_parts([&self.train, &self.val].map(|images| first_share(images, share))))
     }
 
@@ -230,14 +233,6 @@ fn compare_names(a: &Path, b: &Path) -> Ordering {
     let [key_a, key_b] = [a, b].map(|path| io::natural_key(path.file_name().unwrap_or_default()));
     let natural = key_a.cmp(key_b);
     natural.then_with(|| (a.file_name(), a).cmp(&(b.file_name(), b)))
-}
-
-fn check_share(share: f64) -> Result<()> {
-    if (0.0..=1.0).contains(&share) {
-        return Ok(());
-    }
-    let what = format!("{share}, expected a share, 0 to 1");
-    Err(Error::value("head", what))
 }
 
 fn first_share(images: &[PathBuf], share: f64) -> Vec<PathBuf> {

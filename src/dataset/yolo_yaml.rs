@@ -15,9 +15,11 @@ pub(crate) struct DataYaml {
     path: Option<String>,
     train: Vec<String>,
     val: Vec<String>,
-    test: Vec<String>,
+    /// The folders (or lists) of images to test with, below the dataset's; often none.
+    pub(crate) test: Vec<String>,
     nc: Option<usize>,
-    names: Vec<String>,
+    /// Names of the classes, in order.
+    pub(crate) names: Vec<String>,
     /// Numbers of the keypoints in a label.
     keypoint_numbers: usize,
 }
@@ -43,11 +45,6 @@ impl DataYaml {
         }
     }
 
-    /// The folders (or lists) of images to test with, below the dataset's; often none.
-    pub(crate) fn test(&self) -> &[String] {
-        &self.test
-    }
-
     /// Where the folders of the parts are, for a file in `folder`.
     pub(crate) fn root(&self, folder: &Path) -> PathBuf {
         self.path
@@ -59,11 +56,6 @@ impl DataYaml {
     /// without names.
     pub(crate) fn class_count(&self) -> Option<usize> {
         Some(self.names.len()).filter(|&n| n > 0)
-    }
-
-    /// Names of the classes, in order.
-    pub(crate) fn names(&self) -> &[String] {
-        &self.names
     }
 
     /// The text of a `data.yaml` for our folders.
@@ -114,11 +106,10 @@ impl DataYaml {
     /// without it.
     pub(crate) fn read_keypoint_numbers(text: &str) -> Result<usize, Problem> {
         let (yaml, problems) = Self::read_given(text);
-        let of_shape = |what: &str| what.starts_with("kpt_shape: ") && what != KEYPOINTS;
-        match problems
+        let mut of_shape = problems
             .into_iter()
-            .find(|(_, what)| of_shape(what.as_str()))
-        {
+            .filter(|(_, what)| what.starts_with("kpt_shape: ") && what != KEYPOINTS);
+        match of_shape.next() {
             Some(problem) => Err(problem),
             None => Ok(yaml.keypoint_numbers),
         }
@@ -186,7 +177,9 @@ impl DataYaml {
     }
 
     fn missing(&self) -> Vec<String> {
-        self.missing_parts()
+        let parts = Part::ALL.into_iter();
+        parts
+            .filter(|&part| self.folders(part).is_empty())
             .map(|part| format!("no {}:, which trainers require", part.name()))
             .chain(self.names_problem())
             .collect()
@@ -197,17 +190,8 @@ impl DataYaml {
         if count == 0 {
             return Some("no names, expected one for each class".into());
         }
-        self.count_problem(count)
-    }
-
-    fn count_problem(&self, count: usize) -> Option<String> {
         let nc = self.nc.filter(|&nc| nc != count)?;
         Some(format!("nc: {nc}, but there are {count} names"))
-    }
-
-    fn missing_parts(&self) -> impl Iterator<Item = Part> {
-        let parts = Part::ALL.into_iter();
-        parts.filter(move |&part| self.folders(part).is_empty())
     }
 }
 
@@ -268,6 +252,9 @@ impl Value {
         }
     }
 }
+
+/// Plain texts that stand for nothing.
+const NULLS: [&str; 5] = ["", "~", "null", "Null", "NULL"];
 
 /// Deeper documents are refused: a parser's work grows with the square of the depth.
 const MAX_DEPTH: usize = 64;
@@ -350,14 +337,9 @@ impl<'a> Reader<'a> {
 
     fn alias(&mut self, anchor: usize) -> Result<Value, Problem> {
         let value = self.anchors.get(&anchor).cloned().unwrap_or(Value::Other);
-        self.spend_alias_budget(value.bytes())?;
-        Ok(value)
-    }
-
-    fn spend_alias_budget(&mut self, bytes: usize) -> Result<(), Problem> {
-        let left = self.alias_budget.checked_sub(bytes);
+        let left = self.alias_budget.checked_sub(value.bytes());
         self.alias_budget = left.ok_or((None, "aliases repeat too much text".into()))?;
-        Ok(())
+        Ok(value)
     }
 
     /// The rest of a list; one of other things than texts is [`Value::Other`].
@@ -447,13 +429,9 @@ pub(crate) fn yaml_names(classes: &[String]) -> String {
 
 fn scalar(text: &str, style: ScalarStyle) -> Value {
     match style {
-        ScalarStyle::Plain if is_null(text) => Value::Null,
+        ScalarStyle::Plain if NULLS.contains(&text) => Value::Null,
         _ => Value::Text(text.to_owned()),
     }
-}
-
-fn is_null(text: &str) -> bool {
-    matches!(text, "" | "~" | "null" | "Null" | "NULL")
 }
 
 fn not_yaml(error: &ScanError) -> Problem {

@@ -117,21 +117,17 @@ fn displayed(image: &Image<LinearRgb>) -> Image<[f32; 3]> {
     image.map(|c| <[f32; 3]>::from(c).map(|v| linear_to_srgb(v.clamp(0.0, 1.0))))
 }
 
-impl Likeness {
-    fn write_ssim(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.ssim {
-            Some(ssim) => write!(f, "= {ssim:.6}"),
-            None => write!(f, "needs 11 x 11 pixels"),
-        }
-    }
-}
-
 impl fmt::Display for Likeness {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { rmse, bias, .. } = self;
-        write!(f, "RMSE = {rmse:.6}, bias = {bias:+.7}, SSIM ")?;
-        self.write_ssim(f)?;
-        write!(f, ", FLIP = {:.6}", self.flip)
+        let (rmse, bias, flip) = (self.rmse, self.bias, self.flip);
+        let ssim = match self.ssim {
+            Some(ssim) => format!("= {ssim:.6}"),
+            None => "needs 11 x 11 pixels".into(),
+        };
+        write!(
+            f,
+            "RMSE = {rmse:.6}, bias = {bias:+.7}, SSIM {ssim}, FLIP = {flip:.6}"
+        )
     }
 }
 

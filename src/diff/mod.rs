@@ -28,7 +28,7 @@ pub use report::Comparison;
 pub use report::{Largest, Verdict};
 pub use ssim::ssim;
 #[doc(hidden)]
-pub use view::{absolute_difference, difference, triple};
+pub use view::{absolute_difference, triple};
 
 use crate::pixel::{Coverage, Depth, LinearRgb, PremulRgba, StraightRgba};
 use bands::bands;
@@ -134,11 +134,8 @@ pub fn compare<P: NamedChannels>(
         rows.map(|(y, i)| compare_rows(a.row(i), b.row(i), y, thresholds))
             .collect::<Vec<DifferenceTally>>()
     });
-    Comparison::new::<P>(
-        tallies.fold(DifferenceTally::default(), DifferenceTally::then),
-        width * height,
-        thresholds,
-    )
+    let tally = tallies.fold(DifferenceTally::default(), DifferenceTally::then);
+    Comparison::new(tally, P::NAMES, width * height, thresholds)
 }
 
 fn compare_rows<P: NamedChannels>(

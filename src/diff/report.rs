@@ -1,6 +1,6 @@
 //! What a comparison found, and its verdict.
 
-use super::{NamedChannels, Thresholds, is_same};
+use super::{Thresholds, is_same};
 use std::fmt;
 
 /// The outcome of a comparison.
@@ -82,22 +82,14 @@ pub struct Largest {
 impl Comparison {
     /// Of pictures that differ in size.
     pub(super) fn incomparable() -> Self {
-        let nothing = Self::from_tally(DifferenceTally::default(), &[], 0, &Thresholds::default());
+        let nothing = Self::new(DifferenceTally::default(), &[], 0, &Thresholds::default());
         Self {
             verdict: Verdict::Incomparable,
             ..nothing
         }
     }
 
-    pub(super) fn new<P: NamedChannels>(
-        tally: DifferenceTally,
-        pixels: usize,
-        thresholds: &Thresholds,
-    ) -> Self {
-        Self::from_tally(tally, P::NAMES, pixels, thresholds)
-    }
-
-    fn from_tally(
+    pub(super) fn new(
         tally: DifferenceTally,
         names: &[&'static str],
         pixels: usize,

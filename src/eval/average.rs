@@ -71,20 +71,11 @@ pub(super) fn recall_and_precision(
     truths: f64,
     epsilon: [f64; 2],
 ) -> (Vec<f64>, Vec<f64>) {
-    (
-        recalls(sums, truths + epsilon[0]),
-        precisions(sums, epsilon[1]),
-    )
-}
-
-fn recalls(sums: &Running, truths: f64) -> Vec<f64> {
-    sums.right.iter().map(|right| right / truths).collect()
-}
-
-fn precisions(sums: &Running, epsilon: f64) -> Vec<f64> {
+    let truths = truths + epsilon[0];
+    let recalls = sums.right.iter().map(|right| right / truths);
     let both = sums.right.iter().zip(&sums.wrong);
-    both.map(|(right, wrong)| right / (right + wrong + epsilon))
-        .collect()
+    let precisions = both.map(|(right, wrong)| right / (right + wrong + epsilon[1]));
+    (recalls.collect(), precisions.collect())
 }
 
 /// Piecewise linear reading as NumPy's `interp` does it; the last of equal positions counts.

@@ -49,46 +49,31 @@ impl<'a> ImageBoxes<'a> {
     }
 }
 
-/// The places of all boxes that have these classes, image by image.
-fn places<'a, C: Iterator<Item = u32>>(
-    sheets: &'a [EvalImage],
-    classes: impl Fn(&'a EvalImage) -> C,
-) -> Vec<BoxPlace> {
-    let numbered = sheets.iter().enumerate();
-    numbered
-        .flat_map(|(sheet, boxes)| places_on(sheet, classes(boxes)))
-        .collect()
-}
-
-fn places_on(sheet: usize, classes: impl Iterator<Item = u32>) -> impl Iterator<Item = BoxPlace> {
-    let numbered = classes.enumerate();
-    numbered.map(move |(index, class)| BoxPlace {
-        class,
-        sheet,
-        index,
-    })
-}
-
-fn truth_places(sheets: &[EvalImage]) -> Vec<BoxPlace> {
-    let mut truth = places(sheets, |sheet| sheet.truth.iter().map(|t| t.class));
-    // It keeps the order of equal ones.
-    truth.par_sort_by_key(|p| p.class);
-    truth
-}
-
-fn found_places(sheets: &[EvalImage]) -> Vec<BoxPlace> {
-    let mut found = places(sheets, |sheet| sheet.found.iter().map(|f| f.class));
-    // It keeps the order of equal ones.
-    found.par_sort_by(|a, b| a.cmp_detections(b, sheets));
-    found
+/// The places of boxes of these classes, given image by image.
+fn places(sheets: impl Iterator<Item: Iterator<Item = u32>>) -> Vec<BoxPlace> {
+    let mut places = Vec::new();
+    for (sheet, classes) in sheets.enumerate() {
+        places.extend(classes.enumerate().map(|(index, class)| BoxPlace {
+            class,
+            sheet,
+            index,
+        }));
+    }
+    places
 }
 
 impl<'a> ByClass<'a> {
     pub(super) fn new(sheets: &'a [EvalImage]) -> Self {
+        let truth = sheets.iter().map(|s| s.truth.iter().map(|t| t.class));
+        let found = sheets.iter().map(|s| s.found.iter().map(|f| f.class));
+        let (mut truth, mut found) = (places(truth), places(found));
+        // Both sorts keep the order of equal ones.
+        truth.par_sort_by_key(|p| p.class);
+        found.par_sort_by(|a, b| a.cmp_detections(b, sheets));
         Self {
             sheets,
-            truth: truth_places(sheets),
-            found: found_places(sheets),
+            truth,
+            found,
         }
     }
 

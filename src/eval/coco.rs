@@ -19,9 +19,8 @@ const PRECISION_EPSILON: f64 = f64::EPSILON;
 const MAX_THRESHOLD: f64 = 1.0 - 1e-10;
 
 /// Objects of which size are looked for; the others are ignored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum AreaRange {
+#[derive(Clone, Copy)]
+pub(super) enum AreaRange {
     /// Of any size.
     All,
     /// Up to 32 x 32 pixels.
@@ -48,19 +47,15 @@ pub struct CocoScores {
 impl AreaRange {
     const ALL: [Self; 4] = [Self::All, Self::Small, Self::Medium, Self::Large];
 
-    /// Least and greatest area, square pixels, both included.
-    pub fn limits(self) -> [f64; 2] {
-        match self {
-            Self::All => [0.0, 1e10],
-            Self::Small => [0.0, 1024.0],
-            Self::Medium => [1024.0, 9216.0],
-            Self::Large => [9216.0, 1e10],
-        }
-    }
-
+    /// Whether it takes an area, square pixels; both limits are included.
     fn holds(self, area: f64) -> bool {
-        let [low, high] = self.limits();
-        (low..=high).contains(&area)
+        let limits = match self {
+            Self::All => 0.0..=1e10,
+            Self::Small => 0.0..=1024.0,
+            Self::Medium => 1024.0..=9216.0,
+            Self::Large => 9216.0..=1e10,
+        };
+        limits.contains(&area)
     }
 }
 
@@ -338,30 +333,19 @@ fn curves_at_thresholds(
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{bbox, found, sheet, there};
+    use super::super::tests::{bbox, crowd, found, sheet, there};
     use super::*;
 
     #[test]
     fn a_crowd_is_neither_found_nor_missed() {
-        let (b, crowd) = (bbox(0.0, 0.0, 40.0, 40.0), bbox(100.0, 0.0, 200.0, 200.0));
-        let in_crowd = [
+        let b = bbox(0.0, 0.0, 40.0, 40.0);
+        let truth = vec![there(0, b), crowd(0, bbox(100.0, 0.0, 200.0, 200.0))];
+        let seen = vec![
+            found(0, b, 0.5),
             found(0, bbox(110.0, 10.0, 30.0, 30.0), 0.9),
             found(0, bbox(150.0, 10.0, 30.0, 30.0), 0.8),
         ];
-        let truth = vec![
-            there(0, b),
-            GroundTruth {
-                crowd: true,
-                ..there(0, crowd)
-            },
-        ];
-        let scores = coco(
-            &[sheet(
-                truth,
-                [vec![found(0, b, 0.5)], in_crowd.to_vec()].concat(),
-            )],
-            &[],
-        );
+        let scores = coco(&[sheet(truth, seen)], &[]);
         assert!((scores.scores.map() - 1.0).abs() < 1e-12);
         assert_eq!(scores.scores.classes[0].truths, 1);
     }
@@ -369,13 +353,8 @@ mod tests {
     #[test]
     fn sizes_are_scored_apart() {
         let (small, large) = (bbox(0.0, 0.0, 20.0, 20.0), bbox(100.0, 100.0, 200.0, 200.0));
-        let scores = coco(
-            &[sheet(
-                vec![there(0, small), there(0, large)],
-                vec![found(0, large, 0.5)],
-            )],
-            &[],
-        );
+        let truth = vec![there(0, small), there(0, large)];
+        let scores = coco(&[sheet(truth, vec![found(0, large, 0.5)])], &[]);
         let whole = |v: Option<f64>| v.map(|v| (v * 1e12).round() / 1e12);
         assert_eq!(scores.ap_by_area.map(whole), [Some(0.0), None, Some(1.0)]);
         assert_eq!(scores.ar_by_area, [Some(0.0), None, Some(1.0)]);
@@ -385,13 +364,8 @@ mod tests {
     fn more_than_a_hundred_detections_do_not_count() {
         let b = bbox(0.0, 0.0, 20.0, 20.0);
         let noise = (0..100).map(|i| found(0, bbox(100.0 + f64::from(i), 50.0, 9.0, 9.0), 0.9));
-        let scores = coco(
-            &[sheet(
-                vec![there(0, b)],
-                noise.chain([found(0, b, 0.1)]).collect(),
-            )],
-            &[],
-        );
+        let seen = noise.chain([found(0, b, 0.1)]).collect();
+        let scores = coco(&[sheet(vec![there(0, b)], seen)], &[]);
         assert_eq!(
             (scores.scores.map(), scores.ar_by_count),
             (0.0, [Some(0.0); 3])

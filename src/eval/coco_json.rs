@@ -89,7 +89,6 @@ pub fn read_coco_results(path: &Path, truth: &mut CocoTruth) -> Result<()> {
 
 /// What documents of truth and of detections give, for the fuzzers.
 #[cfg(feature = "fuzzing")]
-#[cfg(feature = "fuzzing")]
 pub(crate) fn sheets_of(truth: &str, found: &str) -> Result<Vec<EvalImage>> {
     let mut truth = CocoTruth::new(&io::parse_json(truth)?)?;
     truth.add(&io::parse_json::<Vec<CocoDetection>>(found)?)?;
@@ -99,31 +98,28 @@ pub(crate) fn sheets_of(truth: &str, found: &str) -> Result<Vec<EvalImage>> {
 impl CocoTruth {
     fn new(document: &CocoDocument) -> Result<Self> {
         let mut truth = Self::without_annotations(document)?;
-        truth.add_annotations(&document.annotations)?;
+        for (i, annotation) in document.annotations.iter().enumerate() {
+            truth
+                .add_annotation(annotation)
+                .map_err(|e| e.within(&format!("annotations[{i}]")))?;
+        }
         Ok(truth)
     }
 
     fn without_annotations(document: &CocoDocument) -> Result<Self> {
-        let images = document.image_places()?;
-        let categories = document.category_places()?;
-        let records = document.images_at(images.values());
+        let images = places("images", document.images.iter().map(|image| image.id))?;
+        let categories = places("categories", document.categories.iter().map(|c| c.id))?;
+        let records: Vec<_> = images.values().map(|&i| &document.images[i]).collect();
         let names = sheet_names(&records).into_iter();
         let sheets = names.zip(&records).map(|(name, image)| image.sheet(name));
+        let classes = categories.values().map(|&i| &document.categories[i].name);
         Ok(Self {
             sheets: sheets.collect(),
-            classes: document.category_names(categories.values()),
+            classes: classes.cloned().collect(),
             files: records.iter().map(|image| image.file()).collect(),
             images: images.keys().copied().zip(0..).collect(),
             categories: categories.into_keys().zip(0..).collect(),
         })
-    }
-
-    fn add_annotations(&mut self, annotations: &[CocoAnnotation]) -> Result<()> {
-        for (i, annotation) in annotations.iter().enumerate() {
-            self.add_annotation(annotation)
-                .map_err(|e| e.within(&format!("annotations[{i}]")))?;
-        }
-        Ok(())
     }
 
     fn add_annotation(&mut self, annotation: &CocoAnnotation) -> Result<()> {
@@ -148,15 +144,9 @@ impl CocoTruth {
 
     /// The sheet of an image, and the class of a category.
     fn sheet_mut(&mut self, image: i64, category: i64) -> Result<(&mut EvalImage, u32)> {
-        let (place, class) = self.place(image, category)?;
+        let place = look_up(&self.images, "image_id", image)?;
+        let class = look_up(&self.categories, "category_id", category)?;
         Ok((&mut self.sheets[place], class))
-    }
-
-    fn place(&self, image: i64, category: i64) -> Result<(usize, u32)> {
-        Ok((
-            look_up(&self.images, "image_id", image)?,
-            look_up(&self.categories, "category_id", category)?,
-        ))
     }
 
     /// Where the images are: in `folder`, or where COCO and petcomp have them for a document at
@@ -210,14 +200,10 @@ fn find_picture(roots: &[PathBuf], name: &str, size: Option<[f64; 2]>) -> Option
     if !is_below(name) {
         return None;
     }
-    let path = existing_file(roots, name)?;
+    let mut paths = roots.iter().map(|root| root.join(name));
+    let path = paths.find(|path| path.is_file())?;
     let size = size.or_else(|| stored_size(&path))?;
     Some(Picture { path, size })
-}
-
-fn existing_file(roots: &[PathBuf], name: &str) -> Option<PathBuf> {
-    let mut paths = roots.iter().map(|root| root.join(name));
-    paths.find(|path| path.is_file())
 }
 
 /// A path that stays below the folder that it is joined to.
@@ -229,10 +215,6 @@ fn is_below(name: &str) -> bool {
 fn stored_size(path: &Path) -> Option<[f64; 2]> {
     let header = io::read_header(path).ok()?;
     Some([header.width as f64, header.height as f64])
-}
-
-fn unlisted(at: &str, id: i64) -> Error {
-    Error::value(at, format!("{id}, expected one that the truth lists"))
 }
 
 /// Places in the document by id, in order of the ids.
@@ -252,7 +234,8 @@ fn repeated_id(list: &str, i: usize, id: i64, first: usize) -> Error {
 }
 
 fn look_up<T: Copy>(places: &BTreeMap<i64, T>, field: &str, id: i64) -> Result<T> {
-    places.get(&id).copied().ok_or_else(|| unlisted(field, id))
+    let place = places.get(&id).copied();
+    place.ok_or_else(|| Error::value(field, format!("{id}, expected one that the truth lists")))
 }
 
 impl ImageRecord {
@@ -372,24 +355,6 @@ impl CocoDetection {
             box_area: area_of(self.bbox),
             confidence: self.score,
         })
-    }
-}
-
-impl CocoDocument {
-    fn category_names<'a>(&self, places: impl Iterator<Item = &'a usize>) -> Vec<String> {
-        places.map(|&i| self.categories[i].name.clone()).collect()
-    }
-
-    fn images_at<'a>(&self, places: impl Iterator<Item = &'a usize>) -> Vec<&ImageRecord> {
-        places.map(|&i| &self.images[i]).collect()
-    }
-
-    fn image_places(&self) -> Result<BTreeMap<i64, usize>> {
-        places("images", self.images.iter().map(|image| image.id))
-    }
-
-    fn category_places(&self) -> Result<BTreeMap<i64, usize>> {
-        places("categories", self.categories.iter().map(|c| c.id))
     }
 }
 

@@ -1,9 +1,8 @@
 //! Curves over confidence and over recall, at threshold 0.5.
 
 use super::average::{self, RECALL_POINTS};
-use super::rank::Ranking;
 use super::yolov5::{self, CONFIDENCE_STEPS, Ranked, best_confidence, confidence};
-use super::{Definition, EvalImage, Matches, mean};
+use super::{EvalImage, mean};
 
 /// Curves of every class that occurs in the truth.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,11 +24,8 @@ pub struct Curves {
 /// Precision over recall, and F1 over confidence, at intersection over union 0.5, matched as by
 /// [`yolov5`](super::yolov5()).
 pub fn curves(sheets: &[EvalImage]) -> Curves {
-    Matches::new(sheets, Definition::Yolov5).curves()
-}
-
-pub(super) fn from_rankings(rankings: &[Ranking]) -> Curves {
-    let ranked = yolov5::ranked(rankings, &[]);
+    let rankings = yolov5::rankings(sheets);
+    let ranked = yolov5::ranked(&rankings, &[]);
     let f1: Vec<_> = ranked.iter().map(f1).collect();
     Curves {
         mean_precision: mean_precision(&ranked),

@@ -3,7 +3,7 @@
 use super::by_class::ByClass;
 use super::coco::{self, AreaRange};
 use super::rank::Ranking;
-use super::{Curves, Definition, EvalImage, Scores, check_weights, curve, mean, yolov5};
+use super::{Definition, EvalImage, Scores, check_weights, mean, yolov5};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -47,7 +47,7 @@ impl Matches {
     /// # Panics
     /// When there are weights and not one per image.
     pub fn scores(&self, weights: &[u32]) -> Scores {
-        self.check(weights);
+        check_weights(weights, self.images());
         match self.definition {
             Definition::Yolov5 => yolov5::scores(&self.rankings, weights),
             Definition::Coco => coco::scores(&self.rankings, weights),
@@ -64,17 +64,12 @@ impl Matches {
 
     /// As [`map`](Self::map); none where nothing is to be found.
     pub(crate) fn map_if_any(&self, weights: &[u32]) -> Option<f64> {
-        self.check(weights);
+        check_weights(weights, self.images());
         let rankings = self.rankings.par_iter();
         let each: Vec<f64> = rankings
             .filter_map(|ranking| self.class_map(ranking, weights))
             .collect();
         (!each.is_empty()).then(|| mean(each))
-    }
-
-    /// As [`curves`](super::curves()), matched by this definition.
-    pub fn curves(&self) -> Curves {
-        curve::from_rankings(&self.rankings)
     }
 
     /// Mean over the thresholds of a class' average precision.
@@ -84,10 +79,6 @@ impl Matches {
             Definition::Coco => coco::average_precision(ranking, weights),
         };
         average_precision.map(mean)
-    }
-
-    fn check(&self, weights: &[u32]) {
-        check_weights(weights, self.images());
     }
 }
 

@@ -35,19 +35,15 @@ pub struct Mistake {
 /// All mistakes by the pairs that a [`Confusion`](super::Confusion) counts, the worst first: of
 /// detections the surest, of misses the box with the most area that no detection covers.
 pub fn mistakes(sheets: &[EvalImage], options: &ConfusionOptions) -> Vec<Mistake> {
-    let mut all = all_rated(sheets, options);
+    let numbered = sheets.par_iter().enumerate();
+    let mut all: Vec<(f64, Mistake)> = numbered
+        .flat_map_iter(|(i, sheet)| rated_mistakes(i, sheet, options))
+        .collect();
     all.sort_by(worst_first);
     all.into_iter().map(|(_, mistake)| mistake).collect()
 }
 
 /// With the severity of each.
-fn all_rated(sheets: &[EvalImage], options: &ConfusionOptions) -> Vec<(f64, Mistake)> {
-    let numbered = sheets.par_iter().enumerate();
-    numbered
-        .flat_map_iter(|(i, sheet)| rated_mistakes(i, sheet, options))
-        .collect()
-}
-
 fn rated_mistakes(
     i: usize,
     sheet: &EvalImage,
@@ -64,7 +60,7 @@ fn worst_first(a: &(f64, Mistake), b: &(f64, Mistake)) -> Ordering {
 }
 
 impl Mistake {
-    fn is_miss(&self) -> bool {
+    pub(super) fn is_miss(&self) -> bool {
         self.kind == MistakeKind::Missed
     }
 }

@@ -41,7 +41,7 @@ mod yolov5;
 pub use bootstrap::{Interval, bootstrap};
 pub(crate) use bootstrap::{drawn, interval};
 #[doc(hidden)]
-pub use coco::{AreaRange, CocoScores, coco};
+pub use coco::{CocoScores, coco};
 #[doc(hidden)]
 pub use coco_json::CocoTruth;
 #[cfg(feature = "fuzzing")]
@@ -313,6 +313,13 @@ pub(crate) mod tests {
 
     pub(crate) fn there(class: u32, bbox: BBox) -> GroundTruth {
         GroundTruth::new(class, bbox)
+    }
+
+    pub(crate) fn crowd(class: u32, bbox: BBox) -> GroundTruth {
+        GroundTruth {
+            crowd: true,
+            ..there(class, bbox)
+        }
     }
 
     pub(crate) fn found(class: u32, bbox: BBox, confidence: f64) -> Detection {

@@ -150,7 +150,7 @@ impl<'a> PairSearch<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{bbox, found, sheet, there};
+    use super::super::tests::{bbox, crowd, found, sheet, there};
     use super::super::{Detection, GroundTruth};
     use super::*;
     use proptest::prelude::*;
@@ -196,31 +196,16 @@ mod tests {
 
     #[test]
     fn a_crowd_is_not_missed_and_what_lies_in_it_is_no_alarm() {
-        let (b, crowd) = (bbox(0.0, 0.0, 10.0, 10.0), bbox(50.0, 0.0, 100.0, 100.0));
+        let truth = vec![
+            there(0, bbox(0.0, 0.0, 10.0, 10.0)),
+            crowd(0, bbox(50.0, 0.0, 100.0, 100.0)),
+        ];
         let seen = vec![
             found(0, bbox(60.0, 10.0, 9.0, 9.0), 0.9),
             found(0, bbox(300.0, 0.0, 9.0, 9.0), 0.9),
         ];
-        let all = sheet(
-            vec![
-                there(0, b),
-                GroundTruth {
-                    crowd: true,
-                    ..there(0, crowd)
-                },
-            ],
-            seen,
-        );
-        let expected = [
-            BoxPair {
-                found: Some(1),
-                truth: None,
-            },
-            BoxPair {
-                found: None,
-                truth: Some(0),
-            },
-        ];
-        assert_eq!(pairs(&all, &Default::default()), expected);
+        let expected = [(Some(1), None), (None, Some(0))];
+        let expected = expected.map(|(found, truth)| BoxPair { found, truth });
+        assert_eq!(pairs(&sheet(truth, seen), &Default::default()), expected);
     }
 }

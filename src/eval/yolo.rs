@@ -331,31 +331,24 @@ fn read_detections(path: &Path, size: [u32; 2], keypoints: usize) -> Result<Vec<
     rows.map_err(|what| Error::file(path, what))
 }
 
-fn parse_truth(
-    text: &str,
-    size: [u32; 2],
-    keypoints: usize,
-) -> std::result::Result<Vec<GroundTruth>, String> {
+/// What was read, or what is wrong with the text.
+type Parsed<T> = std::result::Result<T, String>;
+
+fn parse_truth(text: &str, size: [u32; 2], keypoints: usize) -> Parsed<Vec<GroundTruth>> {
     let rows = parse_rows(text, 0, keypoints)?.into_iter();
-    Ok(rows.map(|row| row.truth(size)).collect())
+    let truth = rows.map(|row| GroundTruth::new(row.class, row.bbox(size)));
+    Ok(truth.collect())
 }
 
 /// With a confidence at the end of each line.
-fn parse_detections(
-    text: &str,
-    size: [u32; 2],
-    keypoints: usize,
-) -> std::result::Result<Vec<Detection>, String> {
+fn parse_detections(text: &str, size: [u32; 2], keypoints: usize) -> Parsed<Vec<Detection>> {
     let rows = parse_rows(text, 1, keypoints)?.into_iter();
-    Ok(rows.map(|row| row.found(size)).collect())
+    let found = rows.map(|row| Detection::new(row.class, row.bbox(size), row.confidence));
+    Ok(found.collect())
 }
 
 /// What a text of labels and one of detections give, for the fuzzers.
-pub(crate) fn sheet_of(
-    truth: &str,
-    found: &str,
-    size: [u32; 2],
-) -> std::result::Result<EvalImage, String> {
+pub(crate) fn sheet_of(truth: &str, found: &str, size: [u32; 2]) -> Parsed<EvalImage> {
     let truth = parse_truth(truth, size, 0)?;
     Ok(EvalImage {
         found: parse_detections(found, size, 0)?,
@@ -380,7 +373,8 @@ fn picture_files(folder: &Path) -> Result<FilesByName> {
     // last.
     paths.sort_by_cached_key(|path| {
         let format = Format::from_extension(path);
-        (!is_jpeg_or_png(format), format.is_none(), path.clone())
+        let is_shown = matches!(format, Some(Format::Jpeg | Format::Png));
+        (!is_shown, format.is_none(), path.clone())
     });
     by_name(paths)
 }
@@ -411,10 +405,6 @@ fn same_name(path: &Path, first: &Path) -> Error {
     Error::file(path, what)
 }
 
-fn is_jpeg_or_png(format: Option<Format>) -> bool {
-    matches!(format, Some(Format::Jpeg | Format::Png))
-}
-
 fn image_size(image: &Path) -> Result<[u32; 2]> {
     let header = io::read_header(image)?;
     Ok([header.width as u32, header.height as u32])
@@ -434,21 +424,16 @@ const MAX_SHARE: f64 = 10.0;
 const BOX_NUMBERS: usize = 4;
 
 /// Lines with `extra` numbers (a confidence or nothing) at their ends.
-fn parse_rows(
-    text: &str,
-    extra: usize,
-    keypoints: usize,
-) -> std::result::Result<Vec<LabelRow>, String> {
+fn parse_rows(text: &str, extra: usize, keypoints: usize) -> Parsed<Vec<LabelRow>> {
     filled_lines(text)
         .map(|(i, line)| parse_row(line, extra, keypoints).map_err(|what| in_line(i, &what)))
         .collect()
 }
 
-fn parse_row(line: &str, extra: usize, keypoints: usize) -> std::result::Result<LabelRow, String> {
+fn parse_row(line: &str, extra: usize, keypoints: usize) -> Parsed<LabelRow> {
     let mut words = line.split_ascii_whitespace();
     let class = parse_class(words.next().unwrap_or_default())?;
-    let numbers = words.map(parse_finite);
-    let mut numbers: Vec<f64> = numbers.collect::<std::result::Result<_, _>>()?;
+    let mut numbers = words.map(parse_finite).collect::<Parsed<Vec<f64>>>()?;
     leave_out_keypoints(&mut numbers, extra, keypoints)?;
     let (place, rest) = split_extra(&numbers, extra)?;
     check_shares(place)?;
@@ -464,11 +449,7 @@ fn parse_row(line: &str, extra: usize, keypoints: usize) -> std::result::Result<
 }
 
 /// Takes the numbers of keypoints out from behind those of the box; a row may do without them.
-fn leave_out_keypoints(
-    numbers: &mut Vec<f64>,
-    extra: usize,
-    keypoints: usize,
-) -> std::result::Result<(), String> {
+fn leave_out_keypoints(numbers: &mut Vec<f64>, extra: usize, keypoints: usize) -> Parsed<()> {
     // Behind a confidence there may be the id of a track.
     let ends = |behind: usize| (extra..=2 * extra).contains(&behind);
     let is_box = numbers.len().checked_sub(BOX_NUMBERS).is_some_and(ends);
@@ -492,7 +473,7 @@ fn leave_out_keypoints(
 }
 
 /// The numbers of the place, and those behind them.
-fn split_extra(numbers: &[f64], extra: usize) -> std::result::Result<(&[f64], &[f64]), String> {
+fn split_extra(numbers: &[f64], extra: usize) -> Parsed<(&[f64], &[f64])> {
     let extra = extra + usize::from(extra > 0 && has_track_id(numbers));
     let count = numbers.len().checked_sub(extra);
     let count = count.ok_or_else(|| too_few(numbers, extra))?;
@@ -509,12 +490,12 @@ fn has_track_id(numbers: &[f64]) -> bool {
     }
 }
 
-fn parse_class(text: &str) -> std::result::Result<u32, String> {
+fn parse_class(text: &str) -> Parsed<u32> {
     text.parse()
         .map_err(|_| format!("class \"{text}\", expected 0, 1, .."))
 }
 
-fn parse_finite(word: &str) -> std::result::Result<f64, String> {
+fn parse_finite(word: &str) -> Parsed<f64> {
     match word.parse::<f64>() {
         Ok(v) if v.is_finite() => Ok(v),
         _ => Err(format!("\"{word}\", expected a number")),
@@ -522,7 +503,7 @@ fn parse_finite(word: &str) -> std::result::Result<f64, String> {
 }
 
 /// Fails for pixels in place of shares, and for a box with a negative side.
-fn check_shares(place: &[f64]) -> std::result::Result<(), String> {
+fn check_shares(place: &[f64]) -> Parsed<()> {
     if let Some(far) = place.iter().find(|share| share.abs() > MAX_SHARE) {
         return Err(format!(
             "{far}, expected a share of the image, 0 to 1; is it in pixels?"
@@ -579,19 +560,12 @@ impl LabelRow {
             y1: shares.y1 * h,
         }
     }
-
-    fn truth(&self, size: [u32; 2]) -> GroundTruth {
-        GroundTruth::new(self.class, self.bbox(size))
-    }
-
-    fn found(&self, size: [u32; 2]) -> Detection {
-        Detection::new(self.class, self.bbox(size), self.confidence)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::eval::tests::bbox;
 
     fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
@@ -676,46 +650,21 @@ mod tests {
             ("b.txt", ""),
         ]);
         let truth = read_yolo_truth(labels.path(), None, Some([100, 200])).unwrap();
-        assert_eq!(
-            truth.sheets[0].truth[0].bbox,
-            BBox {
-                x0: 40.0,
-                y0: 60.0,
-                x1: 60.0,
-                y1: 140.0
-            }
-        );
-        assert_eq!(
-            truth.sheets[0].truth[1].bbox,
-            BBox {
-                x0: 0.0,
-                y0: 0.0,
-                x1: 50.0,
-                y1: 50.0
-            }
-        );
-        assert_eq!(
-            (truth.sheets[1].image.as_str(), truth.sheets[1].truth.len()),
-            ("b", 0)
-        );
+        let boxes = [0, 1].map(|i| truth.sheets[0].truth[i].bbox);
+        let expected = [bbox(40.0, 60.0, 20.0, 80.0), bbox(0.0, 0.0, 50.0, 50.0)];
+        assert_eq!(boxes, expected);
+        let empty = &truth.sheets[1];
+        assert_eq!((empty.image.as_str(), empty.truth.len()), ("b", 0));
     }
 
     #[test]
     fn detections_come_with_confidence_and_may_be_missing() {
-        let labels = folder(&[
-            ("a.txt", "1 0.5 0.5 0.2 0.4\n"),
-            ("b.txt", "0 0.5 0.5 1 1\n"),
-        ]);
+        let labels = folder(&[("a.txt", "1 0.5 0.5 0.2 0.4\n"), ("b.txt", BOX)]);
         let mut truth = read_yolo_truth(labels.path(), None, Some([100, 200])).unwrap();
         let found = folder(&[("b.txt", "0 0.5 0.5 1 1 0.25\n")]);
         read_yolo_detections(found.path(), &mut truth).unwrap();
-        assert_eq!(
-            (
-                truth.sheets[0].found.len(),
-                truth.sheets[1].found[0].confidence
-            ),
-            (0, 0.25)
-        );
+        let [none, one] = [0, 1].map(|i| &truth.sheets[i].found);
+        assert_eq!((none.len(), one[0].confidence), (0, 0.25));
     }
 
     #[test]

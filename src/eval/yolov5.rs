@@ -297,8 +297,7 @@ fn threshold(i: usize) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::GroundTruth;
-    use super::super::tests::{bbox, found, sheet, there};
+    use super::super::tests::{bbox, crowd, found, sheet, there};
     use super::*;
 
     #[test]
@@ -321,28 +320,16 @@ mod tests {
     #[test]
     fn a_class_that_was_never_found_scores_zero_and_counts() {
         let b = bbox(0.0, 0.0, 10.0, 10.0);
-        let scores = yolov5(
-            &[sheet(
-                vec![there(0, b), there(1, b)],
-                vec![found(0, b, 0.5)],
-            )],
-            &[],
-        );
+        let truth = vec![there(0, b), there(1, b)];
+        let scores = yolov5(&[sheet(truth, vec![found(0, b, 0.5)])], &[]);
         assert_eq!(scores.classes[1].ap, [0.0; 10]);
         assert!((scores.map() - 0.995 / 2.0).abs() < 1e-12);
     }
 
     #[test]
     fn a_crowd_need_not_be_found_and_what_lies_in_it_does_not_count() {
-        let crowd = GroundTruth {
-            crowd: true,
-            ..there(0, bbox(100.0, 0.0, 50.0, 50.0))
-        };
-        let only_crowd = there(1, bbox(300.0, 0.0, 50.0, 50.0));
-        let only_crowd = GroundTruth {
-            crowd: true,
-            ..only_crowd
-        };
+        let only_crowd = crowd(1, bbox(300.0, 0.0, 50.0, 50.0));
+        let crowd = crowd(0, bbox(100.0, 0.0, 50.0, 50.0));
         let b = bbox(0.0, 0.0, 10.0, 10.0);
         let alarm = found(0, bbox(500.0, 0.0, 9.0, 9.0), 0.7);
         let plain = [sheet(vec![there(0, b)], vec![alarm, found(0, b, 0.5)])];
@@ -366,13 +353,8 @@ mod tests {
     #[test]
     fn other_classes_do_not_take_a_box() {
         let b = bbox(0.0, 0.0, 10.0, 10.0);
-        let scores = yolov5(
-            &[sheet(
-                vec![there(0, b)],
-                vec![found(1, b, 0.9), found(0, b, 0.5)],
-            )],
-            &[],
-        );
+        let seen = vec![found(1, b, 0.9), found(0, b, 0.5)];
+        let scores = yolov5(&[sheet(vec![there(0, b)], seen)], &[]);
         assert!((scores.map_at(0) - 0.995).abs() < 1e-12);
     }
 }

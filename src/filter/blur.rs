@@ -32,12 +32,7 @@ pub fn box_blur<P: Mix>(image: &Image<P>, radius: usize) -> Image<P> {
 /// A Gaussian around every sample of a line.
 fn gaussian_taps(len: usize, sigma: f64) -> Vec<Taps> {
     let reach = (GAUSSIAN_REACH_SIGMAS * sigma).ceil() as usize;
-    window_taps(len, reach, |d| gaussian(d as f64 / sigma))
-}
-
-/// One in the middle.
-fn gaussian(sigmas: f64) -> f64 {
-    libm::exp(-0.5 * sigmas.powi(2))
+    window_taps(len, reach, |d| libm::exp(-0.5 * (d as f64 / sigma).powi(2)))
 }
 
 /// Around every sample of a line, weights by a function of the distance, out to `reach`.

@@ -31,13 +31,10 @@ fn scaling_taps(from: usize, to: usize) -> Vec<Taps> {
 
 /// A triangle around `center` of a line of `len` samples.
 fn triangle_around(center: f64, half_width: f64, len: usize) -> Taps {
-    Taps::new(window_around(center, half_width), len, |j| {
+    let window = (center - half_width).floor() as isize..(center + half_width).ceil() as isize;
+    Taps::new(window, len, |j| {
         1.0 - ((j as f64 + 0.5 - center) / half_width).abs()
     })
-}
-
-fn window_around(center: f64, half_width: f64) -> std::ops::Range<isize> {
-    (center - half_width).floor() as isize..(center + half_width).ceil() as isize
 }
 
 #[cfg(test)]

@@ -17,16 +17,12 @@ pub(crate) fn sample_bilinear<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
 
 #[inline(always)]
 fn pixel_or_empty<P: Copy + Default>(image: &Image<P>, i: isize, j: isize) -> P {
-    if has_pixel(image, i, j) {
+    let (width, height) = (image.width() as isize, image.height() as isize);
+    if (0..width).contains(&i) && (0..height).contains(&j) {
         image[(i as usize, j as usize)]
     } else {
         P::default()
     }
-}
-
-#[inline]
-fn has_pixel<P: Copy>(image: &Image<P>, i: isize, j: isize) -> bool {
-    (0..image.width() as isize).contains(&i) && (0..image.height() as isize).contains(&j)
 }
 
 /// The bilinear value at `(x, y)` in pixels, going on outside the picture as the nearest pixel

@@ -155,8 +155,13 @@ pub(super) fn decode_elsewhere(
 /// one as associated.
 #[cfg(feature = "oiio")]
 fn with_known_alpha(raster: Raster, source: &SourceFile) -> Raster {
+    let premultiplied = match source.format {
+        Format::Tiff => tiff::has_associated_alpha(&source.bytes),
+        Format::Exr => true,
+        _ => raster.premultiplied,
+    };
     Raster {
-        premultiplied: is_premultiplied(&raster, source),
+        premultiplied,
         ..raster
     }
 }
@@ -171,15 +176,6 @@ fn with_whole_palette(mut raster: Raster, source: &SourceFile) -> Raster {
         lit.for_each(|code| *code = code.saturating_add(1));
     }
     raster
-}
-
-#[cfg(feature = "oiio")]
-fn is_premultiplied(raster: &Raster, source: &SourceFile) -> bool {
-    match source.format {
-        Format::Tiff => tiff::has_associated_alpha(&source.bytes),
-        Format::Exr => true,
-        _ => raster.premultiplied,
-    }
 }
 
 /// A header by the other decoder.

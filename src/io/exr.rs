@@ -2,7 +2,7 @@
 
 pub use super::codec::exr::{Channel, ChannelSamples, Part};
 
-use super::codec::exr;
+use super::codec::exr::{self, FlatSamples};
 use super::decode::catch_panic;
 use super::format::Format;
 use super::fs::write_bytes;
@@ -59,14 +59,14 @@ pub fn write_half_channels(
     write_encoded(path.as_ref(), encode(size, planes, metadata))
 }
 
-fn float_planes<'a>(channels: &[(&'a str, &[f32])]) -> Vec<(&'a str, exr::FlatSamples)> {
-    planes(channels, |samples| exr::float_samples(samples.to_vec()))
+fn float_planes<'a>(channels: &[(&'a str, &[f32])]) -> Vec<(&'a str, FlatSamples)> {
+    planes(channels, |samples| FlatSamples::F32(samples.to_vec()))
 }
 
 fn planes<'a>(
     channels: &[(&'a str, &[f32])],
-    stored: impl Fn(&[f32]) -> exr::FlatSamples,
-) -> Vec<(&'a str, exr::FlatSamples)> {
+    stored: impl Fn(&[f32]) -> FlatSamples,
+) -> Vec<(&'a str, FlatSamples)> {
     let channels = channels.iter();
     channels
         .map(|&(name, samples)| (name, stored(samples)))
@@ -75,7 +75,7 @@ fn planes<'a>(
 
 fn encode(
     size: (usize, usize),
-    planes: Vec<(&str, exr::FlatSamples)>,
+    planes: Vec<(&str, FlatSamples)>,
     metadata: &[(String, String)],
 ) -> std::result::Result<Vec<u8>, String> {
     let (canvas, compression) = (Canvas::default(), exr::Compression::Zip);

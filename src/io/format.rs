@@ -3,11 +3,12 @@
 use std::path::Path;
 
 /// The kinds of picture file that are read and written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
     /// OpenEXR: scene-linear half or float, any number of named channels.
     Exr,
     /// PNG: 8 or 16 bits, display-encoded.
+    #[default]
     Png,
     /// JPEG: 8 bits, display-encoded, no alpha.
     Jpeg,

@@ -35,7 +35,7 @@ impl Default for Canvas {
 
 /// How a picture file describes itself; reading it decodes no pixel.
 #[non_exhaustive]
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Header {
     /// The kind of file, by its content.
     pub format: Format,
@@ -79,29 +79,6 @@ pub struct Header {
     pub metadata: Vec<(String, String)>,
 }
 
-impl Default for Header {
-    fn default() -> Self {
-        Self {
-            format: Format::Png,
-            width: 0,
-            height: 0,
-            canvas: Canvas::default(),
-            data_at: [0; 2],
-            data_size: [0; 2],
-            channels: Vec::new(),
-            bits: 0,
-            focal_35mm: None,
-            focal_by_sensor: false,
-            digital_zoom: false,
-            cropped: false,
-            whole: false,
-            turned: false,
-            noted_adobe_rgb: false,
-            metadata: Vec::new(),
-        }
-    }
-}
-
 /// Named texts.
 pub(super) type Notes = Vec<(String, String)>;
 
@@ -110,7 +87,7 @@ pub(super) fn note(key: &str, value: &str) -> (String, String) {
 }
 
 /// Notes for formats that keep a single text: a line `key=value` each.
-pub(super) fn lines_of_notes(notes: &Notes) -> String {
+pub(super) fn lines_of_notes(notes: &[(String, String)]) -> String {
     notes
         .iter()
         .map(|(key, value)| format!("{key}={}\n", value.replace('\n', " ")))

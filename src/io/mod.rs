@@ -110,7 +110,10 @@ pub use document::{
     Override, from_json, from_overrides, has_extension, read_json, read_text, read_toml,
     write_json, write_text, write_toml,
 };
-pub(crate) use document::{parse_json, parse_toml_with, read_json_data};
+pub(crate) use document::{
+    from_table, from_table_with, parse_json, parse_toml_with, read_bytes, read_json_data,
+    suggestion,
+};
 pub use document::{read_document, write_document};
 #[doc(hidden)]
 pub use format::Format;
@@ -120,13 +123,13 @@ pub use fs::{
     path_text, relative, relative_on_disk,
 };
 pub(crate) use fs::{
-    absolute_folder, files_below, is_apple_double, natural_key, real_path, refuse_links, stem_text,
-    with_last_step, write_through,
+    Syncing, absolute_folder, files_below, is_apple_double, length_inside, natural_key, open_own,
+    real_path, refuse_foreign, refuse_links, stem_text, sync_file_system, with_last_step,
+    write_through,
 };
 pub use header::Header;
 #[doc(hidden)]
 pub use header::{Canvas, Window};
-#[doc(hidden)]
 pub(crate) use limits::machine_bytes;
 pub use limits::{LimitOverride, Limits};
 #[doc(hidden)]
@@ -153,8 +156,6 @@ pub use worker::serve as serve_worker;
 #[doc(hidden)]
 pub use worker::worker_version;
 
-pub(crate) use document::{from_table, from_table_with, read_bytes, suggestion};
-pub(crate) use fs::{Syncing, length_inside, open_own, refuse_foreign, sync_file_system};
 #[cfg(feature = "fuzzing")]
 pub(crate) use fuzz::header_of;
 #[cfg(all(feature = "fuzzing", feature = "oiio"))]

@@ -19,11 +19,6 @@ use crate::error::{Error, Result};
 use crate::image::Image;
 use std::path::Path;
 
-/// The OpenImageIO that this library was built with.
-pub fn version() -> String {
-    openimageio::version()
-}
-
 /// For [`Fallback::InProcess`]: a program that calls this links OpenImageIO.
 pub fn in_process() -> Linked {
     Linked(openimageio::answer)

@@ -1,12 +1,12 @@
 //! Typed pictures to files: the format by the extension, the encoding by the pixel type.
 
-use super::codec::codes::{Bits, CodedImage, ToFile, interleaved};
-use super::codec::exr::{self, Compression};
-use super::codec::jpeg::{Chroma, JpegCoding};
+use super::codec::codes::{Bits, Codes, ToFile, interleaved};
+use super::codec::exr::{self, Compression, FlatSamples};
+use super::codec::jpeg::Chroma;
 use super::codec::{jpeg, png, tiff};
 use super::format::Format;
 use super::fs::write_bytes;
-use super::header::Canvas;
+use super::header::{Canvas, note};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::quality::Quality;
@@ -106,8 +106,9 @@ fn encode<P: ToFile>(
         Some(Format::Tiff) => encode_tiff(image, bits, &options.metadata),
         Some(Format::Jpeg) => encode_jpeg(image, options),
         _ => {
-            let codes = CodedImage::new(image, bits);
-            png::encode(&codes, options.png_effort, &options.metadata)
+            let (channels, codes) = (P::NAMES.len(), Codes::new(image, bits));
+            let (effort, metadata) = (options.png_effort, &options.metadata);
+            png::encode(image.size(), channels, &codes, effort, metadata).map_err(|e| e.to_string())
         }
     }
 }
@@ -117,10 +118,12 @@ fn encode_tiff<P: ToFile>(
     bits: Bits,
     metadata: &[(String, String)],
 ) -> std::result::Result<Vec<u8>, String> {
-    match bits {
-        Bits::Float => encode_float_tiff(image, metadata),
-        _ => tiff::encode_codes(&CodedImage::new(image, bits), metadata),
+    let (size, channels) = (image.size(), P::NAMES.len());
+    if bits != Bits::Float {
+        return tiff::encode_codes(size, channels, &Codes::new(image, bits), metadata);
     }
+    let samples = interleaved(image, P::linear);
+    tiff::encode_floats(size, channels, &samples, &with_colorspace(metadata))
 }
 
 fn check_not_empty((width, height): (usize, usize)) -> std::result::Result<(), String> {
@@ -152,72 +155,41 @@ pub(super) fn sample_storage<P: ToFile>(
 fn possible_storage<P: ToFile>(
     format: Option<Format>,
 ) -> std::result::Result<&'static [Bits], String> {
-    if P::CODED {
-        return possible_codes(format);
-    }
-    match format {
-        Some(Format::Exr) => Ok(&[Bits::Float, Bits::Half]),
-        Some(Format::Tiff) if P::NAMES.len() == 1 => Ok(&[Bits::Float]),
-        Some(Format::Tiff | Format::Png | Format::Jpeg) => {
+    match (format, P::CODED) {
+        (Some(Format::Exr), true) => Ok(&[Bits::Half, Bits::Float]),
+        (Some(Format::Tiff), true) => Ok(&[Bits::Sixteen, Bits::Eight, Bits::Float]),
+        (Some(Format::Png), true) => Ok(&[Bits::Eight, Bits::Sixteen]),
+        (Some(Format::Jpeg), true) => Ok(&[Bits::Eight]),
+        (Some(Format::Exr), false) => Ok(&[Bits::Float, Bits::Half]),
+        (Some(Format::Tiff), false) if P::NAMES.len() == 1 => Ok(&[Bits::Float]),
+        (Some(Format::Tiff | Format::Png | Format::Jpeg), false) => {
             Err("a depth needs .exr or .tif, and a film .exr".into())
         }
-        _ => Err(NOT_WRITTEN.into()),
+        _ => Err("cannot be written, expected the extension .exr, .png, .jpg or .tif".into()),
     }
 }
-
-/// The same for a pixel that means something in integers.
-fn possible_codes(format: Option<Format>) -> std::result::Result<&'static [Bits], String> {
-    match format {
-        Some(Format::Exr) => Ok(&[Bits::Half, Bits::Float]),
-        Some(Format::Tiff) => Ok(&[Bits::Sixteen, Bits::Eight, Bits::Float]),
-        Some(Format::Png) => Ok(&[Bits::Eight, Bits::Sixteen]),
-        Some(Format::Jpeg) => Ok(&[Bits::Eight]),
-        _ => Err(NOT_WRITTEN.into()),
-    }
-}
-
-const NOT_WRITTEN: &str = "cannot be written, expected the extension .exr, .png, .jpg or .tif";
 
 fn encode_exr<P: ToFile>(
     image: &Image<P>,
     bits: Bits,
     options: &WriteOptions,
 ) -> std::result::Result<Vec<u8>, String> {
-    let planes = exr_planes(image, bits);
+    let names = P::NAMES.iter().enumerate();
+    let planes = names.map(|(c, &name)| (name, channel_samples(image, c, bits)));
+    let planes = planes.collect();
     let metadata = with_colorspace(&options.metadata);
     let (size, compression) = (image.size(), options.compression);
     exr::encode(size, options.canvas, planes, compression, &metadata)
 }
 
-fn exr_planes<P: ToFile>(image: &Image<P>, bits: Bits) -> Vec<(&'static str, exr::FlatSamples)> {
-    P::NAMES
-        .iter()
-        .enumerate()
-        .map(|(c, &name)| (name, channel_samples(image, c, bits)))
-        .collect()
-}
-
 /// One channel of a picture, scene-linear.
-fn channel_samples<P: ToFile>(image: &Image<P>, channel: usize, bits: Bits) -> exr::FlatSamples {
-    let plane = channel_plane(image, channel);
+fn channel_samples<P: ToFile>(image: &Image<P>, channel: usize, bits: Bits) -> FlatSamples {
+    let pixels = image.pixels().par_iter();
+    let plane: Vec<f32> = pixels.map(|p| p.linear()[channel]).collect();
     match bits {
         Bits::Half => exr::half_samples(&plane),
-        _ => exr::float_samples(plane),
+        _ => FlatSamples::F32(plane),
     }
-}
-
-fn channel_plane<P: ToFile>(image: &Image<P>, channel: usize) -> Vec<f32> {
-    let pixels = image.pixels().par_iter();
-    pixels.map(|p| p.linear()[channel]).collect()
-}
-
-fn encode_float_tiff<P: ToFile>(
-    image: &Image<P>,
-    metadata: &[(String, String)],
-) -> std::result::Result<Vec<u8>, String> {
-    let samples = interleaved(image, P::linear);
-    let size = image.size();
-    tiff::encode_floats(size, P::NAMES.len(), &samples, &with_colorspace(metadata))
 }
 
 fn encode_jpeg<P: ToFile>(
@@ -232,11 +204,8 @@ fn encode_jpeg<P: ToFile>(
     if P::NAMES.len() == 4 {
         codes = without_alpha(&codes)?;
     }
-    let coding = JpegCoding {
-        quality,
-        chroma: options.jpeg_chroma,
-    };
-    jpeg::encode(image.size(), &codes, coding, &options.metadata)
+    let (chroma, metadata) = (options.jpeg_chroma, &options.metadata);
+    jpeg::encode(image.size(), &codes, quality, chroma, metadata)
 }
 
 /// Red, green and blue of opaque codes.
@@ -252,16 +221,10 @@ fn without_alpha(codes: &[u8]) -> std::result::Result<Vec<u8>, String> {
 
 /// The texts with the colour space in front, unless the caller named one.
 fn with_colorspace(metadata: &[(String, String)]) -> Vec<(String, String)> {
-    let ours = (!names_colorspace(metadata)).then(colorspace_note);
+    let (name, space) = COLORSPACE;
+    let is_named = metadata.iter().any(|(key, _)| key == name);
+    let ours = (!is_named).then(|| note(name, space));
     ours.into_iter().chain(metadata.iter().cloned()).collect()
-}
-
-fn names_colorspace(metadata: &[(String, String)]) -> bool {
-    metadata.iter().any(|(key, _)| key == COLORSPACE.0)
-}
-
-fn colorspace_note() -> (String, String) {
-    (COLORSPACE.0.to_string(), COLORSPACE.1.to_string())
 }
 
 #[cfg(test)]

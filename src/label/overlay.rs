@@ -1,7 +1,7 @@
 //! Labels drawn onto their picture, to look at.
 
 use crate::color::encode_srgb8;
-use crate::draw::{self, TextSize};
+use crate::draw;
 use crate::geom::{BBox, Point2};
 use crate::image::Image;
 use crate::label::{Labels, ObjectLabel};
@@ -80,12 +80,11 @@ fn scaled(b: &BBox, [x, y]: [f64; 2]) -> BBox {
 
 /// A name on the box's upper edge; below the edge where there is no room above it.
 fn draw_tag(canvas: &mut Image<Srgb8>, object: &ObjectLabel, name: &str) {
-    let size = TextSize::Small;
-    let tag = [size.width(name) + 6, size.height()];
+    let tag = [draw::text_width(name) + 6, draw::LINE_PX];
     let [x, y] = tag_corner(&object.amodal_box, tag, canvas.width());
     let paper = draw::class_color(object.class);
     draw::fill(canvas, [x, y], tag, paper);
-    draw::text(canvas, [x + 3, y], name, draw::ink_on(paper), size);
+    draw::text(canvas, [x + 3, y], name, draw::ink_on(paper));
 }
 
 /// Above the box where there is room, else in it.

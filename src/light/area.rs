@@ -104,14 +104,7 @@ pub(crate) mod tests {
 
     /// A light whose irradiance at five points was worked out by another program.
     pub(crate) fn square() -> AreaLight {
-        AreaLight {
-            shape: LightShape::Rectangle,
-            position: [0.3, 0.2, 0.9],
-            target: [0.0; 3],
-            size: [0.4; 2],
-            power: 10.0,
-            color: LinearRgb::WHITE,
-        }
+        AreaLight::new([0.3, 0.2, 0.9], [0.4; 2], 10.0)
     }
 
     /// Receiver, its normal and the irradiance there, from the same test.

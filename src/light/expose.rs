@@ -83,17 +83,13 @@ fn stops_of(ratio: f64) -> f64 {
 ///
 /// Pixels that are not finite are left out; 0 for a plate without any other.
 pub(super) fn plate_white(plate: &Image<LinearRgb>) -> f32 {
-    let mut luminances = finite_luminances(plate);
+    let finite = plate.pixels().iter().filter(|c| c.is_finite());
+    let mut luminances: Vec<f32> = finite.map(|c| c.luminance()).collect();
     if luminances.is_empty() {
         return 0.0;
     }
     let rank = ((luminances.len() - 1) as f64 * WHITE_PERCENTILE).round() as usize;
     *luminances.select_nth_unstable_by(rank, f32::total_cmp).1
-}
-
-fn finite_luminances(plate: &Image<LinearRgb>) -> Vec<f32> {
-    let finite = plate.pixels().iter().filter(|c| c.is_finite());
-    finite.map(|c| c.luminance()).collect()
 }
 
 #[cfg(test)]
@@ -123,6 +119,13 @@ mod tests {
         }
     }
 
+    fn exposed_ev(scene: Scene, plate: &Image<LinearRgb>) -> f64 {
+        let Exposure::Ev(ev) = expose(scene, plate, None).exposure else {
+            panic!("still unknown")
+        };
+        ev
+    }
+
     /// Grey 0.2, a fiftieth of it paper of 0.5, one highlight of 40.
     fn plate() -> Image<LinearRgb> {
         let value = |i: usize| {
@@ -145,11 +148,7 @@ mod tests {
 
     #[test]
     fn a_white_card_gets_the_plate_s_white() {
-        let Exposure::Ev(ev) =
-            expose(scene(Exposure::MatchPlate { gain_ev: 1.0 }), &plate(), None).exposure
-        else {
-            panic!("still unknown")
-        };
+        let ev = exposed_ev(scene(Exposure::MatchPlate { gain_ev: 1.0 }), &plate());
         let card = 2.975061 / PI + 0.1;
         assert!((card * libm::exp2(ev) - 1.0).abs() < 1e-5);
     }
@@ -161,10 +160,7 @@ mod tests {
                 cast: tint,
                 ..scene(Exposure::MatchPlate { gain_ev: 0.0 })
             };
-            let Exposure::Ev(ev) = expose(cast, &plate(), None).exposure else {
-                panic!("still unknown")
-            };
-            ev
+            exposed_ev(cast, &plate())
         };
         let white = matched(LightTint::Known(LinearRgb::WHITE));
         let dark = matched(LightTint::Known(LinearRgb::grey(0.25)));
@@ -210,9 +206,7 @@ mod tests {
             exposure,
             ..crate::light::surface::tests::scene(Default::default())
         };
-        let Exposure::Ev(ev) = expose(scene, &plate, None).exposure else {
-            panic!("still unknown")
-        };
+        let ev = exposed_ev(scene, &plate);
         assert!((0.2 * 0.5 * libm::exp2(ev) - 0.3).abs() < 1e-6);
     }
 

@@ -271,11 +271,7 @@ mod tests {
     fn lamp() -> AreaLight {
         AreaLight {
             shape: LightShape::Ellipse,
-            position: [0.0, 0.0, 1.2],
-            target: [0.0; 3],
-            size: [0.2; 2],
-            power: 10.0,
-            color: LinearRgb::WHITE,
+            ..AreaLight::new([0.0, 0.0, 1.2], [0.2; 2], 10.0)
         }
     }
 

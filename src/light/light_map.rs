@@ -142,11 +142,7 @@ mod tests {
     fn what_the_scene_s_own_lights_do_is_not_done_twice() {
         let lamp = AreaLight {
             shape: LightShape::Ellipse,
-            position: [0.3, 0.0, 0.3],
-            target: [0.0; 3],
-            size: [0.02; 2],
-            power: 10.0,
-            color: LinearRgb::WHITE,
+            ..AreaLight::new([0.3, 0.0, 0.3], [0.02; 2], 10.0)
         };
         let lit = Scene {
             lights: vec![lamp],

@@ -151,19 +151,11 @@ impl LightHorizon {
     /// Points and areas of what the plane leaves, with the light's sides running from -1 to 1; none
     /// where it cuts nothing.
     fn visible_part(&self, shape: LightShape, per_side: usize) -> Option<Vec<([f64; 2], f64)>> {
+        let ([a, b], height) = (self.rise.map(f64::abs), self.middle.abs());
         match shape {
-            LightShape::Rectangle => self.cuts_square().then(|| self.strips(per_side)),
-            LightShape::Ellipse => self.cuts_disk().then(|| self.chords(per_side)),
+            LightShape::Rectangle => (height < a + b).then(|| self.strips(per_side)),
+            LightShape::Ellipse => (height < self.steepest_rise()).then(|| self.chords(per_side)),
         }
-    }
-
-    fn cuts_square(&self) -> bool {
-        let [a, b] = self.rise.map(f64::abs);
-        self.middle.abs() < a + b
-    }
-
-    fn cuts_disk(&self) -> bool {
-        self.middle.abs() < self.steepest_rise()
     }
 
     fn steepest_rise(&self) -> f64 {
@@ -246,22 +238,25 @@ mod tests {
     use crate::light::area::tests::{lit_points, square};
     use std::f64::consts::PI;
 
-    impl Node {
-        /// Irradiance at `point` by unit radiance from this node: `cos cos / r^2 dA`; 0 below either
-        /// horizon.
-        fn irradiance(&self, frame: &LightFrame, point: Point3<f64>, normal: Vector3<f64>) -> f64 {
-            geometry_term(&(self.point - point), &frame.normal, &normal) * self.area
-        }
+    /// Irradiance at a point by unit radiance from the nodes of a light: `cos cos / r^2 dA`; 0 below
+    /// either horizon.
+    fn irradiance(
+        nodes: &[Node],
+        light: &AreaLight,
+        point: Point3<f64>,
+        normal: Vector3<f64>,
+    ) -> f64 {
+        let face = frame(light).normal;
+        nodes
+            .iter()
+            .map(|n| geometry_term(&(n.point - point), &face, &normal) * n.area)
+            .sum()
     }
 
     #[test]
     fn nine_nodes_match_the_closed_form() {
         for (at, normal, expected) in lit_points() {
-            let f = frame(&square());
-            let sum: f64 = nodes(&square(), 3)
-                .iter()
-                .map(|n| n.irradiance(&f, at.into(), normal))
-                .sum();
+            let sum = irradiance(&nodes(&square(), 3), &square(), at.into(), normal);
             let e = sum * f64::from(radiance(&square()).r);
             assert!(
                 (e / expected - 1.0).abs() < 1e-4,
@@ -305,17 +300,10 @@ mod tests {
                 (0.3, [0.0; 3]),
             ] {
                 let light = standing(shape, height, target);
-                let f = frame(&light);
                 let nodes = nodes_above(&light, 3, Point3::origin(), &Vector3::z());
                 assert!(nodes.iter().all(|n| n.point.z > 0.0), "{shape:?} {height}");
-                let sum: f64 = nodes
-                    .iter()
-                    .map(|n| n.irradiance(&f, Point3::origin(), Vector3::z()))
-                    .sum();
-                let fine: f64 = super::nodes(&light, 400)
-                    .iter()
-                    .map(|n| n.irradiance(&f, Point3::origin(), Vector3::z()))
-                    .sum();
+                let [sum, fine] = [nodes, super::nodes(&light, 400)]
+                    .map(|nodes| irradiance(&nodes, &light, Point3::origin(), Vector3::z()));
                 assert!(
                     (sum / fine - 1.0).abs() < 0.02,
                     "{shape:?} {height}: {sum} against {fine}"

@@ -71,7 +71,7 @@ fn noise_between_pixels(plate: &Image<LinearRgb>) -> Noise {
         return Noise::None;
     }
     let groups: Vec<_> = residuals.chunks_exact(size).map(group_noise).collect();
-    fit_noise(&groups)
+    FitSums::new(&groups).noise()
 }
 
 /// The residuals around pixels all over the plate but the outermost.
@@ -100,28 +100,11 @@ fn residual_at(plate: &Image<LinearRgb>, x: usize, y: usize) -> Option<(f32, f32
 
 /// Mean brightness and variance of a group.
 fn group_noise(group: &[(f32, f32)]) -> [f64; 2] {
-    let sigma = lower_quartile(group) / (QUARTILE_SIGMAS * MASK_GAIN);
-    [mean_brightness(group), sigma * sigma]
-}
-
-fn mean_brightness(group: &[(f32, f32)]) -> f64 {
     let sum: f64 = group.iter().map(|p| f64::from(p.0)).sum();
-    sum / group.len() as f64
-}
-
-/// That of the residuals of a group.
-fn lower_quartile(group: &[(f32, f32)]) -> f64 {
     let residuals = group.iter().map(|p| p.1).collect();
-    quantile(residuals, 0.25, f32::total_cmp).map_or(0.0, f64::from)
-}
-
-/// The line of least squares through variances over means.
-fn fit_noise(groups: &[[f64; 2]]) -> Noise {
-    let (shot, dark) = FitSums::new(groups).line();
-    Noise::Known {
-        shot,
-        read: dark.sqrt(),
-    }
+    let quartile = quantile(residuals, 0.25, f32::total_cmp).map_or(0.0, f64::from);
+    let sigma = quartile / (QUARTILE_SIGMAS * MASK_GAIN);
+    [sum / group.len() as f64, sigma * sigma]
 }
 
 /// Sums of a linear regression of variance (y) over mean (x).
@@ -153,14 +136,18 @@ impl FitSums {
         }
     }
 
-    /// Slope and offset of the line, neither of them negative.
-    fn line(&self) -> (f64, f64) {
+    /// The line of least squares, neither slope nor offset negative.
+    fn noise(&self) -> Noise {
         let slope = self.slope();
         let offset = (self.y - slope * self.x) / self.n;
-        match (slope > 0.0, offset > 0.0) {
+        let (shot, dark) = match (slope > 0.0, offset > 0.0) {
             (true, true) => (slope, offset),
             (true, false) => (self.xy / self.xx.max(f64::MIN_POSITIVE), 0.0),
             (false, _) => (0.0, self.y / self.n),
+        };
+        Noise::Known {
+            shot,
+            read: dark.sqrt(),
         }
     }
 }

@@ -18,18 +18,13 @@ fn root_estimate(n: usize, i: usize) -> f64 {
 }
 
 fn gauss_point(n: usize, estimate: f64) -> (f64, f64) {
-    let root = legendre_root(n, estimate);
-    let (_, slope) = legendre(n, root);
-    (root, 2.0 / ((1.0 - root * root) * slope * slope))
-}
-
-/// Newton's method.
-fn legendre_root(n: usize, estimate: f64) -> f64 {
     // Quadratic convergence: 8 steps are plenty from an estimate good to three digits.
-    (0..8).fold(estimate, |x, _| {
+    let root = (0..8).fold(estimate, |x, _| {
         let (p, slope) = legendre(n, x);
         x - p / slope
-    })
+    });
+    let (_, slope) = legendre(n, root);
+    (root, 2.0 / ((1.0 - root * root) * slope * slope))
 }
 
 /// Value and slope of the Legendre polynomial of degree `n`, by its recurrence.

@@ -101,15 +101,12 @@ struct VisiblePiece {
 impl VisiblePiece {
     /// The same in the world, its light scaled.
     fn in_world(&self, rotation: f64, scale: [f64; 3]) -> SkyPiece {
+        let irradiance = std::array::from_fn(|c| (self.irradiance[c] * scale[c]) as f32);
         SkyPiece {
             direction: turned(&self.direction, -rotation),
-            irradiance: self.scaled_irradiance(scale),
+            irradiance: LinearRgb::from(irradiance),
             width: self.width,
         }
-    }
-
-    fn scaled_irradiance(&self, scale: [f64; 3]) -> LinearRgb {
-        std::array::from_fn(|c| (self.irradiance[c] * scale[c]) as f32).into()
     }
 
     /// None for a piece below a receiver's horizon.

@@ -26,6 +26,12 @@ pub(super) fn largest_difference<const N: usize>(a: [f64; N], b: [f64; N]) -> f6
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
+/// How far two colours differ, channel by channel.
+#[inline]
+pub(super) fn differences(a: LinearRgb, b: LinearRgb) -> [f32; 3] {
+    channel_pairs(a, b).map(|(a, b)| (a - b).abs())
+}
+
 /// The channels of two colours, in pairs.
 #[inline]
 pub(super) fn channel_pairs(a: LinearRgb, b: LinearRgb) -> [(f32, f32); 3] {

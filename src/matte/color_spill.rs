@@ -82,8 +82,7 @@ impl Default for ColorSpillOptions {
 /// The excess of the spill channel over `ratio` times its limit is subtracted from it where
 /// positive, and handed to the other channels as the strengths say.
 pub fn color_spill<P: Photo>(photo: &Image<P>, options: &ColorSpillOptions) -> Image<PremulRgba> {
-    let spill = options.channel as usize;
-    let strengths = strengths(options, spill);
+    let strengths = strengths(options);
     photo.map(|p| without_spill(p.premul(), strengths, options))
 }
 
@@ -116,20 +115,22 @@ fn excess(c: [f32; 3], options: &ColorSpillOptions) -> f32 {
 fn limit(c: [f32; 3], options: &ColorSpillOptions) -> f32 {
     match options.limit_method {
         SpillLimit::Simple => c[options.limit_channel as usize],
-        SpillLimit::Average => mean_of_others(c, options.channel as usize),
+        SpillLimit::Average => {
+            let (first, second) = other_channels(c, options.channel as usize);
+            (first + second) * 0.5
+        }
     }
 }
 
-#[inline(always)]
-fn mean_of_others(c: [f32; 3], channel: usize) -> f32 {
-    let (first, second) = other_channels(c, channel);
-    (first + second) * 0.5
-}
-
 /// What every channel gets of the excess.
-fn strengths(options: &ColorSpillOptions, spill: usize) -> [f32; 3] {
+fn strengths(options: &ColorSpillOptions) -> [f32; 3] {
+    let spill = options.channel as usize;
     let mut strengths = match options.use_unspill {
-        true => options.unspill_strengths(),
+        true => [
+            options.unspill_red,
+            options.unspill_green,
+            options.unspill_blue,
+        ],
         false => [0, 1, 2].map(|k| if k == spill { 1.0 } else { 0.0 }),
     };
     strengths[spill] = -strengths[spill];
@@ -150,9 +151,5 @@ impl ColorSpillOptions {
         check_length("key.unspill_red", self.unspill_red)?;
         check_length("key.unspill_green", self.unspill_green)?;
         check_length("key.unspill_blue", self.unspill_blue)
-    }
-
-    fn unspill_strengths(&self) -> [f32; 3] {
-        [self.unspill_red, self.unspill_green, self.unspill_blue]
     }
 }

@@ -13,6 +13,7 @@ use super::plate::{PlateOptions, ScreenPlate};
 use super::prepared::Prepared;
 use super::screen::{masked_pixels, mean_color, screen_color, screen_pixels};
 use super::screen_edge::screen_edge_seen;
+use super::segment::hull::sides;
 use super::segment::{Segmentation, segment_prepared};
 use super::stroke::{Claims, Stroke, StrokesOnPhoto, check_strokes, corrected_coverage, unclaimed};
 use crate::diagnostic::{Code, Diagnostic};
@@ -77,26 +78,15 @@ impl CutOut {
 /// [`Error::Value`](crate::Error::Value) (`key.clip_black`, `soften_px`, ..) for an option that
 /// cannot be right.
 pub fn cut_out(photo: &Image<LinearRgb>, options: &CutOutOptions) -> Result<CutOut> {
-    cut_out_on(photo, None, options)
+    cut_out_corrected(photo, None, &[], options)
 }
 
-/// As [`cut_out`], with a photo of the empty screen where there is one.
+/// As [`cut_out`], with a photo of the empty screen where there is one, corrected by what a person
+/// painted on the photo.
 ///
 /// # Errors
-/// Those of [`cut_out`] and of [`ScreenPlate::from_photo`].
-pub fn cut_out_on(
-    photo: &Image<LinearRgb>,
-    empty: Option<&Image<LinearRgb>>,
-    options: &CutOutOptions,
-) -> Result<CutOut> {
-    cut_out_corrected(photo, empty, &[], options)
-}
-
-/// As [`cut_out_on`], corrected by what a person painted on the photo.
-///
-/// # Errors
-/// Those of [`cut_out_on`]; [`Error::Value`](crate::Error::Value) (`strokes[2].radius_px`) for a
-/// stroke that cannot be right.
+/// Those of [`cut_out`] and of [`ScreenPlate::from_photo`]; [`Error::Value`](crate::Error::Value)
+/// (`strokes[2].radius_px`) for a stroke that cannot be right.
 pub fn cut_out_corrected(
     photo: &Image<LinearRgb>,
     empty: Option<&Image<LinearRgb>>,
@@ -138,12 +128,8 @@ fn cut_segmented(
 ) -> Result<CutOut> {
     let matted = Matted::new(prepared, screen, region, options)?;
     watch.lap("matte");
-    let cut = CutOut {
-        diagnostics: diagnostics(prepared.photo, &segmentation, screen, &matted, options),
-        ..region
-            .trim(options.longest_side)
-            .cut_out(matted, segmentation, screen)
-    };
+    let told = diagnostics(prepared.photo, &segmentation, screen, &matted, options);
+    let cut = region.cut_out(matted, segmentation, screen, told);
     watch.lap("trim");
     Ok(cut)
 }
@@ -243,6 +229,8 @@ struct ObjectRegion {
     around: Roi,
     /// The hull and the margin that is kept.
     kept: Roi,
+    /// Pixels of the cut-out for one pixel of the photo.
+    scale: f64,
     photo: Image<LinearRgb>,
     /// What the matte is cut to.
     cut: Image<Coverage>,
@@ -265,23 +253,16 @@ impl ObjectRegion {
         let boundary = options.within.of_object(found).crop(around);
         let drawn = cropped(&claims.outline);
         let boundary = corrected_coverage(boundary, drawn.as_ref());
+        let kept = hull_roi(&found.hull, options.margin_px, size);
+        let longer = kept.width.max(kept.height);
         Self {
             around,
-            kept: hull_roi(&found.hull, options.margin_px, size),
+            kept,
+            scale: (options.longest_side as f64 / longer as f64).min(1.0),
             photo: prepared.photo.crop(around),
             cut: softened(&boundary, options.soften_px),
             claims: cropped(&claims.transmittance),
             drawn,
-        }
-    }
-
-    /// How pictures of the region become those of the cut-out, whose longer side is at most
-    /// `longest_side`.
-    fn trim(&self, longest_side: usize) -> Trim {
-        Trim {
-            roi: self.kept,
-            in_region: self.kept_in_region(),
-            scale: self.kept_scale(longest_side),
         }
     }
 
@@ -301,9 +282,52 @@ impl ObjectRegion {
         }
     }
 
-    fn kept_scale(&self, longest_side: usize) -> f64 {
-        let longer = self.kept.width.max(self.kept.height);
-        (longest_side as f64 / longer as f64).min(1.0)
+    /// The matte of the region, trimmed.
+    fn cut_out(
+        &self,
+        matted: Matted,
+        found: Segmentation,
+        screen: &CleanScreen,
+        diagnostics: Vec<Diagnostic>,
+    ) -> CutOut {
+        CutOut {
+            film: self.cropped(&matted.film).map(Film::clamped),
+            transmittance: self
+                .cropped(&matted.transmittance)
+                .map(|t| t.map(|t| t.clamp(0.0, 1.0))),
+            uncertainty: self.cropped(&matted.uncertainty).map(|u| u.clamp(0.0, 1.0)),
+            hull: found.hull.iter().map(|p| self.moved(*p)).collect(),
+            outline: found.outline.map(|p| self.moved(p)),
+            roi: self.kept,
+            scale: self.scale,
+            screen: screen.color,
+            unevenness: screen.plate.unevenness,
+            method: matted.method,
+            residual_matte: matted.residual_matte,
+            color_uncertainty: matted.color_uncertainty,
+            diagnostics,
+            segmentation: found,
+        }
+    }
+
+    /// A point of the photo in pixels of the cut-out.
+    fn moved(&self, p: Point2<f64>) -> Point2<f64> {
+        let corner = Point2::new(self.kept.x as f64, self.kept.y as f64);
+        Point2::from((p - corner) * self.scale)
+    }
+
+    /// A picture of the region as one of the cut-out; reduced, it may exceed its range by rounding.
+    fn cropped<P: Mix>(&self, image: &Image<P>) -> Image<P> {
+        let image = image.crop(self.kept_in_region());
+        if self.scale >= 1.0 {
+            return image;
+        }
+        let [width, height] = [image.width(), image.height()].map(|side| self.scaled(side));
+        filter::resize(&image, width, height)
+    }
+
+    fn scaled(&self, side: usize) -> usize {
+        ((side as f64 * self.scale).round() as usize).max(1)
     }
 }
 
@@ -324,83 +348,16 @@ impl Boundary {
     }
 }
 
-/// Which pixels the cut-out shows.
-struct Trim {
-    /// In the photo.
-    roi: Roi,
-    /// In the region around the object.
-    in_region: Roi,
-    /// Pixels of the cut-out for one pixel of the photo.
-    scale: f64,
-}
-
-impl Trim {
-    /// The matte of the region, trimmed; without diagnostics.
-    fn cut_out(&self, matted: Matted, found: Segmentation, screen: &CleanScreen) -> CutOut {
-        CutOut {
-            film: self.cropped(&matted.film).map(Film::clamped),
-            transmittance: self
-                .cropped(&matted.transmittance)
-                .map(|t| t.map(|t| t.clamp(0.0, 1.0))),
-            uncertainty: self.cropped(&matted.uncertainty).map(|u| u.clamp(0.0, 1.0)),
-            hull: found.hull.iter().map(|p| self.moved(*p)).collect(),
-            outline: found.outline.map(|p| self.moved(p)),
-            roi: self.roi,
-            scale: self.scale,
-            screen: screen.color,
-            unevenness: screen.plate.unevenness,
-            method: matted.method,
-            residual_matte: matted.residual_matte,
-            color_uncertainty: matted.color_uncertainty,
-            diagnostics: Vec::new(),
-            segmentation: found,
-        }
-    }
-
-    /// A point of the photo in pixels of the cut-out.
-    fn moved(&self, p: Point2<f64>) -> Point2<f64> {
-        let corner = Point2::new(self.roi.x as f64, self.roi.y as f64);
-        Point2::from((p - corner) * self.scale)
-    }
-
-    /// A picture of the region as one of the cut-out; reduced, it may exceed its range by rounding.
-    fn cropped<P: Mix>(&self, image: &Image<P>) -> Image<P> {
-        let image = image.crop(self.in_region);
-        if self.scale >= 1.0 {
-            image
-        } else {
-            self.reduced(&image)
-        }
-    }
-
-    fn reduced<P: Mix>(&self, image: &Image<P>) -> Image<P> {
-        let (width, height) = image.size();
-        filter::resize(image, self.scaled(width), self.scaled(height))
-    }
-
-    fn scaled(&self, side: usize) -> usize {
-        ((side as f64 * self.scale).round() as usize).max(1)
-    }
-}
-
 /// The whole pixels that a hull and a margin around it cover.
 fn hull_roi(hull: &[Point2<f64>], margin_px: usize, (w, h): (usize, usize)) -> Roi {
-    let xs = whole_pixels(hull.iter().map(|p| p.x), w);
-    let ys = whole_pixels(hull.iter().map(|p| p.y), h);
+    let [left, top, right, bottom] = sides(hull);
+    let (xs, ys) = (whole_pixels(left, right, w), whole_pixels(top, bottom, h));
     Roi::spanning(xs, ys).grown(margin_px, w, h)
 }
 
-/// The whole pixels of a row of `len` from the least to the greatest of some coordinates.
-fn whole_pixels(coordinates: impl Iterator<Item = f64>, len: usize) -> std::ops::Range<usize> {
-    let (low, high) = extremes(coordinates);
+/// The whole pixels of a row of `len` from one coordinate to another.
+fn whole_pixels(low: f64, high: f64, len: usize) -> std::ops::Range<usize> {
     (low.max(0.0) as usize).min(len)..(high.ceil() as usize).min(len)
-}
-
-/// The least of some coordinates and the greatest, at least 0.
-fn extremes(coordinates: impl Iterator<Item = f64>) -> (f64, f64) {
-    coordinates.fold((f64::MAX, 0.0_f64), |(low, high), v| {
-        (low.min(v), high.max(v))
-    })
 }
 
 fn softened(mask: &Image<Coverage>, sigma_px: f32) -> Image<Coverage> {
@@ -551,6 +508,24 @@ mod tests {
         cut_out_corrected(photo, None, strokes, &CutOutOptions::default())
     }
 
+    fn clear_plastic() -> LinearRgb {
+        GREEN.scale(0.56) + LinearRgb::grey(0.02)
+    }
+
+    /// A clear slab with a patch.
+    fn clear_slab(patch: LinearRgb) -> Image<LinearRgb> {
+        Image::from_fn(120, 80, |x, y| match (x, y) {
+            (50..70, 30..50) => patch,
+            (30..90, 25..55) => clear_plastic(),
+            _ => GREEN,
+        })
+    }
+
+    /// A photo cut out without a stroke, and with it.
+    fn without_and_with(photo: &Image<LinearRgb>, stroke: Stroke) -> [CutOut; 2] {
+        [&[] as &[Stroke], &[stroke]].map(|strokes| corrected(photo, strokes).unwrap())
+    }
+
     /// The film at a pixel of the photo; nothing outside the cut-out.
     fn film_at(cut: &CutOut, [x, y]: [usize; 2]) -> Film {
         let [x, y] = [x.wrapping_sub(cut.roi.x), y.wrapping_sub(cut.roi.y)];
@@ -619,17 +594,9 @@ mod tests {
 
     #[test]
     fn paint_of_the_screen_s_colour_is_opaque_where_a_person_says_so() {
-        // A clear slab with a patch that looks like bare screen.
-        let photo = Image::from_fn(120, 80, |x, y| match (x, y) {
-            (50..70, 30..50) => GREEN,
-            (30..90, 25..55) => GREEN.scale(0.56) + LinearRgb::grey(0.02),
-            _ => GREEN,
-        });
+        let photo = clear_slab(GREEN);
         let patch = painted(Claim::Opaque, 9.0, &[[60.0, 40.0]]);
-        let (found, cut) = (
-            corrected(&photo, &[]).unwrap(),
-            corrected(&photo, &[patch]).unwrap(),
-        );
+        let [found, cut] = without_and_with(&photo, patch);
         let [before, after] = [&found, &cut].map(|cut| opacity_at(cut, [60, 40]));
         assert!(before < 0.2 && after > 0.99, "{before} {after}");
         let color = film_at(&cut, [60, 40]).color;
@@ -640,30 +607,15 @@ mod tests {
 
     #[test]
     fn coloured_light_on_plastic_hides_nothing_where_a_person_says_so() {
-        // A clear slab with an orange patch.
-        let photo = Image::from_fn(120, 80, |x, y| {
-            let clear = GREEN.scale(0.56) + LinearRgb::grey(0.02);
-            match (x, y) {
-                (50..70, 30..50) => clear + LinearRgb::new(0.3, 0.1, 0.0),
-                (30..90, 25..55) => clear,
-                _ => GREEN,
-            }
-        });
+        let orange = clear_plastic() + LinearRgb::new(0.3, 0.1, 0.0);
         let patch = painted(Claim::SeeThrough, 14.0, &[[60.0, 40.0]]);
-        let (found, cut) = (
-            corrected(&photo, &[]).unwrap(),
-            corrected(&photo, &[patch]).unwrap(),
-        );
+        let [found, cut] = without_and_with(&clear_slab(orange), patch);
         let [before, after] = [&found, &cut].map(|cut| opacity_at(cut, [60, 40]));
         assert!(before > 0.9 && after < 0.4, "{before} {after}");
     }
 
     #[test]
     fn strokes_correct_a_keyed_cut_out_too() {
-        let clear = Image::from_fn(120, 80, |x, y| match (x, y) {
-            (30..90, 25..55) => GREEN.scale(0.56) + LinearRgb::grey(0.02),
-            _ => GREEN,
-        });
         let options = CutOutOptions {
             method: Some(MatteMethod::Key),
             within: Boundary::Hull,
@@ -673,6 +625,7 @@ mod tests {
             painted(Claim::Opaque, 5.0, &[[60.0, 40.0]]),
             painted(Claim::NotObject, 5.0, &[[80.0, 40.0]]),
         ];
+        let clear = clear_slab(clear_plastic());
         let cut = cut_out_corrected(&clear, None, &strokes, &options).unwrap();
         assert!(opacity_at(&cut, [60, 40]) > 0.99 && opacity_at(&cut, [80, 40]) < 0.01);
         assert!((0.05..0.95).contains(&opacity_at(&cut, [45, 40])));

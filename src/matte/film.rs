@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 use solve::{Factor, Solver};
 use std::borrow::Cow;
 use std::ops::RangeInclusive;
-use tint::{DARKEST_SHARE, Tint, TintSamples, bare_shade};
+use tint::{DARKEST_SHARE, Tint, TintSamples};
 
 /// How film is solved for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -86,15 +86,6 @@ pub struct FilmMatte {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-impl FilmMatte {
-    /// Reflected light F and opacity `1 - T`: the film as it lay on the screen, its shadow
-    /// included.
-    pub fn shaded(&self) -> Image<Film> {
-        self.film
-            .zip_map(&self.transmittance, |film, t| Film::new(film.color, t))
-    }
-}
-
 /// Solves `photo = F + T * plate` for the reflected light F and the transmittance T of one object.
 ///
 /// `photo` is scene-linear; `inside` is the object's coverage, soft at its outline, and cuts off
@@ -134,7 +125,16 @@ pub fn film(
     options.check()?;
     check_finite(photo)?;
     check_coverage(inside)?;
-    let mut matte = solve_film(FilmInput::whole(photo, plate, inside, options), options)?;
+    let whole = FilmInput {
+        photo,
+        plate,
+        inside,
+        screen: plate.color(),
+        longer_side: longer_side(photo),
+        clipped: clipping_level(photo, options.clipped),
+        claims: None,
+    };
+    let mut matte = solve_film(whole, options)?;
     let clipped = clipped_screen(photo, inside, options.clipped);
     matte.diagnostics.extend(clipped);
     Ok(matte)
@@ -192,34 +192,13 @@ fn solve_as_exposed(object: FilmInput<'_>, options: &FilmOptions) -> FilmMatte {
     let mut factors = solution.factors(tint.flat);
     watch.lap("factors");
     let color_uncertainty = solution.refine(&mut factors, tint, &mut watch);
-    let matte = FilmMatte {
-        color_uncertainty,
-        diagnostics: solution.diagnostics(color_uncertainty),
-        ..solution.composed(&factors, tint.flat.into())
-    };
+    let matte = solution.composed(&factors, tint.flat.into(), color_uncertainty);
     watch.lap("compose");
     watch.log("film");
     matte
 }
 
-impl<'a> FilmInput<'a> {
-    fn whole(
-        photo: &'a Image<LinearRgb>,
-        plate: &'a ScreenPlate,
-        inside: &'a Image<Coverage>,
-        options: &FilmOptions,
-    ) -> Self {
-        Self {
-            photo,
-            plate,
-            inside,
-            screen: plate.color(),
-            longer_side: longer_side(photo),
-            clipped: clipping_level(photo, options.clipped),
-            claims: None,
-        }
-    }
-
+impl FilmInput<'_> {
     /// The film by the photo exposed by a factor more, with the light of the photo as it is:
     /// `photo = F + T * plate` holds at any exposure.
     fn solve_exposed(self, gain: f32, options: &FilmOptions) -> FilmMatte {
@@ -245,20 +224,12 @@ impl<'a> FilmInput<'a> {
     /// # Panics
     /// When the sizes differ.
     fn check(&self) -> Result<()> {
-        self.assert_same_sizes();
+        let (photo, plate) = (self.photo.size(), self.plate.image.size());
+        assert_eq!(photo, plate, "photo and plate differ in size");
+        assert_eq!(photo, self.inside.size(), "photo and mask differ in size");
         check_photo(self.inside.pixels().iter().any(|c| c.0 > 0.0), || {
             "the mask of the object is empty".into()
         })
-    }
-
-    fn assert_same_sizes(&self) {
-        let size = self.photo.size();
-        assert_eq!(
-            size,
-            self.plate.image.size(),
-            "photo and plate differ in size"
-        );
-        assert_eq!(size, self.inside.size(), "photo and mask differ in size");
     }
 }
 
@@ -314,21 +285,11 @@ impl<'a> FilmSolution<'a> {
         } else {
             Solver::guess
         };
-        let bare = |pixel, screen| {
-            let shade = self
-                .is_keyable
-                .then(|| bare_shade(pixel, screen, flat, self.key));
-            shade.flatten()
-        };
         let factors = self
             .calm
             .zip3_map(&plate.image, inside, |pixel, screen, inside| {
                 if inside.0 > 0.0 {
-                    let [pixel, screen] = [pixel, screen].map(LinearRgb::into);
-                    Factor {
-                        bare_shade: bare(pixel, screen),
-                        ..factor(&solver, pixel, screen)
-                    }
+                    factor(&solver, pixel.into(), screen.into())
                 } else {
                     Factor::default()
                 }
@@ -360,31 +321,14 @@ impl<'a> FilmSolution<'a> {
         Tint { flat, uncertainty }: Tint,
         watch: &mut Stopwatch,
     ) -> ColorUncertainty {
-        let FilmInput {
-            photo,
-            plate,
-            inside,
-            longer_side,
-            clipped,
-            claims,
-            ..
-        } = self.object;
-        let most = largest(flat);
-        let guessed = uncertainty::guessed(factors, inside, self.options.thickness_spread, most);
-        let screen_hue = bright::make_opaque(
-            factors,
-            &self.calm,
-            &plate.image,
-            inside,
-            longer_side,
-            claims,
-        );
-        let photos = [&*self.calm, &plate.image];
-        let keyed_away =
-            uncertainty::keyed_away(factors, photos, inside, flat[self.key], longer_side);
+        let (object, most) = (self.object, largest(flat));
+        let spread = self.options.thickness_spread;
+        let guessed = uncertainty::guessed(factors, object.inside, spread, most);
+        let screen_hue = bright::make_opaque(factors, &self.calm, object);
+        let keyed_away = uncertainty::keyed_away(factors, &self.calm, object, flat[self.key]);
         watch.lap("paint");
-        let clipped = bright::fill_glints(factors, photo, inside, clipped);
-        claimed::make_opaque(factors, claims);
+        let clipped = bright::fill_glints(factors, object);
+        claimed::make_opaque(factors, object.claims);
         watch.lap("glints");
         ColorUncertainty {
             keyed_away,
@@ -404,7 +348,12 @@ impl<'a> FilmSolution<'a> {
     }
 
     /// F, T and V from the factors by which the pixels are flat plastic.
-    fn composed(&self, factors: &Image<Factor>, flat: LinearRgb) -> FilmMatte {
+    fn composed(
+        &self,
+        factors: &Image<Factor>,
+        flat: LinearRgb,
+        color_uncertainty: ColorUncertainty,
+    ) -> FilmMatte {
         let inside = self.object.inside;
         let plastic = factors.map(|f| f.transmittance(flat));
         let transmittance = plastic.zip_map(inside, covered);
@@ -422,8 +371,8 @@ impl<'a> FilmSolution<'a> {
             transmittance,
             uncertainty: uncertainty_of(factors, inside, flat.max_channel()),
             flat,
-            color_uncertainty: ColorUncertainty::default(),
-            diagnostics: Vec::new(),
+            color_uncertainty,
+            diagnostics: self.diagnostics(color_uncertainty),
         }
     }
 }
@@ -472,7 +421,7 @@ pub(super) fn covered(t: LinearRgb, Coverage(c): Coverage) -> LinearRgb {
 }
 
 /// Light that is left when some is taken away; not less than none.
-pub(super) fn without(light: LinearRgb, taken: LinearRgb) -> LinearRgb {
+fn without(light: LinearRgb, taken: LinearRgb) -> LinearRgb {
     LinearRgb::new(
         (light.r - taken.r).max(0.0),
         (light.g - taken.g).max(0.0),

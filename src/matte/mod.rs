@@ -47,7 +47,7 @@ pub(crate) use clipping::ends_at_one;
 #[doc(hidden)]
 pub use color_spill::{ColorSpillOptions, SpillChannel, SpillLimit, color_spill};
 #[doc(hidden)]
-pub use cut_out::{Boundary, cut_out_on};
+pub use cut_out::Boundary;
 pub use cut_out::{CutOut, CutOutOptions, MatteMethod, cut_out, cut_out_corrected};
 #[doc(hidden)]
 pub use difference_key::{DifferenceKeyOptions, difference_key};

@@ -45,13 +45,9 @@ impl Outline {
 
     /// The convex hull, clockwise as seen.
     pub fn hull(&self) -> Vec<Point2<f64>> {
-        let (ring, _) = self.all_points().convex_hull().into_inner();
+        let points = self.rings.iter().flatten().map(|p| Point::new(p.x, p.y));
+        let (ring, _) = points.collect::<MultiPoint>().convex_hull().into_inner();
         points_of(ring.0.get(1..).unwrap_or_default())
-    }
-
-    fn all_points(&self) -> MultiPoint {
-        let points = self.rings.iter().flatten();
-        points.map(|p| Point::new(p.x, p.y)).collect()
     }
 
     /// Area inside, square pixels, without the holes.
@@ -70,17 +66,12 @@ impl Outline {
     /// How wide a long strip of this area and outline would be: twice the area over the length of
     /// its rings, pixels; 0 where there is nothing.
     pub fn width(&self) -> f64 {
-        let around = self.length();
+        let around: f64 = self.rings.iter().map(|ring| ring_length(ring)).sum();
         if around > 0.0 {
             2.0 * self.area() / around
         } else {
             0.0
         }
-    }
-
-    /// Length of all rings, pixels.
-    fn length(&self) -> f64 {
-        self.rings.iter().map(|ring| ring_length(ring)).sum()
     }
 
     /// Every point moved by a function.
@@ -122,14 +113,11 @@ impl Outline {
 }
 
 fn contours(coverage: &Image<Coverage>) -> Vec<Contour> {
+    let values: Vec<f64> = coverage.pixels().iter().map(|c| c.0.into()).collect();
     // Fails only where the number of values is not that of the pixels.
     ContourBuilder::new(coverage.width(), coverage.height(), true)
-        .contours(&values_of(coverage), &[HALF_COVERED])
+        .contours(&values, &[HALF_COVERED])
         .unwrap_or_default()
-}
-
-fn values_of(coverage: &Image<Coverage>) -> Vec<f64> {
-    coverage.pixels().iter().map(|c| f64::from(c.0)).collect()
 }
 
 /// The polygons of a contour that are more than rounding.
@@ -157,12 +145,7 @@ fn open_rings(polygon: Polygon) -> impl Iterator<Item = Vec<Point2<f64>>> {
     let (outer, holes) = polygon.into_inner();
     std::iter::once(outer)
         .chain(holes)
-        .map(|ring| open_ring(&ring.0))
-}
-
-/// The points of a closed ring without its repeated first one.
-fn open_ring(closed: &[Coord]) -> Vec<Point2<f64>> {
-    points_of(&closed[..closed.len().saturating_sub(1)])
+        .map(|ring| points_of(&ring.0[..ring.0.len().saturating_sub(1)]))
 }
 
 pub(super) fn points_of(coordinates: &[Coord]) -> Vec<Point2<f64>> {
@@ -181,15 +164,8 @@ const LINE_COVERAGE: f32 = 1.0 / SCAN_LINES as f32;
 
 /// Where a side crosses the horizontal line at `y`.
 #[inline]
-fn crossing(side: &RingSide, y: f64) -> Option<f64> {
-    let [a, b] = side;
-    ((a.y <= y) != (b.y <= y)).then(|| x_on_side(side, y))
-}
-
-/// Where the line through a side that is not horizontal is at `y`.
-#[inline]
-fn x_on_side([a, b]: &RingSide, y: f64) -> f64 {
-    a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x)
+fn crossing([a, b]: &RingSide, y: f64) -> Option<f64> {
+    ((a.y <= y) != (b.y <= y)).then(|| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x))
 }
 
 /// Adds what the insides of rings with these sides cover of row `y`.
@@ -288,13 +264,9 @@ mod tests {
     #[test]
     fn the_hull_has_no_hollow() {
         let ell = Image::from_fn(40, 40, |x, y| {
-            Coverage(f32::from(u8::from(
-                (5..35).contains(&x) && (5..35).contains(&y) && (x < 15 || y > 25),
-            )))
+            (5..35).contains(&x) && (5..35).contains(&y) && (x < 15 || y > 25)
         });
-        let hull = Outline {
-            rings: vec![Outline::around(&ell).hull()],
-        };
+        let hull = Outline::from_ring(Outline::around(&ell.to_coverage()).hull());
         let [full, corner] = [900.0, 0.5 * 20.0 * 21.0];
         assert!(
             (hull.area() - (full - corner)).abs() < 40.0,
@@ -306,15 +278,9 @@ mod tests {
     #[test]
     fn coverage_sums_to_the_area_also_of_what_lies_outside() {
         let sum = |ring: &[[f64; 2]], side: usize| -> f32 {
-            let outline = Outline {
-                rings: vec![ring.iter().map(|p| Point2::from(*p)).collect()],
-            };
-            outline
-                .coverage(side, side)
-                .pixels()
-                .iter()
-                .map(|c| c.0)
-                .sum()
+            let outline = Outline::from_ring(ring.iter().map(|p| Point2::from(*p)).collect());
+            let coverage = outline.coverage(side, side);
+            coverage.pixels().iter().map(|c| c.0).sum()
         };
         let triangle = sum(&[[1.0, 1.0], [9.0, 2.5], [3.0, 8.0]], 10);
         assert!(
@@ -331,8 +297,8 @@ mod tests {
 
     #[test]
     fn what_reaches_the_border_ends_there() {
-        let half = Image::from_fn(20, 10, |x, _| Coverage(f32::from(u8::from(x < 8))));
-        let outline = Outline::around(&half);
+        let half = Image::from_fn(20, 10, |x, _| x < 8);
+        let outline = Outline::around(&half.to_coverage());
         assert!((outline.area() - 80.0).abs() < 1.0, "{}", outline.area());
     }
 

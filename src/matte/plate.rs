@@ -170,19 +170,9 @@ impl ScreenPlate {
     /// # Panics
     /// When `roi` reaches outside the plate.
     pub(super) fn crop(&self, roi: Roi) -> Self {
-        let Self {
-            unevenness,
-            residual,
-            degree,
-            shift_px,
-            ..
-        } = *self;
         Self {
             image: self.image.crop(roi),
-            unevenness,
-            residual,
-            degree,
-            shift_px,
+            ..*self
         }
     }
 
@@ -229,7 +219,10 @@ const MAX_DEGREE: usize = 6;
 
 impl PlateOptions {
     pub(super) fn check(&self) -> Result<()> {
-        check_degree(self.max_degree)?;
+        let degree = self.max_degree;
+        check_value(degree <= MAX_DEGREE, "max_degree", || {
+            format!("{degree}, expected 0 to {MAX_DEGREE}")
+        })?;
         check_share("least_gain", self.least_gain)?;
         check_length("max_shift_px", self.max_shift_px)?;
         check_share("max_mismatch", self.max_mismatch)
@@ -255,12 +248,6 @@ impl PlateOptions {
     }
 }
 
-fn check_degree(degree: usize) -> Result<()> {
-    check_value(degree <= MAX_DEGREE, "max_degree", || {
-        format!("{degree}, expected 0 to {MAX_DEGREE}")
-    })
-}
-
 /// A photo of the empty screen, moved onto the photo, without its noise and of the photo's
 /// exposure.
 fn matched(
@@ -269,13 +256,9 @@ fn matched(
     background: &Mask,
     shift_px: [f64; 2],
 ) -> Result<Image<LinearRgb>> {
-    let smooth = moved_and_smoothed(empty, shift_px);
+    let smooth = filter::gaussian_blur(&register::moved(empty, shift_px), PHOTO_BLUR_PX);
     let gain = gain_on_background(photo, &smooth, background)?;
     Ok(smooth.map(|p| p * gain))
-}
-
-fn moved_and_smoothed(empty: &Image<LinearRgb>, shift_px: [f64; 2]) -> Image<LinearRgb> {
-    filter::gaussian_blur(&register::moved(empty, shift_px), PHOTO_BLUR_PX)
 }
 
 fn check_same_size((w, h): (usize, usize), (width, height): (usize, usize)) -> Result<()> {
@@ -293,22 +276,12 @@ fn shift_onto(
     let gain = gain_on_background(photo, empty, background)?;
     // The object's edges must not be seen: the filters of the search reach over them into the free
     // screen.
-    let without_object = free_or_empty(photo, empty, background, gain);
-    Ok(register::shift(&without_object, empty, background, [1.0; 3]).shift_px)
-}
-
-/// The photo where the screen is free, elsewhere the empty screen times a gain.
-fn free_or_empty(
-    photo: &Image<LinearRgb>,
-    empty: &Image<LinearRgb>,
-    background: &Mask,
-    gain: LinearRgb,
-) -> Image<LinearRgb> {
-    photo.zip3_map(
+    let without_object = photo.zip3_map(
         empty,
         background,
         |p, e, free| if free { p } else { e * gain },
-    )
+    );
+    Ok(register::shift(&without_object, empty, background, [1.0; 3]).shift_px)
 }
 
 /// The factor per channel from a photo of the empty screen to the photo.

@@ -97,21 +97,15 @@ pub(super) fn longer_side<P: Copy>(image: &Image<P>) -> usize {
 fn at_working_size(photo: &Image<LinearRgb>, working_size: usize) -> Cow<'_, Image<LinearRgb>> {
     let longer = longer_side(photo);
     if longer < SMALL_PHOTO_PX.min(working_size) {
-        Cow::Owned(enlarged(photo, ENLARGED_PHOTO_PX.div_ceil(longer)))
+        let times = ENLARGED_PHOTO_PX.div_ceil(longer);
+        let (w, h) = photo.size();
+        Cow::Owned(filter::resize(photo, times * w, times * h))
     } else if longer <= working_size {
         Cow::Borrowed(photo)
     } else {
-        Cow::Owned(reduced(photo, working_size))
+        let [w, h] = scaled_sides(photo.size(), working_size, MIN_SEARCH_SIZE_PX);
+        Cow::Owned(filter::resize(photo, w, h))
     }
-}
-
-fn enlarged(photo: &Image<LinearRgb>, times: usize) -> Image<LinearRgb> {
-    filter::resize(photo, times * photo.width(), times * photo.height())
-}
-
-fn reduced(photo: &Image<LinearRgb>, working_size: usize) -> Image<LinearRgb> {
-    let [w, h] = scaled_sides(photo.size(), working_size, MIN_SEARCH_SIZE_PX);
-    filter::resize(photo, w, h)
 }
 
 /// The sides of a picture that is scaled to a longer side; none is less than `shortest`.

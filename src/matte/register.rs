@@ -77,17 +77,11 @@ impl Registered {
     /// The shift is a significant one between pictures of the same thing; `side` is the shorter one
     /// of the picture.
     fn is_reliable(&self, side: usize) -> bool {
+        let length_px = Vector2::from(self.shift_px).norm();
         let is_unlike = self.agreement < MIN_AGREEMENT;
-        let is_lost = self.length_px() > MAX_SHIFT_SHARE * side as f64;
-        !(is_unlike || is_lost || self.is_insignificant())
-    }
-
-    fn is_insignificant(&self) -> bool {
-        self.length_px() < SIGNIFICANT_SIGMAS * self.sigma_px
-    }
-
-    fn length_px(&self) -> f64 {
-        Vector2::from(self.shift_px).norm()
+        let is_lost = length_px > MAX_SHIFT_SHARE * side as f64;
+        let is_insignificant = length_px < SIGNIFICANT_SIGMAS * self.sigma_px;
+        !(is_unlike || is_lost || is_insignificant)
     }
 }
 
@@ -120,7 +114,8 @@ struct PyramidLevel {
 impl PyramidLevel {
     /// The next level; none where its pictures would be too small.
     fn halved(&self) -> Option<Self> {
-        self.can_be_halved().then(|| Self {
+        let shorter = self.a.width().min(self.a.height());
+        (shorter >= 2 * MIN_HALVED_SIDE_PX).then(|| Self {
             a: filter::halve(&self.a),
             b: filter::halve(&self.b),
             mask: filter::halve(&self.mask),
@@ -134,10 +129,6 @@ impl PyramidLevel {
             levels.extend(levels.last().and_then(Self::halved));
         }
         levels
-    }
-
-    fn can_be_halved(&self) -> bool {
-        self.a.width().min(self.a.height()) >= 2 * MIN_HALVED_SIDE_PX
     }
 
     /// The shift from the coarsest level down to the finest, each starting from the one before.
@@ -155,7 +146,11 @@ impl PyramidLevel {
     fn registered(&self, start_px: [f64; 2], at_full: f64) -> Option<Registered> {
         let start = Vector2::from(start_px) / at_full;
         let (at, last) = self.high_passed().refined(start)?;
-        Some(last.to_registered(at, at_full))
+        Some(Registered {
+            shift_px: (at * at_full).into(),
+            sigma_px: last.sigma * at_full,
+            agreement: last.agreement,
+        })
     }
 
     fn high_passed(&self) -> Self {
@@ -264,18 +259,6 @@ struct ShiftStep {
     by: Vector2<f64>,
     sigma: f64,
     agreement: f64,
-}
-
-impl ShiftStep {
-    /// The shift that this was the last step to, at a level of which a pixel is `at_full` of the
-    /// first.
-    fn to_registered(&self, at: Vector2<f64>, at_full: f64) -> Registered {
-        Registered {
-            shift_px: (at * at_full).into(),
-            sigma_px: self.sigma * at_full,
-            agreement: self.agreement,
-        }
-    }
 }
 
 /// Neighbouring pixels that vary together after the blur: the area of its kernel, 4 pi sigma^2.

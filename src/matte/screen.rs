@@ -109,12 +109,10 @@ mod tests {
 
     fn disc(size: usize, radius: usize) -> Image<Coverage> {
         let half = size / 2;
-        let inside = |x: usize, y: usize| {
+        let disc = Image::from_fn(size, size, |x, y| {
             x.abs_diff(half).pow(2) + y.abs_diff(half).pow(2) <= radius * radius
-        };
-        Image::from_fn(size, size, |x, y| {
-            Coverage(f32::from(u8::from(inside(x, y))))
-        })
+        });
+        disc.to_coverage()
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The four corners of a coloured screen that is seen as a whole.
 
+use super::arrays::dot;
 use super::check::refused;
 use super::outline::Outline;
 use super::prepared::{longer_side, scaled_sides};
@@ -111,21 +112,13 @@ fn refined(
     scale: f64,
 ) -> Result<ScreenCorners> {
     let sides = fitted_sides(photo, corners, scale)?;
+    let corners_px = corners_between(&sides.map(|side| side.line))
+        .ok_or_else(|| not_found("two of its sides are parallel that should meet"))?;
+    let off_px = sides.map(|side| side.off_px);
     Ok(ScreenCorners {
-        corners_px: corners_of(&sides)?,
-        sigma_px: most_off_px(&sides),
+        corners_px,
+        sigma_px: off_px.into_iter().fold(NOISE_PX, f64::max),
     })
-}
-
-fn corners_of(sides: &[ScreenSide; 4]) -> Result<[Point2<f64>; 4]> {
-    corners_between(&sides.map(|side| side.line))
-        .ok_or_else(|| not_found("two of its sides are parallel that should meet"))
-}
-
-/// How far the border is from the least straight side; not less than noise.
-fn most_off_px(sides: &[ScreenSide; 4]) -> f64 {
-    let off_px = sides.iter().map(|side| side.off_px);
-    off_px.fold(NOISE_PX, f64::max)
 }
 
 /// The same ring of corners, begun with the one that is nearest to the picture's top left.
@@ -283,13 +276,8 @@ fn is_covered(region: &Mask, hull: &[Point2<f64>]) -> bool {
     let coverage = Outline::from_ring(hull.to_vec()).coverage(w, h);
     let within = coverage.map(|c| c.0 > 0.5);
     let free = filter::erode(&within, RIM_PX).zip_map(region, |inside, screen| inside && !screen);
-    largest_group(&free) as f64 > MIN_OBJECT_SHARE * within.count() as f64
-}
-
-/// Pixels of the largest connected group of a set.
-fn largest_group(set: &Mask) -> usize {
-    let sizes = PixelGroups::new(set).sizes(set);
-    sizes.into_iter().max().unwrap_or(0)
+    let largest = PixelGroups::new(&free).sizes(&free).into_iter().max();
+    largest.unwrap_or(0) as f64 > MIN_OBJECT_SHARE * within.count() as f64
 }
 
 /// The four points of a convex polygon that enclose the most of it, in its order.
@@ -423,12 +411,13 @@ impl BorderProbe<'_> {
     fn border(&self, reach: f64) -> Option<Point2<f64>> {
         let steps = (2.0 * reach * STEPS_PER_PX).ceil() as usize;
         let [inside, outside] = [-1.0, 1.0].map(|side| self.mean_beyond(side, reach, steps));
-        let change = inside.add_scaled(-1.0, outside);
+        let change = inside.add_scaled(-1.0, outside).channels();
         let square = dot(change, change);
         let step = 2.0 * reach / steps as f64;
         let inside_length: f64 = self
             .colors(reach, steps)
-            .map(|color| step * f64::from(dot(color.add_scaled(-1.0, outside), change) / square))
+            .map(|color| color.add_scaled(-1.0, outside).channels())
+            .map(|off| step * f64::from(dot(off, change) / square))
             .sum();
         // Where the inside ends, from the foot.
         let at = inside_length - reach;
@@ -458,8 +447,4 @@ impl BorderProbe<'_> {
             .fold(LinearRgb::BLACK, |sum, p| sum + p)
             .scale(2.0 / steps as f32)
     }
-}
-
-fn dot(a: LinearRgb, b: LinearRgb) -> f32 {
-    a.r * b.r + a.g * b.g + a.b * b.b
 }

@@ -126,17 +126,20 @@ mod tests {
     const GREEN: LinearRgb = LinearRgb::new(0.05, 0.4, 0.1);
     const RED: LinearRgb = LinearRgb::new(0.5, 0.05, 0.05);
 
-    /// A sheet with a smaller sheet on it on a table, told that the outer one was cut out.
-    fn is_told(table: LinearRgb, sheet: LinearRgb, thing: LinearRgb) -> bool {
+    /// A sheet with a smaller sheet on it on a table, told that this hull was cut out.
+    fn is_hull_told([table, sheet, thing]: [LinearRgb; 3], hull: &[Point2<f64>]) -> bool {
         let photo = Image::from_fn(240, 180, |x, y| match (x, y) {
             (80..150, 70..110) => thing,
             (30..210, 25..155) => sheet,
             _ => table,
         });
+        screen_edge_seen(&photo, hull, table, &SegmentOptions::default()).is_some()
+    }
+
+    /// The same of the hull of the outer one.
+    fn is_told(table: LinearRgb, sheet: LinearRgb, thing: LinearRgb) -> bool {
         let hull = [[30.0, 25.0], [210.0, 25.0], [210.0, 155.0], [30.0, 155.0]];
-        let hull = hull.map(Point2::from);
-        let told = screen_edge_seen(&photo, &hull, table, &SegmentOptions::default());
-        told.is_some()
+        is_hull_told([table, sheet, thing], &hull.map(Point2::from))
     }
 
     #[test]
@@ -151,11 +154,6 @@ mod tests {
 
     #[test]
     fn a_sheet_that_was_cut_out_with_bulges_is_told() {
-        let photo = Image::from_fn(240, 180, |x, y| match (x, y) {
-            (80..150, 70..110) => RED,
-            (30..210, 25..155) => GREEN,
-            _ => BROWN,
-        });
         // Grain of the table bends every side outwards: four corners have 0.92 of it.
         let hull = [
             [30.0, 25.0],
@@ -169,8 +167,7 @@ mod tests {
         ];
         let hull = hull.map(Point2::from);
         assert!(area(&four_corners(&hull).unwrap()) < MIN_QUADRANGLE_SHARE * area(&hull));
-        let told = screen_edge_seen(&photo, &hull, BROWN, &SegmentOptions::default());
-        assert!(told.is_some());
+        assert!(is_hull_told([BROWN, GREEN, RED], &hull));
     }
 
     #[test]

@@ -6,7 +6,7 @@ mod choose;
 mod cluster;
 mod confidence;
 mod holes;
-mod hull;
+pub(super) mod hull;
 mod mattes;
 mod options;
 mod pass;

@@ -131,11 +131,13 @@ pub fn triangulate(
     // Drift shows as tint, too.
     let doubt = exposure_drift(&aligned, &solved, inside, determined)
         .or_else(|| uncertain_tint(inferred.largest_spread()));
-    let mut diagnostics = diagnostics(&shift_px, determined, doubt);
-    diagnostics.extend(clipped_screens(shots, inside));
+    let told = moved_photos(&shift_px)
+        .chain(open_channels(determined))
+        .chain(doubt)
+        .chain(clipped_screens(shots, inside));
     Ok(Triangulated {
         residual: residual(&aligned, &solved, inside),
-        diagnostics,
+        diagnostics: told.collect(),
         determined,
         shift_px,
         ..composed(&solved, inside)
@@ -178,15 +180,6 @@ fn view_transmittance(
 ) -> Image<LinearRgb> {
     let measured = solved.map(|p| p.transmittance);
     view(&measured, flat, inside).zip_map(inside, covered)
-}
-
-fn diagnostics(
-    shift_px: &[[f64; 2]],
-    determined: [bool; 3],
-    doubt: Option<Diagnostic>,
-) -> Vec<Diagnostic> {
-    let moved = moved_photos(shift_px).chain(open_channels(determined));
-    moved.chain(doubt).collect()
 }
 
 /// The warning about photos that differ in exposure or white balance.
@@ -252,13 +245,17 @@ fn check_sizes(
     check_value(shots.len() >= 2, "photos", || {
         format!("{}, expected at least 2", shots.len())
     })?;
+    let (width, height) = inside.size();
     for (i, (photo, plate)) in shots.iter().enumerate() {
+        let (w, h) = photo.size();
         assert_eq!(
-            photo.size(),
+            (w, h),
             plate.image.size(),
             "photo {i} and its plate differ in size"
         );
-        check_same_size(i, photo.size(), inside.size())?;
+        check_value((w, h) == (width, height), &format!("photos[{i}]"), || {
+            format!("{w} x {h} pixels, expected {width} x {height}")
+        })?;
     }
     Ok(())
 }
@@ -268,19 +265,6 @@ fn check_pixels(shots: &[(&Image<LinearRgb>, &ScreenPlate)]) -> Result<()> {
     let mut photos = (1..).zip(shots);
     photos
         .try_for_each(|(number, (photo, _))| check_finite_photo(&format!("photo {number}"), photo))
-}
-
-/// Photo `number`, from 0, has the size of the mask.
-fn check_same_size(
-    number: usize,
-    (w, h): (usize, usize),
-    (width, height): (usize, usize),
-) -> Result<()> {
-    check_value(
-        (w, h) == (width, height),
-        &format!("photos[{number}]"),
-        || format!("{w} x {h} pixels, expected {width} x {height}"),
-    )
 }
 
 fn align(
@@ -469,22 +453,14 @@ fn determined_channels(
     inside: &Image<Coverage>,
     max_sigma: f32,
 ) -> Result<[bool; 3]> {
-    let determined =
-        [0, 1, 2].map(|c| median_sigma(lines, inside, c).is_some_and(|sigma| sigma <= max_sigma));
+    let determined = [0, 1, 2].map(|c| {
+        let sigmas = lines::covered_pixels(lines, inside).map(|p| p.sigma(c));
+        median(sigmas, f32::total_cmp).is_some_and(|sigma| sigma <= max_sigma)
+    });
     check_photo(determined != [false; 3], || {
         "the screens are too similar in every channel to separate film from background".into()
     })?;
     Ok(determined)
-}
-
-/// Standard deviation of a channel's transmittance, the median over the object.
-fn median_sigma(
-    lines: &Image<PixelLines>,
-    inside: &Image<Coverage>,
-    channel: usize,
-) -> Option<f32> {
-    let pixels = lines::covered_pixels(lines, inside);
-    median(pixels.map(|p| p.sigma(channel)), f32::total_cmp)
 }
 
 /// Root mean square of what the film does not explain of the photos inside the object.

@@ -427,14 +427,10 @@ fn free_places(
 
 fn free_place(point: [f64; 2], width: f64, taken: &[Area], frame: &Area) -> Option<[f64; 2]> {
     let mut places = places_beside(point, width).into_iter();
-    places.find(|place| frame.has_room(&Area::of_word(*place, width), taken))
-}
-
-impl Area {
-    /// It holds another area, which none of those that are taken overlaps.
-    fn has_room(&self, area: &Self, taken: &[Self]) -> bool {
-        self.holds(area) && !taken.iter().any(|other| other.overlaps(area))
-    }
+    places.find(|place| {
+        let area = Area::of_word(*place, width);
+        frame.holds(&area) && !taken.iter().any(|other| other.overlaps(&area))
+    })
 }
 
 /// Where a word beside a point may begin, best first: to its right or left, above or below.
@@ -456,18 +452,14 @@ fn short_number(value: f64) -> String {
 mod tests {
     use super::*;
 
-    fn set_beside(
-        labels: Vec<([f64; 2], &str)>,
-        points: Vec<[f64; 2]>,
-        [left, right, top, bottom]: [f64; 4],
-    ) -> String {
+    fn set_beside(labels: Vec<([f64; 2], &str)>) -> String {
         let frame = Area {
-            left,
-            top,
-            right,
-            bottom,
+            left: 0.0,
+            top: 0.0,
+            right: 200.0,
+            bottom: 200.0,
         };
-        labels_beside(labels, points, frame).into_string()
+        labels_beside(labels, vec![], frame).into_string()
     }
 
     #[test]
@@ -531,41 +523,15 @@ mod tests {
 
     #[test]
     fn words_beside_points_do_not_cover_each_other() {
-        let text = set_beside(
-            vec![([50.0, 50.0], "one"), ([51.0, 50.0], "two")],
-            vec![],
-            [0.0, 200.0, 0.0, 200.0],
-        );
+        let text = set_beside(vec![([50.0, 50.0], "one"), ([51.0, 50.0], "two")]);
         assert_eq!(text.matches("<text").count(), 2);
         let crowd = vec![([50.0, 50.0], "a long word"); 9];
-        assert!(
-            set_beside(crowd, vec![], [0.0, 200.0, 0.0, 200.0])
-                .matches("<text")
-                .count()
-                < 9
-        );
-        let low = set_beside(
-            vec![([50.0, 198.0], "low")],
-            vec![],
-            [0.0, 200.0, 0.0, 200.0],
-        );
+        assert!(set_beside(crowd).matches("<text").count() < 9);
+        let low = set_beside(vec![([50.0, 198.0], "low")]);
         assert!(low.contains("y=\"195.0\""), "not below the frame: {low}");
-        assert!(
-            !set_beside(
-                vec![([199.0, 50.0], "wide")],
-                vec![],
-                [0.0, 200.0, 0.0, 200.0]
-            )
-            .contains("x=\"206")
-        );
-        assert_eq!(
-            set_beside(
-                vec![([10.0, 50.0], "a word as wide as the chart itself is")],
-                vec![],
-                [0.0, 200.0, 0.0, 200.0]
-            ),
-            ""
-        );
+        assert!(!set_beside(vec![([199.0, 50.0], "wide")]).contains("x=\"206"));
+        let wide = vec![([10.0, 50.0], "a word as wide as the chart itself is")];
+        assert_eq!(set_beside(wide), "");
     }
 
     #[test]

@@ -41,7 +41,8 @@ impl Histogram {
         let last = counts.len() - 1;
         for value in values {
             let place = (value - low) / (high - low) * bins as f64;
-            counts[bin_at(place).min(last)] += 1;
+            // What is below 0 and NaN become 0.
+            counts[(place as usize).min(last)] += 1;
         }
         Self {
             title: title.into(),
@@ -137,18 +138,9 @@ fn line_across(y: &str) -> String {
 fn clipped_label([x, y]: [f64; 2], room: f64, anchor: &str, whole: &str) -> Markup {
     html! {
         text x=(tenths(x)) y=(tenths(y)) text-anchor=(anchor) {
-            (text(&cut_to_room(whole, room))) title { (text(whole)) }
+            (text(&clipped(whole, (room / LETTER_WIDTH) as usize))) title { (text(whole)) }
         }
     }
-}
-
-fn bin_at(place: f64) -> usize {
-    if place > 0.0 { place as usize } else { 0 }
-}
-
-/// A text, cut where there is no more room for it.
-fn cut_to_room(text: &str, room: f64) -> String {
-    clipped(text, (room / LETTER_WIDTH) as usize)
 }
 
 /// A number with as many digits as help.

@@ -4,7 +4,7 @@ use crate::asset::Texture;
 use crate::filter::sample_bilinear;
 use crate::geom::Vector3;
 use crate::pixel::Film;
-use crate::render::grade::graded_opacity;
+use crate::render::grade::shifted_opacity;
 use crate::render::view::ScenePlane;
 use crate::scene::Card;
 
@@ -22,7 +22,7 @@ pub(super) fn card_texel(
     let grade = &card.grade;
     Film {
         color: crate::color::shift_hsv(film.color, grade.hue_deg, grade.saturation, grade.value),
-        opacity: graded_opacity(film.opacity, grade),
+        opacity: shifted_opacity(film.opacity, grade.hue_deg, grade.saturation),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::asset::Texture;
 use crate::error::{Error, Result};
-use crate::pixel::{Film, ObjectId};
+use crate::pixel::Film;
 use crate::scene::{AreaLight, Card, EnvironmentMap, Shot};
 
 /// Is a shot something that can be rendered?
@@ -25,7 +25,10 @@ pub fn check(shot: &Shot) -> Result<()> {
 
 fn check_lights(lights: &[AreaLight]) -> Result<()> {
     let mut numbered = lights.iter().enumerate();
-    numbered.try_for_each(|(i, light)| check_light(i, light))
+    numbered.try_for_each(|(i, light)| {
+        let at = format!("lights[{i}]");
+        require(is_finite(light), &at, "not finite, expected numbers")
+    })
 }
 
 fn check_cards(cards: &[Card]) -> Result<()> {
@@ -45,21 +48,10 @@ fn check_plate(shot: &Shot) -> Result<()> {
     Err(Error::value("plate", what))
 }
 
-fn check_light(i: usize, light: &AreaLight) -> Result<()> {
-    require(
-        is_finite(light),
-        &format!("lights[{i}]"),
-        "not finite, expected numbers",
-    )
-}
-
 fn is_finite(light: &AreaLight) -> bool {
-    lengths_of(light).all(f64::is_finite) && light.power.is_finite() && light.color.is_finite()
-}
-
-fn lengths_of(light: &AreaLight) -> impl Iterator<Item = f64> {
-    let places = [light.position, light.target];
-    places.into_iter().flatten().chain(light.size)
+    let places = [light.position, light.target].into_iter().flatten();
+    let mut numbers = places.chain(light.size).chain([light.power]);
+    numbers.all(f64::is_finite) && light.color.is_finite()
 }
 
 /// The environment, constant or a map, and the exposure.
@@ -85,20 +77,15 @@ fn check_map(map: &EnvironmentMap) -> Result<()> {
 }
 
 fn check_ids(cards: &[Card]) -> Result<()> {
-    match repeated_id(cards) {
-        Some(ObjectId(id)) => Err(Error::value(
-            "cards",
-            format!("id {id} is used twice, expected one card each"),
-        )),
+    let mut ids: Vec<_> = cards.iter().map(|card| card.id.0).collect();
+    ids.sort_unstable();
+    match ids.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => {
+            let what = format!("id {} is used twice, expected one card each", pair[0]);
+            Err(Error::value("cards", what))
+        }
         None => Ok(()),
     }
-}
-
-fn repeated_id(cards: &[Card]) -> Option<ObjectId> {
-    let mut ids: Vec<_> = cards.iter().map(|card| card.id).collect();
-    ids.sort_unstable();
-    let pair = ids.windows(2).find(|pair| pair[0] == pair[1])?;
-    Some(pair[0])
 }
 
 fn check_card(card: &Card) -> std::result::Result<(), String> {
@@ -106,11 +93,8 @@ fn check_card(card: &Card) -> std::result::Result<(), String> {
         return Err("id 0, expected 1 or more".into());
     }
     check_texture(&card.texture)?;
-    card.back.iter().try_for_each(check_back)
-}
-
-fn check_back(back: &Texture) -> std::result::Result<(), String> {
-    check_texture(back).map_err(|what| format!("back: {what}"))
+    let mut back = card.back.iter();
+    back.try_for_each(|back| check_texture(back).map_err(|what| format!("back: {what}")))
 }
 
 fn check_texture(texture: &Texture) -> std::result::Result<(), String> {

@@ -34,26 +34,26 @@ impl Cryptomatte {
     /// Coverage is what is seen of an object. Where more than six objects share a pixel, those with
     /// least are left out.
     pub fn new(deep: &DeepImage, layer: &str, names: &[(ObjectId, String)]) -> Self {
-        let ids = hashed_ids(names);
+        let ids: Vec<_> = names
+            .iter()
+            .map(|(object, name)| (*object, id_of_name(name)))
+            .collect();
+        let planes = rank_planes(deep, &ids).into_iter().enumerate();
+        let texts = [
+            ("name", layer.to_owned()),
+            ("hash", "MurmurHash3_32".to_owned()),
+            ("conversion", "uint32_to_float32".to_owned()),
+            ("manifest", manifest_text(names)),
+        ];
         Self {
-            channels: named_planes(layer, rank_planes(deep, &ids)),
-            metadata: layer_metadata(layer, names),
+            channels: planes
+                .map(|(i, plane)| (channel_name(layer, i), plane))
+                .collect(),
+            metadata: texts
+                .map(|(what, text)| (attribute_name(layer, what), text))
+                .into(),
         }
     }
-}
-
-fn hashed_ids(names: &[(ObjectId, String)]) -> Vec<(ObjectId, f32)> {
-    let names = names.iter();
-    names
-        .map(|(object, name)| (*object, id_of_name(name)))
-        .collect()
-}
-
-fn named_planes(layer: &str, planes: Vec<Vec<f32>>) -> Vec<(String, Vec<f32>)> {
-    let numbered = planes.into_iter().enumerate();
-    numbered
-        .map(|(i, plane)| (channel_name(layer, i), plane))
-        .collect()
 }
 
 /// Samples of each channel, row by row: id and coverage of each rank in turn.
@@ -62,18 +62,14 @@ fn rank_planes(deep: &DeepImage, ids: &[(ObjectId, f32)]) -> Vec<Vec<f32>> {
     let mut planes = vec![Vec::with_capacity(deep.width() * deep.height()); count];
     for y in 0..deep.height() {
         for x in 0..deep.width() {
-            push_ranks(&mut planes, ranked_objects(deep.at(x, y), ids, count / 2));
+            let ranks = ranked_objects(deep.at(x, y), ids, count / 2);
+            for (pair, (id, coverage)) in planes.chunks_exact_mut(2).zip(ranks) {
+                pair[0].push(id);
+                pair[1].push(coverage);
+            }
         }
     }
     planes
-}
-
-/// Adds a pixel to the planes of each rank.
-fn push_ranks(planes: &mut [Vec<f32>], ranks: Vec<(f32, f32)>) {
-    for (pair, (id, coverage)) in planes.chunks_exact_mut(2).zip(ranks) {
-        pair[0].push(id);
-        pair[1].push(coverage);
-    }
 }
 
 /// Ids and visible coverage of a pixel's objects, the most visible first; as many as there are
@@ -100,22 +96,6 @@ fn ranked_objects(
 fn channel_name(layer: &str, i: usize) -> String {
     let (set, channel) = (i / SET_CHANNELS.len(), SET_CHANNELS[i % SET_CHANNELS.len()]);
     format!("{layer}{set:02}.{channel}")
-}
-
-fn layer_metadata(layer: &str, names: &[(ObjectId, String)]) -> Vec<(String, String)> {
-    layer_texts(layer, names)
-        .into_iter()
-        .map(|(what, text)| (attribute_name(layer, what), text))
-        .collect()
-}
-
-fn layer_texts(layer: &str, names: &[(ObjectId, String)]) -> [(&'static str, String); 4] {
-    [
-        ("name", layer.to_owned()),
-        ("hash", "MurmurHash3_32".to_owned()),
-        ("conversion", "uint32_to_float32".to_owned()),
-        ("manifest", manifest_text(names)),
-    ]
 }
 
 /// Ids by name, as JSON.
@@ -148,7 +128,7 @@ pub(crate) fn id_of_name(name: &str) -> f32 {
 }
 
 /// MurmurHash3_x86_32 with seed 0, by Austin Appleby, who put it into the public domain.
-pub(crate) fn murmur3(bytes: &[u8]) -> u32 {
+fn murmur3(bytes: &[u8]) -> u32 {
     let words = bytes.chunks_exact(4);
     let rest = words.remainder().iter().rev();
     let rest = rest.fold(0, |word, &byte| word << 8 | u32::from(byte));

@@ -160,11 +160,10 @@ fn layer_stack(
     let planes = visible_planes(shot);
     let context = LightingContext::new(shot, &planes, view, *options);
     let content = TexelContent::needed(context.occluders.tinted, is_lit(shot));
-    let detail = PictureDetail {
-        offsets: &offsets,
-        content,
-    };
-    let cards = projected_cards(&planes, view, &detail);
+    let cards: Vec<_> = planes
+        .par_iter()
+        .map(|(card, plane)| ProjectedCard::new(card, plane, view, &offsets, content))
+        .collect();
     watch.lap("bake");
     let receivers = receivers(&context, &cards);
     watch.lap("shadows");
@@ -186,18 +185,6 @@ fn layer_stack(
 /// Some light shines.
 fn is_lit(shot: &Shot) -> bool {
     !shot.lights.is_empty() || !shot.ambient.is_black() || shot.environment.is_some()
-}
-
-/// The cards in the picture; none for one that is edge-on or outside.
-fn projected_cards<'a>(
-    planes: &[(&'a Card, ScenePlane)],
-    view: &CameraView,
-    detail: &PictureDetail<'_>,
-) -> Vec<Option<ProjectedCard<'a>>> {
-    planes
-        .par_iter()
-        .map(|(card, plane)| ProjectedCard::new(card, plane, view, detail))
-        .collect()
 }
 
 /// The same without any light: what objects cover and hide, and how far away they are.
@@ -269,13 +256,6 @@ fn sample_grid(
     }
 }
 
-/// What textures are made ready for.
-struct PictureDetail<'a> {
-    /// Sub-samples along each side of a pixel.
-    offsets: &'a [f64],
-    content: TexelContent,
-}
-
 /// A card in the picture, before it is lit.
 struct ProjectedCard<'a> {
     card: &'a Card,
@@ -288,12 +268,14 @@ struct ProjectedCard<'a> {
 }
 
 impl<'a> ProjectedCard<'a> {
-    /// None for a card that is edge-on or outside the picture.
+    /// None for a card that is edge-on or outside the picture; `offsets` are the sub-samples along
+    /// each side of a pixel.
     fn new(
         card: &'a Card,
         plane: &ScenePlane,
         view: &CameraView,
-        detail: &PictureDetail<'_>,
+        offsets: &[f64],
+        content: TexelContent,
     ) -> Option<Self> {
         let projected = ProjectedPlane::new(plane, view)?;
         let (rows, columns) = rows_and_columns(plane, [0.0; 2], view);
@@ -304,8 +286,8 @@ impl<'a> ProjectedCard<'a> {
         let (texture, mirrored) = visible_texture(card, plane, &view.eye);
         let projected = projected.mirrored_if(mirrored);
         let texels = texels_per_pixel(texture, plane, &projected, view, &plane.center);
-        let level = detail_level(texels, detail.offsets);
-        let texture = BakedTexture::new(texture, &card.grade, level, detail.content);
+        let level = detail_level(texels, offsets);
+        let texture = BakedTexture::new(texture, &card.grade, level, content);
         let (rows, columns) = rows_and_columns(plane, texture.grid.reach, view);
         Some(Self {
             card,
@@ -348,26 +330,16 @@ fn visible_texture<'a>(
     }
 }
 
-/// Tiles as one picture.
-fn assemble_tiles(size: [usize; 2], side: usize, tiles: Vec<RenderedTile>) -> DeepImage {
-    let shadow = assemble_shadow(size, &tiles);
+/// Tiles as one picture; the factor on the plate is 1 where no tile has one.
+fn assemble_tiles([width, height]: [usize; 2], side: usize, tiles: Vec<RenderedTile>) -> DeepImage {
+    let mut shadow = Image::filled(width, height, LinearRgb::WHITE);
+    for tile in &tiles {
+        if let Some(values) = &tile.shadow {
+            copy_block(&tile.block, values, &mut shadow);
+        }
+    }
     let samples = tiles.into_iter().map(|tile| tile.samples).collect();
     DeepImage::from_tiles(shadow, side, samples)
-}
-
-/// The factor on the plate, 1 where no tile has one.
-fn assemble_shadow([width, height]: [usize; 2], tiles: &[RenderedTile]) -> Image<LinearRgb> {
-    let mut shadow = Image::filled(width, height, LinearRgb::WHITE);
-    for tile in tiles {
-        copy_shadow(tile, &mut shadow);
-    }
-    shadow
-}
-
-fn copy_shadow(tile: &RenderedTile, picture: &mut Image<LinearRgb>) {
-    if let Some(values) = &tile.shadow {
-        copy_block(&tile.block, values, picture);
-    }
 }
 
 /// Copies a block's values, row by row, to where it lies in a picture.

@@ -1,6 +1,6 @@
 //! Four numbers that are worked on together, as one vector register.
 
-use crate::pixel::{LinearRgb, PremulRgba};
+use crate::pixel::{LinearRgb, Mix, PremulRgba};
 use bytemuck::{Pod, Zeroable};
 
 /// Numbers between which others lie.
@@ -47,11 +47,6 @@ impl Float4 {
     #[inline(always)]
     pub(super) fn alpha(self) -> f32 {
         self.0[3]
-    }
-
-    #[inline(always)]
-    pub(super) fn add_scaled(self, weight: f32, o: Self) -> Self {
-        Self(std::array::from_fn(|i| self.0[i] + weight * o.0[i]))
     }
 
     #[inline(always)]
@@ -105,6 +100,13 @@ impl Blend for Float4 {
         Self(std::array::from_fn(|i| {
             self.0[i] + t * (o.0[i] - self.0[i])
         }))
+    }
+}
+
+impl Mix for Float4 {
+    #[inline(always)]
+    fn add_scaled(self, weight: f32, o: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] + weight * o.0[i]))
     }
 }
 

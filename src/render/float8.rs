@@ -1,6 +1,6 @@
 //! Colour and opacity that are worked on together, as one vector register.
 
-use crate::pixel::{Film, LinearRgb, PremulRgba};
+use crate::pixel::{Film, LinearRgb, Mix, PremulRgba};
 use crate::render::float4::{Blend, Float4};
 use bytemuck::{Pod, Zeroable};
 
@@ -31,11 +31,6 @@ impl Float8 {
         Float4([p, q, s, t])
     }
 
-    #[inline(always)]
-    pub(super) fn add_scaled(self, weight: f32, o: Self) -> Self {
-        Self(std::array::from_fn(|i| self.0[i] + weight * o.0[i]))
-    }
-
     /// `self + a * b`, number by number.
     #[inline(always)]
     pub(super) fn add_product(self, a: Self, b: Self) -> Self {
@@ -49,6 +44,13 @@ impl Blend for Float8 {
         Self(std::array::from_fn(|i| {
             self.0[i] + t * (o.0[i] - self.0[i])
         }))
+    }
+}
+
+impl Mix for Float8 {
+    #[inline(always)]
+    fn add_scaled(self, weight: f32, o: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] + weight * o.0[i]))
     }
 }
 

@@ -8,12 +8,8 @@ use crate::scene::Grade;
 
 /// Opacity of film whose transmittance is turned in hue and changed in saturation; grey stays as it
 /// is.
-pub(super) fn graded_opacity(opacity: LinearRgb, grade: &Grade) -> LinearRgb {
-    shifted_opacity(opacity, grade.hue_deg, grade.saturation)
-}
-
 #[inline(always)]
-fn shifted_opacity(opacity: LinearRgb, hue_deg: f32, saturation: f32) -> LinearRgb {
+pub(super) fn shifted_opacity(opacity: LinearRgb, hue_deg: f32, saturation: f32) -> LinearRgb {
     let through = opacity.map(|o| 1.0 - o);
     let shifted = crate::color::shift_hsv(through, hue_deg, saturation, 1.0);
     let is_grey = opacity.r == opacity.g && opacity.g == opacity.b;
@@ -45,7 +41,7 @@ pub(super) fn grade_texels(texels: &mut [Float8], grade: &Grade) {
     }
 }
 
-/// Grades opacities as [`graded_opacity`] does each.
+/// Grades opacities as [`shifted_opacity`] does each.
 pub(super) fn grade_opacities(opacities: &mut [Float4], grade: &Grade) {
     if turns_opacity(grade) {
         shift_opacities(opacities, 1, grade.hue_deg, grade.saturation);

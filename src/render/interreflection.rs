@@ -138,13 +138,8 @@ fn light_from_above(cards: &[(&Card, ScenePlane)], point: &Vector3<f64>) -> Line
         .filter_map(|(card, plane)| hit_above(card, plane, point));
     let mut hits: Vec<_> = hits.collect();
     hits.sort_by(|a, b| a.0.total_cmp(&b.0));
-    reflected_back(hits.into_iter().map(|(_, film)| film))
-}
-
-/// Light that comes back from layers of film, the first one met first.
-fn reflected_back(layers: impl Iterator<Item = Film>) -> LinearRgb {
     let (mut back, mut through) = (LinearRgb::BLACK, LinearRgb::WHITE);
-    for film in layers {
+    for (_, film) in hits {
         back = back + through * through * film.color;
         through = through * film.transmittance();
     }

@@ -1,5 +1,6 @@
 //! Irradiance of each receiver at the nodes of the lattice, to be looked up between them.
 
+use crate::pixel::Mix;
 use crate::render::float4::{Blend, Float4};
 use crate::render::lattice::{LatticePosition, coarser_position};
 use crate::render::ranges::{range_overlap, ranges_meet};

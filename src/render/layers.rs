@@ -7,7 +7,7 @@
 
 use crate::deep::{DeepSample, DeepTile};
 use crate::geom::Vector3;
-use crate::pixel::{Depth, LinearRgb, ObjectId};
+use crate::pixel::{Depth, LinearRgb, Mix, ObjectId};
 use crate::render::block::PixelBlock;
 use crate::render::float4::Float4;
 use crate::render::grade::channel_mean;
@@ -70,13 +70,6 @@ pub(super) struct BentLattice {
     pub(super) lattice: Lattice,
     /// Position of the pinhole camera's picture, from the picture's.
     pub(super) ideal_from_picture: Matrix3<f64>,
-}
-
-impl BentLattice {
-    fn position_of(&self, px: [f64; 2]) -> (LatticePosition, LatticePosition) {
-        let ideal = self.ideal_from_picture * Vector3::new(px[0], px[1], 1.0);
-        self.lattice.position_of(ideal.x, ideal.y)
-    }
 }
 
 /// The surface under the cards, which their shadows fall on.
@@ -153,6 +146,11 @@ impl RenderedTile {
 }
 
 impl BentLattice {
+    fn position_of(&self, px: [f64; 2]) -> (LatticePosition, LatticePosition) {
+        let ideal = self.ideal_from_picture * Vector3::new(px[0], px[1], 1.0);
+        self.lattice.position_of(ideal.x, ideal.y)
+    }
+
     /// Pixels of the pinhole camera's picture that a block of the picture shows, and some around.
     fn ideal_area(&self, block: &PixelBlock) -> PixelBlock {
         let ends = block.ends().map(|[x, y]| {
@@ -202,11 +200,6 @@ impl SampleGrid {
     fn sample_weight(&self) -> f32 {
         let r = self.offsets.len();
         1.0 / (r * r) as f32
-    }
-
-    /// How far sub-samples lie from their pixel's centre, at most.
-    fn reach_px(&self) -> f64 {
-        self.offsets.iter().fold(0.0, |m: f64, o| m.max(o.abs()))
     }
 
     /// Where a position of the grid is on the lattice: a pixel, where light is looked up once for
@@ -278,22 +271,17 @@ impl Layer {
         (self.plane.w.dot(p) / self.plane.height) as f32
     }
 
-    /// It is no farther away than another layer.
-    fn is_before(&self, other: &Self, p: &Vector3<f64>) -> bool {
-        self.reciprocal_depth(p) >= other.reciprocal_depth(p)
-    }
-
-    fn is_before_at_all(&self, other: &Self, points: &[Vector3<f64>]) -> bool {
-        points.iter().all(|p| self.is_before(other, p))
+    /// It is nowhere farther away than another layer.
+    fn is_before(&self, other: &Self, points: &[Vector3<f64>]) -> bool {
+        let mut points = points.iter();
+        points.all(|p| self.reciprocal_depth(p) >= other.reciprocal_depth(p))
     }
 
     /// Depth at a pixel's centre; as far as can be where the plane is behind the camera.
     fn depth_at(&self, x: usize, y: usize) -> Depth {
         Depth(self.plane.depth_at(&pixel_center(x, y)) as f32)
     }
-}
 
-impl Layer {
     /// A texture on a plane that may touch these rows and columns of pixels.
     pub(super) fn new(
         id: ObjectId,
@@ -319,9 +307,7 @@ impl Layer {
         let area = (block.y.clone(), block.x.clone());
         Self::new(self.id, (plane, texture), self.light.clone(), area)
     }
-}
 
-impl Layer {
     /// It is farther away than another layer, in the middle of what they have in common; in its own
     /// middle where that is nothing.
     fn is_behind(&self, other: &Self) -> bool {
@@ -332,20 +318,15 @@ impl Layer {
         let block = if common.len() > 0 {
             common
         } else {
-            self.block()
+            PixelBlock {
+                x: self.columns.clone(),
+                y: self.rows.clone(),
+            }
         };
         let [x, y] = block.middle();
         let p = Vector3::new(x, y, 1.0);
         let [own, others] = [self, other].map(|layer| layer.reciprocal_depth(&p));
         own < others || (own == others && self.id > other.id)
-    }
-
-    /// Pixels it may touch.
-    fn block(&self) -> PixelBlock {
-        PixelBlock {
-            x: self.columns.clone(),
-            y: self.rows.clone(),
-        }
     }
 }
 
@@ -456,7 +437,7 @@ impl LayerStack {
     fn is_sorted_at(&self, layers: &[usize], corners: &[Vector3<f64>; 4]) -> bool {
         layers
             .windows(2)
-            .all(|pair| self.layers[pair[0]].is_before_at_all(&self.layers[pair[1]], corners))
+            .all(|pair| self.layers[pair[0]].is_before(&self.layers[pair[1]], corners))
     }
 
     /// Walks the layers of a part of a tile front to back; returns what passes through all of them.
@@ -752,7 +733,7 @@ impl CatcherSpans {
             .map(|o| row_span(edges, y as f64 + 0.5 + o))
             .collect();
         let (low, high) = common_span(&rows);
-        let reach = samples.reach_px();
+        let reach = samples.offsets.iter().fold(0.0, |m: f64, o| m.max(o.abs()));
         Self {
             rows,
             inner: (low + reach, high - reach),

@@ -11,7 +11,6 @@ use crate::render::block::PixelBlock;
 use crate::render::lattice::Lattice;
 use crate::render::layers::{BentLattice, LayerStack};
 use crate::scene::Shot;
-use nalgebra::Matrix3;
 
 /// How far the tangent may be from the lens at a corner of a tile, pixels: what a code of 8 bits of
 /// an edge from black to white is worth four times over.
@@ -68,18 +67,12 @@ impl LensView {
         lattice: Lattice,
         tile: &PixelBlock,
     ) -> LayerStack {
-        let ideal_from_picture = self.tangent(tile);
+        let tangent = self.lens.undistort_near(Point2::from(tile.middle()));
         let bent = BentLattice {
             lattice,
-            ideal_from_picture,
+            ideal_from_picture: tangent.append_translation(&self.offset),
         };
         stack.bent(bent, tile)
-    }
-
-    /// The lens close to the middle of a tile: position of the pinhole camera's picture.
-    fn tangent(&self, tile: &PixelBlock) -> Matrix3<f64> {
-        let near = self.lens.undistort_near(Point2::from(tile.middle()));
-        near.append_translation(&self.offset)
     }
 }
 

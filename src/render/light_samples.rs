@@ -213,20 +213,16 @@ impl LightGroup {
         }
     }
 
-    /// The constant environment of a shot.
+    /// The constant environment of a shot, from directions around a normal.
     fn constant(shot: &Shot, options: &RenderOptions, normal: &Vector3<f64>) -> Self {
-        Self::ambient(shot.ambient, options.ambient_samples, normal)
-    }
-
-    /// A constant environment, from directions around a normal.
-    fn ambient(radiance: LinearRgb, count: usize, normal: &Vector3<f64>) -> Self {
+        let count = options.ambient_samples;
         let world_from_hemisphere = hemisphere_frame(normal);
         let share = PI / count as f64;
         let samples = light::ambient_directions(count).into_iter().map(|d| {
             LightSample::in_sky(&(world_from_hemisphere * d), (share / d.z).sqrt(), share)
         });
         Self {
-            radiance,
+            radiance: shot.ambient,
             samples: samples.collect(),
         }
     }
@@ -255,17 +251,14 @@ impl LightGroup {
 
 /// Axes of a frame whose `z` is `normal`.
 fn hemisphere_frame(normal: &Vector3<f64>) -> Matrix3<f64> {
-    let x = oblique_axis(normal).cross(normal).normalize();
-    Matrix3::from_columns(&[x, normal.cross(&x), *normal])
-}
-
-/// An axis of the world that is far from parallel to a normal.
-fn oblique_axis(normal: &Vector3<f64>) -> Vector3<f64> {
-    if normal.x.abs() < 0.6 {
+    // An axis of the world that is far from parallel to it.
+    let oblique = if normal.x.abs() < 0.6 {
         Vector3::x()
     } else {
         Vector3::y()
-    }
+    };
+    let x = oblique.cross(normal).normalize();
+    Matrix3::from_columns(&[x, normal.cross(&x), *normal])
 }
 
 impl LightSample {
@@ -320,11 +313,17 @@ mod tests {
     fn disk(size: f64, height: f64) -> AreaLight {
         AreaLight {
             shape: LightShape::Ellipse,
-            position: [0.0, 0.0, height],
-            target: [0.0; 3],
-            size: [size; 2],
-            power: 10.0,
-            color: LinearRgb::WHITE,
+            ..AreaLight::new([0.0, 0.0, height], [size; 2], 10.0)
+        }
+    }
+
+    fn level_patch(occluded: f64, cell: f64) -> LitPatch {
+        LitPatch {
+            center: Vector3::zeros(),
+            normal: Vector3::z(),
+            reach: 0.1,
+            occluded,
+            cell,
         }
     }
 
@@ -333,11 +332,9 @@ mod tests {
         let shot = Shot::new(tilted_camera()).with_light(light);
         let options = RenderOptions::from(quality);
         let patch = LitPatch {
-            center: Vector3::zeros(),
             normal,
             reach,
-            occluded: 0.1,
-            cell: 0.0,
+            ..level_patch(0.1, 0.0)
         };
         LightSamples::faces_above(&shot, &options, &patch).remove(0)
     }
@@ -371,14 +368,7 @@ mod tests {
     #[test]
     fn penumbrae_of_a_few_pixels_need_few_samples() {
         let samples = |size: f64, height: f64, occluded: f64| {
-            let patch = LitPatch {
-                center: Vector3::zeros(),
-                normal: Vector3::z(),
-                reach: 0.1,
-                occluded,
-                cell: 0.002,
-            };
-            patch.samples_per_side(&disk(size, height), 3)
+            level_patch(occluded, 0.002).samples_per_side(&disk(size, height), 3)
         };
         // Penumbrae of 0, 0.3, 3 and 17 cells.
         let by_height = [0.0, 0.01, 0.1, 0.4].map(|occluded| samples(0.05, 1.0, occluded));
@@ -395,13 +385,7 @@ mod tests {
             position: [2.0, 0.0, 0.4],
             ..disk(0.06, 0.4)
         };
-        let patch = LitPatch {
-            center: Vector3::zeros(),
-            normal: Vector3::z(),
-            reach: 0.1,
-            occluded: 0.02,
-            cell: 0.00235,
-        };
+        let patch = level_patch(0.02, 0.00235);
         assert_eq!(patch.samples_per_side(&low, 3), 3);
         assert_eq!(patch.samples_per_side(&disk(0.06, 0.4), 3), 1);
     }

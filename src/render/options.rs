@@ -152,42 +152,21 @@ mod tests {
                 .into_iter()
                 .all(|quality| RenderOptions::from(quality).check().is_ok())
         );
-        let default = RenderOptions::default();
-        let message = |options: RenderOptions| options.check().unwrap_err().to_string();
-        let many = message(RenderOptions {
-            subsamples: 1_000_000,
-            ..default
-        });
+        let message = |spoil: &dyn Fn(&mut RenderOptions)| {
+            let mut options = RenderOptions::default();
+            spoil(&mut options);
+            options.check().unwrap_err().to_string()
+        };
         assert_eq!(
-            many,
+            message(&|o| o.subsamples = 1_000_000),
             "subsamples: 1000000, expected 1 to 16 (quality reference has 6)"
         );
-        assert!(
-            message(RenderOptions {
-                subsamples: 0,
-                ..default
-            })
-            .starts_with("subsamples: 0, expected 1 to 16")
-        );
-        assert!(
-            message(RenderOptions {
-                light_samples: usize::MAX,
-                ..default
-            })
-            .starts_with("light_samples: 1.8")
-        );
-        assert!(
-            message(RenderOptions {
-                ambient_samples: 0,
-                ..default
-            })
-            .starts_with("ambient_samples: 0")
-        );
+        assert!(message(&|o| o.subsamples = 0).starts_with("subsamples: 0, expected 1 to 16"));
+        assert!(message(&|o| o.light_samples = usize::MAX).starts_with("light_samples: 1.8"));
+        assert!(message(&|o| o.ambient_samples = 0).starts_with("ambient_samples: 0"));
         for cell_px in [0.0, -1.0, f64::NAN] {
-            assert!(
-                message(RenderOptions { cell_px, ..default }).starts_with("cell_px: "),
-                "{cell_px}"
-            );
+            let told = message(&|o| o.cell_px = cell_px);
+            assert!(told.starts_with("cell_px: "), "{cell_px}");
         }
     }
 }

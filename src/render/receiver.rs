@@ -4,7 +4,7 @@
 //! occluder at most nodes, and makes light exact where nothing is in its way.
 
 use crate::geom::Vector3;
-use crate::pixel::LinearRgb;
+use crate::pixel::{LinearRgb, Mix};
 use crate::render::float4::Float4;
 use crate::render::half_plane::{ConvexShape, grown_side};
 use crate::render::lattice::{COARSER, Lattice};
@@ -48,10 +48,6 @@ struct RayGroup {
 impl RayGroup {
     fn has_faces(&self) -> bool {
         self.rays.iter().any(ShadowRay::is_face)
-    }
-
-    fn shadows(&self) -> impl Iterator<Item = &ProjectedShadow> {
-        self.rays.iter().flat_map(|ray| &ray.shadows)
     }
 }
 
@@ -272,8 +268,8 @@ impl VisibleSide<'_> {
 
 /// Bounds of all shadows on a receiver.
 fn shadowed_area(groups: &[RayGroup]) -> LatticeArea {
-    let shadows = groups.iter().flat_map(RayGroup::shadows);
-    shadows
+    let rays = groups.iter().flat_map(|group| &group.rays);
+    rays.flat_map(|ray| &ray.shadows)
         .map(ProjectedShadow::area)
         .reduce(area_union)
         .unwrap_or((0..0, 0..0))

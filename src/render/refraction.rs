@@ -327,16 +327,7 @@ struct Ending<'a> {
     growth: f64,
 }
 
-impl<'a> Ending<'a> {
-    fn new(card: &'a BendingCard<'a>, point: Vector3<f64>, depth: f64) -> Self {
-        Self {
-            growth: card.growth_at(&point),
-            card,
-            point,
-            depth,
-        }
-    }
-
+impl Ending<'_> {
     /// Where it ends with a displacement.
     fn at(&self, displacement: [f32; 2]) -> Vector3<f64> {
         self.point + self.card.along(displacement) * self.growth
@@ -396,7 +387,13 @@ impl<'a> Sight<'a> {
         let Some(depth) = backdrop.depth(x, y, surface) else {
             return SeenBehind::default();
         };
-        let ending = Ending::new(card, self.view.point_at(middle.x, middle.y, depth), depth);
+        let point = self.view.point_at(middle.x, middle.y, depth);
+        let ending = Ending {
+            card,
+            point,
+            depth,
+            growth: card.growth_at(&point),
+        };
         let straight = backdrop.pixel(x, y);
         let weight = 1.0 / (self.offsets.len() * self.offsets.len()) as f32;
         let seen = self

@@ -1,8 +1,7 @@
 //! A level of a pyramid made up to two times smaller, with a transparent border.
 
 use crate::image::Image;
-use crate::render::float4::Float4;
-use crate::render::float8::Float8;
+use crate::pixel::Mix;
 use crate::render::texel_grid::BORDER_TEXELS;
 use bytemuck::Pod;
 
@@ -12,26 +11,6 @@ pub(super) struct DetailLevel {
     level: usize,
     /// Texels of the level that make one, along each side: 1 up to 2.
     step: f64,
-}
-
-/// Numbers of a texel, which averages are made of.
-pub(super) trait Texel: Copy + Default {
-    /// `self + weight * o`, number by number.
-    fn add_scaled(self, weight: f32, o: Self) -> Self;
-}
-
-impl Texel for Float8 {
-    #[inline(always)]
-    fn add_scaled(self, weight: f32, o: Self) -> Self {
-        Float8::add_scaled(self, weight, o)
-    }
-}
-
-impl Texel for Float4 {
-    #[inline(always)]
-    fn add_scaled(self, weight: f32, o: Self) -> Self {
-        Float4::add_scaled(self, weight, o)
-    }
 }
 
 /// Texels with their border, row by row.
@@ -51,7 +30,7 @@ impl DetailLevel {
     }
 
     /// Reads what is wanted of a picture of floats from its pyramid, and finishes it row by row.
-    pub(super) fn resample<'a, P: Pod, T: Texel>(
+    pub(super) fn resample<'a, P: Pod, T: Mix>(
         &self,
         level: impl Fn(usize) -> &'a Image<P>,
         wanted: impl Fn(P) -> T,
@@ -71,7 +50,7 @@ impl DetailLevel {
     }
 }
 
-impl<T: Texel> BorderedTexels<T> {
+impl<T: Mix> BorderedTexels<T> {
     /// Room for this many columns and rows inside of the border.
     fn transparent(columns: usize, rows: usize) -> Self {
         let (width, height) = (columns + 2 * BORDER_TEXELS, rows + 2 * BORDER_TEXELS);
@@ -99,7 +78,7 @@ struct RowAverages<'a, P, T> {
     line: Vec<T>,
 }
 
-impl<'a, P: Pod, T: Texel> RowAverages<'a, P, T> {
+impl<'a, P: Pod, T: Mix> RowAverages<'a, P, T> {
     fn new(image: &'a Image<P>) -> Self {
         let channels = size_of::<P>() / size_of::<f32>();
         Self {
@@ -142,7 +121,7 @@ fn add_row(sum: &mut [f32], weight: f32, row: &[f32]) {
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn average_columns<T: Texel>(columns: &[TexelWeights], line: &[T], out: &mut [T]) {
+fn average_columns<T: Mix>(columns: &[TexelWeights], line: &[T], out: &mut [T]) {
     for (column, out) in columns.iter().zip(out) {
         *out = column.weighted_sum(line);
     }
@@ -184,7 +163,7 @@ impl TexelWeights {
     }
 
     #[inline(always)]
-    fn weighted_sum<T: Texel>(&self, texels: &[T]) -> T {
+    fn weighted_sum<T: Mix>(&self, texels: &[T]) -> T {
         self.weighted().fold(T::default(), |sum, (x, weight)| {
             sum.add_scaled(weight, texels[x])
         })

@@ -103,22 +103,6 @@ pub(super) struct TexelReads {
     pub(super) edges: usize,
 }
 
-impl TexelReads {
-    fn see_through(count: usize) -> Self {
-        Self {
-            see_through: count,
-            edges: 0,
-        }
-    }
-
-    fn at_edges(count: usize) -> Self {
-        Self {
-            see_through: 0,
-            edges: count,
-        }
-    }
-}
-
 impl std::ops::AddAssign for TexelReads {
     fn add_assign(&mut self, other: Self) {
         self.see_through += other.see_through;
@@ -338,10 +322,16 @@ impl ProjectedShadow {
             through[dark.clone()].fill(Float4::ZERO);
             opacity.attenuate(&line, 0, &mut through[..dark.start]);
             opacity.attenuate(&line, dark.end, &mut through[dark.end..]);
-            TexelReads::at_edges(nodes.len() - dark.len())
+            TexelReads {
+                see_through: 0,
+                edges: nodes.len() - dark.len(),
+            }
         } else {
             opacity.attenuate(&line, 0, through);
-            TexelReads::see_through(nodes.len())
+            TexelReads {
+                see_through: nodes.len(),
+                edges: 0,
+            }
         }
     }
 

@@ -125,7 +125,7 @@ mod tests {
     use crate::render::view::{
         CameraView, LatticeArea, ProjectedPlane, ScenePlane, visible_planes,
     };
-    use crate::scene::{AreaLight, Card, LightShape, Shot};
+    use crate::scene::{AreaLight, Card, Shot};
 
     fn camera() -> Camera {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 2.6);
@@ -138,14 +138,7 @@ mod tests {
     }
 
     fn light() -> AreaLight {
-        AreaLight {
-            shape: LightShape::Rectangle,
-            position: [0.4, 0.3, 0.8],
-            target: [0.0; 3],
-            size: [0.3; 2],
-            power: 9.0,
-            color: LinearRgb::WHITE,
-        }
+        AreaLight::new([0.4, 0.3, 0.8], [0.3; 2], 9.0)
     }
 
     /// A card of odd size, turned in every way.

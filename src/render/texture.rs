@@ -3,11 +3,11 @@
 
 use crate::asset::Texture;
 use crate::geom::Vector3;
-use crate::pixel::{Film, PremulRgba};
+use crate::pixel::{Film, Mix, PremulRgba};
 use crate::render::float4::Float4;
 use crate::render::float8::Float8;
 use crate::render::grade::{channel_mean, grade_opacities, grade_texels};
-use crate::render::resample::{BorderedTexels, DetailLevel, Texel};
+use crate::render::resample::{BorderedTexels, DetailLevel};
 use crate::render::texel_extent::TexelExtent;
 use crate::render::texel_grid::TexelGrid;
 use crate::render::view::ProjectedPlane;
@@ -84,7 +84,7 @@ impl BakedTexture {
         }
     }
 
-    fn from_texels<T: Texel + PartialEq>(
+    fn from_texels<T: Mix + PartialEq>(
         baked: BorderedTexels<T>,
         grid: TexelGrid,
         content: impl Fn(Vec<T>) -> BakedTexels,

@@ -3,7 +3,7 @@
 
 #![expect(clippy::manual_clamp, reason = "turns NaN into 0")]
 
-use crate::pixel::LinearRgb;
+use crate::pixel::{LinearRgb, Mix};
 use crate::render::block::PixelBlock;
 use crate::render::float4::Float4;
 use crate::render::float8::Float8;

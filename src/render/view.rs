@@ -179,13 +179,8 @@ impl CameraView {
 
     /// Picture position `(x, y, 1)` of a world point; the middle where it is at or behind the eye.
     fn position_of(&self, point: &Vector3<f64>) -> Vector3<f64> {
-        let seen = self.project_points(&[*point]);
-        seen.map_or(self.middle_px(), |[p]| p)
-    }
-
-    /// Picture position `(x, y, 1)` of the middle.
-    fn middle_px(&self) -> Vector3<f64> {
-        Vector3::new(0.5 * self.width as f64, 0.5 * self.height as f64, 1.0)
+        let middle = Vector3::new(0.5 * self.width as f64, 0.5 * self.height as f64, 1.0);
+        self.project_points(&[*point]).map_or(middle, |[p]| p)
     }
 
     /// All rows and columns.
@@ -196,11 +191,9 @@ impl CameraView {
     /// Rows and columns of projected points, one more on each side; all where one of the points is
     /// not in front.
     pub(super) fn area_around(&self, points: &[Vector3<f64>; 4]) -> LatticeArea {
-        let corners = self.project_points(points);
-        corners.map_or_else(|| self.whole_area(), |px| self.area_around_px(&px))
-    }
-
-    fn area_around_px(&self, px: &[Vector3<f64>; 4]) -> LatticeArea {
+        let Some(px) = self.project_points(points) else {
+            return self.whole_area();
+        };
         let columns = range_around(px.map(|p| p.x), self.width);
         (range_around(px.map(|p| p.y), self.height), columns)
     }

@@ -48,15 +48,16 @@ pub struct Belt {
 
 impl Belt {
     /// Fails on the first impossible value.
-    pub(super) fn check(&self, at: &str) -> Result<()> {
-        for (way, name) in [(self.offset_m, "offset_m"), (self.motion_m, "motion_m")] {
-            for along in way {
-                WAY.check(&format!("{at}.{name}"), along)?;
-            }
+    pub(super) fn check(&self) -> Result<()> {
+        for along in self.offset_m {
+            WAY.check("belt.offset_m", along)?;
         }
-        FRAME_RATE.check(&format!("{at}.frame_rate"), self.frame_rate)?;
+        for along in self.motion_m {
+            WAY.check("belt.motion_m", along)?;
+        }
+        FRAME_RATE.check("belt.frame_rate", self.frame_rate)?;
         let last = self.frames.saturating_sub(1) as f64;
-        Bounds::new(0.0, last, "the sequence").check(&format!("{at}.frame"), self.frame as f64)
+        Bounds::new(0.0, last, "the sequence").check("belt.frame", self.frame as f64)
     }
 }
 

@@ -27,12 +27,6 @@ pub struct Bend {
 }
 
 impl Bend {
-    /// No bend.
-    pub const FLAT: Self = Self {
-        deg: 0.0,
-        axis_deg: 0.0,
-    };
-
     /// Whether there is no bend.
     pub fn is_flat(&self) -> bool {
         self.deg == 0.0
@@ -134,6 +128,13 @@ impl Cylinder {
         let cosine = 1.0 - self.curvature * (height + self.mean_height);
         libm::atan2(sine, cosine) / self.curvature
     }
+
+    /// The way from one point of the flat card towards another, without the last one.
+    fn edge(self, a: Point2<f64>, b: Point2<f64>) -> impl Iterator<Item = Point3<f64>> {
+        let turn = self.curvature * (self.arc_of(&b) - self.arc_of(&a));
+        let count = (turn.abs() / OUTLINE_STEP).ceil().max(1.0) as usize;
+        (0..count).map(move |k| self.point(&(a + (b - a) * (k as f64 / count as f64))))
+    }
 }
 
 impl Card {
@@ -172,15 +173,6 @@ impl Card {
             .flat_map(|(a, b)| cylinder.edge(*a, *b))
             .map(|p| self.quad.world_from_card * p)
             .collect()
-    }
-}
-
-impl Cylinder {
-    /// The way from one point of the flat card towards another, without the last one.
-    fn edge(self, a: Point2<f64>, b: Point2<f64>) -> impl Iterator<Item = Point3<f64>> {
-        let turn = self.curvature * (self.arc_of(&b) - self.arc_of(&a));
-        let count = (turn.abs() / OUTLINE_STEP).ceil().max(1.0) as usize;
-        (0..count).map(move |k| self.point(&(a + (b - a) * (k as f64 / count as f64))))
     }
 }
 

@@ -47,19 +47,17 @@ pub struct Background {
 
 /// The assets of a library as a recipe sees them, in the library's order.
 pub fn catalog(library: &Library) -> Vec<AssetVariant> {
-    library.assets.iter().map(AssetVariant::from).collect()
+    library.assets.iter().map(variant_of).collect()
 }
 
-impl From<&Asset<Photo>> for AssetVariant {
-    fn from(asset: &Asset<Photo>) -> Self {
-        Self {
-            asset: asset.name.clone(),
-            role: asset.role,
-            photo_sizes: asset.photos.iter().map(Photo::size).collect(),
-            photo_outlines: asset.photos.iter().map(collider_outline).collect(),
-            thickness: asset.thickness,
-            mass: asset.mass,
-        }
+fn variant_of(asset: &Asset<Photo>) -> AssetVariant {
+    AssetVariant {
+        asset: asset.name.clone(),
+        role: asset.role,
+        photo_sizes: asset.photos.iter().map(Photo::size).collect(),
+        photo_outlines: asset.photos.iter().map(collider_outline).collect(),
+        thickness: asset.thickness,
+        mass: asset.mass,
     }
 }
 

@@ -12,7 +12,8 @@ use crate::scene::bounds::{
 };
 use crate::scene::hull::doubled_corner_area;
 use crate::scene::{
-    AreaLight, CameraSource, Exposure, Grade, LightTint, Object, Placement, Scene, Surface,
+    AreaLight, CameraSource, Environment, Exposure, Grade, LightTint, Object, Placement, Scene,
+    Surface,
 };
 use std::fmt::{Debug, Display};
 
@@ -30,8 +31,8 @@ impl Scene {
         self.check_view()?;
         self.check_objects()?;
         self.check_lights()?;
-        self.belt.map_or(Ok(()), |belt| belt.check("belt"))?;
-        self.finish.check("finish")?;
+        self.belt.map_or(Ok(()), |belt| belt.check())?;
+        self.finish.check()?;
         check_exposure(self.exposure)
     }
 
@@ -39,8 +40,8 @@ impl Scene {
         check_image(self.image)?;
         check_surface(&self.surface)?;
         check_camera(&self.camera)?;
-        self.view.check("view")?;
-        self.lens.check("lens")
+        self.view.check()?;
+        self.lens.check()
     }
 
     fn check_objects(&self) -> Result<()> {
@@ -51,19 +52,12 @@ impl Scene {
     fn check_lights(&self) -> Result<()> {
         check_count(self.lights.len(), "lights", MAX_LIGHTS)?;
         check_each(&self.lights, "lights", check_light)?;
-        self.check_surroundings()?;
+        check_color(self.ambient, "ambient", &RADIANCE)?;
+        self.environment.iter().try_for_each(Environment::check)?;
         check_cast(&self.cast)?;
         self.light_direction.check()?;
         self.light_map.check()?;
-        check_shares(self.interreflection, "interreflection")
-    }
-
-    fn check_surroundings(&self) -> Result<()> {
-        check_color(self.ambient, "ambient")?;
-        match &self.environment {
-            Some(map) => map.check("environment"),
-            None => Ok(()),
-        }
+        check_color(self.interreflection, "interreflection", &SHARE)
     }
 }
 
@@ -106,13 +100,9 @@ fn check_within(numbers: &[f64], at: &str, bounds: &Bounds) -> Result<()> {
 pub(super) fn check_image(image: [u32; 2]) -> Result<()> {
     let [w, h] = image;
     expect(w > 0 && h > 0, "image", image, "two numbers above 0")?;
-    let fits = is_within_limits(image);
+    let fits = w.max(h) <= LONGEST_SIDE_PX && u64::from(w) * u64::from(h) <= MOST_PIXELS;
     let expected = format_args!("at most {LONGEST_SIDE_PX} a side and {MOST_PIXELS} in all");
     expect(fits, "image", image, expected)
-}
-
-fn is_within_limits([w, h]: [u32; 2]) -> bool {
-    w.max(h) <= LONGEST_SIDE_PX && u64::from(w) * u64::from(h) <= MOST_PIXELS
 }
 
 /// No more of something than scenes may have.
@@ -124,14 +114,23 @@ fn check_surface(surface: &Surface) -> Result<()> {
     check_within(&surface.size, "surface.size", &LENGTH)?;
     FRICTION.check("surface.friction", surface.friction)?;
     SHARE.check("surface.restitution", surface.restitution)?;
-    surface
-        .wall
-        .map_or(Ok(()), |wall| wall.check("surface.wall"))
+    surface.wall.map_or(Ok(()), |wall| wall.check())
 }
 
-fn check_color(color: LinearRgb, at: &str) -> Result<()> {
-    let channels: [f32; 3] = color.into();
-    check_within(&channels.map(f64::from), at, &RADIANCE)
+fn check_color(color: LinearRgb, at: &str, bounds: &Bounds) -> Result<()> {
+    check_within(&color.channels().map(f64::from), at, bounds)
+}
+
+/// Three factors, as people type them.
+pub(super) fn check_factors(color: LinearRgb, at: &str, bounds: &Bounds) -> Result<()> {
+    let factors = color.channels();
+    let are_within = factors.iter().all(|&factor| bounds.contains(factor.into()));
+    expect(
+        are_within,
+        at,
+        factors,
+        format_args!("three numbers of {bounds}"),
+    )
 }
 
 fn check_rotation(rotation: &UnitQuaternion<f64>, at: &str) -> Result<()> {
@@ -153,7 +152,7 @@ fn check_pose(pose: &Pose, at: &str) -> Result<()> {
 
 pub(super) fn check_cast(cast: &LightTint) -> Result<()> {
     match *cast {
-        LightTint::Known(color) => check_color(color, "cast.known"),
+        LightTint::Known(color) => check_color(color, "cast.known", &RADIANCE),
         LightTint::MatchSurface { share, albedo } => {
             CAST_SHARE.check("cast.match_surface.share", share)?;
             check_albedo(Albedo::Color(albedo), "cast.match_surface.albedo")
@@ -170,11 +169,6 @@ pub(super) fn is_grid<T>(rows: &[Vec<T>]) -> bool {
     let sizes = 1..=MAX_CELLS;
     let fits = rows.len() <= MAX_CELLS && sizes.contains(&columns);
     fits && rows.iter().all(|row| row.len() == columns)
-}
-
-fn check_shares(color: LinearRgb, at: &str) -> Result<()> {
-    let [r, g, b] = [color.r, color.g, color.b].map(f64::from);
-    check_within(&[r, g, b], at, &SHARE)
 }
 
 pub(super) fn check_albedo(albedo: Albedo, at: &str) -> Result<()> {
@@ -244,7 +238,7 @@ fn check_grade(grade: &Grade, at: &str) -> Result<()> {
     GRADE.check(&field(at, "saturation"), grade.saturation.into())?;
     GRADE.check(&field(at, "value"), grade.value.into())?;
     GRADE.check(&field(at, "glints"), grade.glints.into())?;
-    grade.check_tint(&field(at, "tint"))
+    check_factors(grade.tint, &field(at, "tint"), &SHARE)
 }
 
 fn check_placement(placement: &Placement, at: &str) -> Result<()> {
@@ -292,14 +286,12 @@ fn check_light(light: &AreaLight, at: &str) -> Result<()> {
     )?;
     check_within(&light.size, &field(at, "size"), &LENGTH)?;
     RADIANCE.check(&field(at, "power"), light.power)?;
-    check_color(light.color, &field(at, "color"))
+    check_color(light.color, &field(at, "color"), &RADIANCE)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::Pose;
-    use crate::scene::{Grade, LightShape, Surface};
 
     fn scene() -> Scene {
         let object = Object {
@@ -320,14 +312,6 @@ mod tests {
             height: 0.3,
             rotation: UnitQuaternion::identity(),
         };
-        let light = AreaLight {
-            shape: LightShape::Rectangle,
-            position: [0.0, 0.0, 1.0],
-            target: [0.0; 3],
-            size: [0.1; 2],
-            power: 10.0,
-            color: LinearRgb::WHITE,
-        };
         Scene {
             plate: "tray".into(),
             objects: vec![
@@ -337,7 +321,7 @@ mod tests {
                     ..object
                 },
             ],
-            lights: vec![light],
+            lights: vec![AreaLight::new([0.0, 0.0, 1.0], [0.1; 2], 10.0)],
             ambient: LinearRgb::grey(0.5),
             exposure: Exposure::MatchPlate { gain_ev: 0.25 },
             ..Scene::new(

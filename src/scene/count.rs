@@ -92,14 +92,10 @@ fn last_weighted(values: &[u32], weights: &[f64]) -> u32 {
 /// of their sum.
 fn draw_weighted(values: &[u32], weights: &[f64], draws: &Draws, path: &str) -> usize {
     let share = draws.unit(path) * weights.iter().sum::<f64>();
-    let value = value_at(share, values, weights);
+    let value = values[weighted_place(weights, share)];
     let ends = [values[0], values[values.len() - 1]].map(f64::from);
     draws.note(path, Distribution::Weighted(ends), value.into());
     value as usize
-}
-
-fn value_at(share: f64, values: &[u32], weights: &[f64]) -> u32 {
-    values[weighted_place(weights, share)]
 }
 
 fn check_values(at: &str, values: &[u32], bounds: &Bounds) -> Result<()> {
@@ -216,7 +212,7 @@ mod tests {
 
     #[test]
     fn a_share_that_rounds_to_the_whole_sum_is_the_last_value_that_occurs() {
-        assert_eq!(value_at(3.0, &[1, 2, 3], &[1.0, 2.0, 0.0]), 2);
+        assert_eq!(weighted_place(&[1.0, 2.0, 0.0], 3.0), 1);
     }
 
     #[test]

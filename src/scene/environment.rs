@@ -35,12 +35,12 @@ impl Environment {
     }
 
     /// Fails on the first impossible value.
-    pub(super) fn check(&self, at: &str) -> Result<()> {
+    pub(super) fn check(&self) -> Result<()> {
         if self.file.is_empty() {
-            return Err(unnamed_picture(format!("{at}.file")));
+            return Err(unnamed_picture("environment.file"));
         }
-        TURN.check(&format!("{at}.rotation_deg"), self.rotation_deg)?;
-        RADIANCE.check(&format!("{at}.strength"), self.strength)
+        TURN.check("environment.rotation_deg", self.rotation_deg)?;
+        RADIANCE.check("environment.strength", self.strength)
     }
 }
 
@@ -87,7 +87,7 @@ pub(crate) fn turned(direction: &Vector3<f64>, angle: f64) -> Vector3<f64> {
     Vector3::new(cos * d.x - sin * d.y, sin * d.x + cos * d.y, d.z)
 }
 
-fn unnamed_picture(at: String) -> Error {
+fn unnamed_picture(at: &str) -> Error {
     Error::value(at, "\"\", expected the name of a picture")
 }
 
@@ -120,21 +120,17 @@ impl EnvironmentRanges {
         if self.files.is_empty() {
             return None;
         }
+        let i = draws.choose("environment.file", self.files.len());
         Some(Environment {
-            file: self.draw_file(draws),
+            file: self.files[i].clone(),
             rotation_deg: self.rotation_deg.draw(draws, "environment.rotation_deg"),
             strength: self.strength.draw(draws, "environment.strength"),
         })
     }
 
-    fn draw_file(&self, draws: &Draws) -> String {
-        let i = draws.choose("environment.file", self.files.len());
-        self.files[i].clone()
-    }
-
     pub(super) fn check(&self) -> Result<()> {
         if let Some(i) = self.files.iter().position(String::is_empty) {
-            return Err(unnamed_picture(format!("environment.files[{i}]")));
+            return Err(unnamed_picture(&format!("environment.files[{i}]")));
         }
         self.rotation_deg.check("environment.rotation_deg", &TURN)?;
         self.strength.check("environment.strength", &RADIANCE)
@@ -153,49 +149,31 @@ mod tests {
         assert!((u - 0.25).abs() < 1e-12 && (v - 0.5).abs() < 1e-12);
     }
 
+    fn lab() -> Environment {
+        Environment {
+            file: "lab.hdr".into(),
+            rotation_deg: 0.0,
+            strength: 1.0,
+        }
+    }
+
     #[test]
     fn a_file_needs_only_a_name() {
         let read: Environment = toml::from_str("file = 'lab.hdr'").unwrap();
-        assert_eq!(
-            read,
-            Environment {
-                file: "lab.hdr".into(),
-                rotation_deg: 0.0,
-                strength: 1.0
-            }
-        );
-        assert!(read.check("environment").is_ok());
+        assert_eq!(read, lab());
+        assert!(read.check().is_ok());
     }
 
     #[test]
     fn what_cannot_be_right_is_told() {
-        let good = Environment {
-            file: "lab.hdr".into(),
-            rotation_deg: 0.0,
-            strength: 1.0,
+        let reported = |spoil: fn(&mut Environment)| {
+            let mut spoiled = lab();
+            spoil(&mut spoiled);
+            spoiled.check().unwrap_err().to_string()
         };
-        let reported = |e: Environment| e.check("environment").unwrap_err().to_string();
-        assert!(
-            reported(Environment {
-                file: String::new(),
-                ..good.clone()
-            })
-            .starts_with("environment.file")
-        );
-        assert!(
-            reported(Environment {
-                rotation_deg: f64::NAN,
-                ..good.clone()
-            })
-            .starts_with("environment.rotation_deg")
-        );
-        assert!(
-            reported(Environment {
-                strength: -1.0,
-                ..good
-            })
-            .starts_with("environment.strength: -1,")
-        );
+        assert!(reported(|e| e.file.clear()).starts_with("environment.file"));
+        assert!(reported(|e| e.rotation_deg = f64::NAN).starts_with("environment.rotation_deg"));
+        assert!(reported(|e| e.strength = -1.0).starts_with("environment.strength: -1,"));
     }
 
     #[test]

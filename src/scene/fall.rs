@@ -110,17 +110,14 @@ impl SettleOptions {
 
     fn check_gravity(&self) -> Result<()> {
         let [x, y, z] = self.gravity;
-        if !self.falls_down() {
+        let falls_down = z < 0.0 && self.gravity.iter().all(|g| g.is_finite());
+        if !falls_down {
             return Err(Error::value(
                 "settle.gravity",
                 format!("{:?}, expected to point down", self.gravity),
             ));
         }
         GRAVITY.check("settle.gravity", libm::hypot(libm::hypot(x, y), z))
-    }
-
-    fn falls_down(&self) -> bool {
-        self.gravity[2] < 0.0 && self.gravity.iter().all(|g| g.is_finite())
     }
 }
 
@@ -184,14 +181,10 @@ mod tests {
     #[test]
     fn options_that_cannot_be_right_are_told() {
         assert!(SettleOptions::default().check().is_ok());
-        let reported = |step: f64| {
-            SettleOptions {
-                step,
-                ..Default::default()
-            }
-            .check()
-            .unwrap_err()
-            .to_string()
+        let reported = |spoil: &dyn Fn(&mut SettleOptions)| {
+            let mut options = SettleOptions::default();
+            spoil(&mut options);
+            options.check().unwrap_err().to_string()
         };
         let why = "seconds; longer steps let cards pass through each other, shorter ones only take longer";
         for (step, number) in [
@@ -200,41 +193,18 @@ mod tests {
             (1.0 / 64.0, "0.015625"),
         ] {
             assert_eq!(
-                reported(step),
+                reported(&|o| o.step = step),
                 format!("settle.step: {number}, expected 0.0001 to 0.0042 ({why})")
             );
         }
         for never in [0, 1_000_000] {
-            let wrong = SettleOptions {
-                attempts: never,
-                ..Default::default()
-            };
-            assert!(
-                wrong
-                    .check()
-                    .unwrap_err()
-                    .to_string()
-                    .starts_with("settle.attempts: "),
-                "{never}"
-            );
+            let told = reported(&|o| o.attempts = never);
+            assert!(told.starts_with("settle.attempts: "), "{never}");
         }
-        let weightless = SettleOptions {
-            gravity: [0.0, 0.0, -1e-300],
-            ..Default::default()
-        };
-        assert!(
-            weightless
-                .check()
-                .unwrap_err()
-                .to_string()
-                .starts_with("settle.gravity: 1e-300, expected 0.01")
-        );
-        let up = SettleOptions {
-            gravity: [0.0, 0.0, 9.81],
-            ..Default::default()
-        };
+        let weightless = reported(&|o| o.gravity = [0.0, 0.0, -1e-300]);
+        assert!(weightless.starts_with("settle.gravity: 1e-300, expected 0.01"));
         assert_eq!(
-            up.check().unwrap_err().to_string(),
+            reported(&|o| o.gravity = [0.0, 0.0, 9.81]),
             "settle.gravity: [0.0, 0.0, 9.81], expected to point down"
         );
     }

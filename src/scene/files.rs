@@ -65,20 +65,12 @@ fn moved_path(path: Option<&Path>, from: &Path, to: &Path) -> Result<Option<Path
 /// (`render.subsamples`); what is not in it has the recipe's default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct SceneSettings(toml::Table);
+pub struct SceneSettings(pub(crate) toml::Table);
 
 impl SceneSettings {
     /// Whether everything has its default.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
-    }
-
-    pub(crate) fn from_table(table: toml::Table) -> Self {
-        Self(table)
-    }
-
-    pub(crate) fn to_table(&self) -> toml::Table {
-        self.0.clone()
     }
 }
 

@@ -129,22 +129,14 @@ fn on_card(p: &Point2<f64>, [w, h]: [f64; 2]) -> [f64; 2] {
 /// Twice the area of the triangle of a corner and its neighbours; above 0 where the ring turns
 /// left.
 pub(super) fn doubled_corner_area(ring: &[[f64; 2]], i: usize) -> f64 {
-    let [a, b, c] = with_neighbours(ring, i);
-    (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
-}
-
-/// A corner between the one before and the one after it.
-fn with_neighbours(ring: &[[f64; 2]], i: usize) -> [[f64; 2]; 3] {
-    [i + ring.len() - 1, i, i + 1].map(|i| ring[i % ring.len()])
+    let [a, b, c] = [i + ring.len() - 1, i, i + 1].map(|i| ring[i % ring.len()]);
+    cross([b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]])
 }
 
 /// Twice the area of a ring; above 0 where it turns left.
 pub(crate) fn doubled_area(ring: &[[f64; 2]]) -> f64 {
-    edges(ring).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum()
-}
-
-fn edges(ring: &[[f64; 2]]) -> impl Iterator<Item = (&[f64; 2], &[f64; 2])> {
-    ring.iter().zip(ring.iter().cycle().skip(1))
+    let next = ring.iter().cycle().skip(1);
+    ring.iter().zip(next).map(|(a, b)| cross(*a, *b)).sum()
 }
 
 #[cfg(test)]

@@ -1,11 +1,9 @@
 //! What a lens does that a pinhole does not: it bends straight lines, and is sharp at one distance.
 
-use crate::bounds::Bounds;
 use crate::camera::{self, Camera, RadialDistortion};
 use crate::error::{Error, Result};
 use crate::geom::Point2;
 use crate::scene::bounds::{F_NUMBER, FOCUS, K1, SENSOR};
-use crate::scene::check::field;
 use crate::scene::{Background, CameraSource, Draws, Range};
 use serde::{Deserialize, Serialize};
 
@@ -136,11 +134,11 @@ impl Lens {
     }
 
     /// Fails on the first impossible value.
-    pub(super) fn check(&self, at: &str) -> Result<()> {
-        K1.check(&field(at, "k1"), self.k1)?;
-        SENSOR.check(&field(at, "sensor_mm"), self.sensor_mm)?;
-        check_optional(self.f_number, &field(at, "f_number"), &F_NUMBER)?;
-        check_optional(self.focus_m, &field(at, "focus_m"), &FOCUS)
+    pub(super) fn check(&self) -> Result<()> {
+        K1.check("lens.k1", self.k1)?;
+        SENSOR.check("lens.sensor_mm", self.sensor_mm)?;
+        Range::check_optional(self.f_number.map(Range::fixed), "lens.f_number", &F_NUMBER)?;
+        Range::check_optional(self.focus_m.map(Range::fixed), "lens.focus_m", &FOCUS)
     }
 
     /// Fails on a barrel that folds the corners of a camera's pictures over, or nearly.
@@ -163,10 +161,6 @@ fn told_of(error: Error, background: &str) -> Error {
         Error::Value { at, what } => Error::value(at, format!("{what} (background {background})")),
         other => other,
     }
-}
-
-fn check_optional(value: Option<f64>, at: &str, bounds: &Bounds) -> Result<()> {
-    value.map_or(Ok(()), |value| bounds.check(at, value))
 }
 
 /// What the lens is drawn from.
@@ -219,7 +213,7 @@ impl LensRanges {
 
     /// A photo that has no distortion of its own is bent.
     fn bends_plate(&self, photo_k1: f64) -> bool {
-        photo_k1 == 0.0 && self.k1 != Range::fixed(0.0)
+        photo_k1 == 0.0 && !self.k1.is_zero()
     }
 
     /// The lens before a background.
@@ -418,7 +412,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_right_is_told() {
-        let reported = |lens: Lens| lens.check("lens").unwrap_err().to_string();
+        let reported = |lens: Lens| lens.check().unwrap_err().to_string();
         let good = Lens::default();
         let nan = Lens {
             k1: f64::NAN,

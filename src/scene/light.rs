@@ -29,6 +29,20 @@ pub struct AreaLight {
     pub color: LinearRgb,
 }
 
+impl AreaLight {
+    /// A white rectangle that faces the origin; lengths in metres, watts.
+    pub fn new(position: [f64; 3], size: [f64; 2], power: f64) -> Self {
+        Self {
+            shape: LightShape::Rectangle,
+            position,
+            target: [0.0; 3],
+            size,
+            power,
+            color: LinearRgb::WHITE,
+        }
+    }
+}
+
 /// Outline of an area light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -98,7 +112,7 @@ impl Default for Exposure {
     }
 }
 
-fn is_white(color: &LinearRgb) -> bool {
+pub(super) fn is_white(color: &LinearRgb) -> bool {
     *color == LinearRgb::WHITE
 }
 

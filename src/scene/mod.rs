@@ -107,7 +107,6 @@ pub(crate) use hull::doubled_area;
 pub use lens::{Lens, LensRanges, ThinLens};
 pub use light::{AreaLight, Exposure, LightShape, LightTint};
 #[doc(hidden)]
-#[doc(hidden)]
 pub use light_direction::{LightDirection, LightDirectionSource};
 pub use light_map::{LightGrid, LightMap};
 pub use locate::locate;

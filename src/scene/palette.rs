@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
 use crate::scene::bounds::{SHARE, WEIGHT};
-use crate::scene::check::{check_each, field};
+use crate::scene::check::{check_each, check_factors, field};
 use crate::scene::draw::weighted_place;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
@@ -74,16 +74,10 @@ pub struct WeightedColor {
 
 impl PaletteEntry {
     fn tint(&self) -> LinearRgb {
-        match self.color() {
+        let (Self::Plain(color) | Self::Weighted(WeightedColor { color, .. })) = *self;
+        match color {
             PaletteColor::Named(name) => name.tint(),
             PaletteColor::Known(tint) => tint,
-        }
-    }
-
-    fn color(&self) -> PaletteColor {
-        match *self {
-            Self::Plain(color) => color,
-            Self::Weighted(WeightedColor { color, .. }) => color,
         }
     }
 
@@ -96,18 +90,8 @@ impl PaletteEntry {
 
     fn check(&self, at: &str) -> Result<()> {
         WEIGHT.check(&field(at, "weight"), self.weight())?;
-        check_tint(self.tint(), at)
+        check_factors(self.tint(), at, &SHARE)
     }
-}
-
-/// A transmittance of each channel.
-pub(super) fn check_tint(tint: LinearRgb, at: &str) -> Result<()> {
-    let shares = tint.channels();
-    if shares.iter().all(|&share| SHARE.contains(share.into())) {
-        return Ok(());
-    }
-    let what = format!("{shares:?}, expected three numbers of {SHARE}");
-    Err(Error::value(at, what))
 }
 
 /// Fails on the first colour that no plastic has, and where none has any weight.

@@ -1,11 +1,10 @@
 //! Objects and where they are.
 
 use crate::asset::Role;
-use crate::error::Result;
 use crate::geom::{Pose, UnitQuaternion};
 use crate::pixel::LinearRgb;
 use crate::scene::Bend;
-use crate::scene::palette::check_tint;
+use crate::scene::light::is_white;
 use serde::{Deserialize, Serialize};
 
 /// One occurrence of an asset in a scene.
@@ -110,10 +109,6 @@ pub struct Grade {
     pub glints: f32,
 }
 
-fn is_white(tint: &LinearRgb) -> bool {
-    *tint == LinearRgb::WHITE
-}
-
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
 fn is_one(factor: &f32) -> bool {
     *factor == 1.0
@@ -123,11 +118,6 @@ impl Grade {
     /// Whether plastic is dyed or glints are changed.
     pub fn changes_surface(&self) -> bool {
         !is_white(&self.tint) || !is_one(&self.glints)
-    }
-
-    /// Fails on a dye that gives light.
-    pub(super) fn check_tint(&self, at: &str) -> Result<()> {
-        check_tint(self.tint, at)
     }
 }
 

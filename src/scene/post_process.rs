@@ -1,10 +1,10 @@
 //! What happens to a finished frame before it is written: the other half of a camera.
 
 use crate::color::planckian;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::pixel::LinearRgb;
 use crate::scene::bounds::{BLUR, CHROMATIC, EV, GAIN, NOISE, SHARPENING, WHITE};
-use crate::scene::check::field;
+use crate::scene::check::check_factors;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 
@@ -58,44 +58,16 @@ impl Default for PostProcess {
 /// Blur of a lens and a sensor: a Gaussian of this standard deviation, pixels; in files the number
 /// or `"match_plate"`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "BlurInFile<Px>", into = "BlurInFile<Px>")]
-#[serde(bound(serialize = "Px: Clone + Serialize"))]
+#[serde(
+    rename_all = "snake_case",
+    expecting = "expected pixels or \"match_plate\""
+)]
 pub enum Blur<Px = f64> {
-    /// This much.
-    Known(Px),
     /// Found by the `light` stage: as much as the plate has.
     MatchPlate,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(untagged, expecting = "expected pixels or \"match_plate\"")]
-enum BlurInFile<Px> {
+    /// This much.
+    #[serde(untagged)]
     Known(Px),
-    Word(BlurWord),
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum BlurWord {
-    MatchPlate,
-}
-
-impl<Px> From<BlurInFile<Px>> for Blur<Px> {
-    fn from(written: BlurInFile<Px>) -> Self {
-        match written {
-            BlurInFile::Known(sigma_px) => Self::Known(sigma_px),
-            BlurInFile::Word(BlurWord::MatchPlate) => Self::MatchPlate,
-        }
-    }
-}
-
-impl<Px> From<Blur<Px>> for BlurInFile<Px> {
-    fn from(blur: Blur<Px>) -> Self {
-        match blur {
-            Blur::Known(sigma_px) => Self::Known(sigma_px),
-            Blur::MatchPlate => Self::Word(BlurWord::MatchPlate),
-        }
-    }
 }
 
 impl Blur {
@@ -134,50 +106,26 @@ pub struct CameraNoise<T: Default = f64> {
 impl PostProcess {
     /// Whether it leaves the frame alone.
     pub fn is_identity(&self) -> bool {
-        let Self {
-            exposure_ev,
-            white_balance,
-            blur_px,
-            noise,
-            noise_seed: _,
-            chromatic_px,
-            camera_blur_px,
-            camera_noise,
-            sharpening,
-        } = *self;
-        exposure_ev == 0.0
-            && white_balance == LinearRgb::WHITE
-            && blur_px == Blur::NONE
-            && noise == Noise::None
-            && chromatic_px == 0.0
-            && camera_blur_px == 0.0
-            && camera_noise == CameraNoise::default()
-            && sharpening == 0.0
+        Self {
+            noise_seed: 0,
+            ..*self
+        } == Self::default()
     }
 
     /// Fails on the first impossible value.
-    pub(super) fn check(&self, at: &str) -> Result<()> {
-        EV.check(&field(at, "exposure_ev"), self.exposure_ev)?;
-        check_gains(self.white_balance, &field(at, "white_balance"))?;
-        SHARPENING.check(&field(at, "sharpening"), self.sharpening)?;
-        CHROMATIC.check(&field(at, "chromatic_px"), self.chromatic_px)?;
-        BLUR.check(&field(at, "camera_blur_px"), self.camera_blur_px)?;
-        NOISE.check(&field(at, "camera_noise.shot"), self.camera_noise.shot)?;
-        NOISE.check(&field(at, "camera_noise.read"), self.camera_noise.read)?;
+    pub(super) fn check(&self) -> Result<()> {
+        EV.check("finish.exposure_ev", self.exposure_ev)?;
+        check_factors(self.white_balance, "finish.white_balance", &GAIN)?;
+        SHARPENING.check("finish.sharpening", self.sharpening)?;
+        CHROMATIC.check("finish.chromatic_px", self.chromatic_px)?;
+        BLUR.check("finish.camera_blur_px", self.camera_blur_px)?;
+        NOISE.check("finish.camera_noise.shot", self.camera_noise.shot)?;
+        NOISE.check("finish.camera_noise.read", self.camera_noise.read)?;
         if let Blur::Known(sigma_px) = self.blur_px {
-            BLUR.check(&field(at, "blur_px"), sigma_px)?;
+            BLUR.check("finish.blur_px", sigma_px)?;
         }
-        self.noise.check(&field(at, "noise"))
+        self.noise.check()
     }
-}
-
-fn check_gains(gains: LinearRgb, at: &str) -> Result<()> {
-    let gains: [f32; 3] = gains.into();
-    if gains.iter().all(|gain| GAIN.contains((*gain).into())) {
-        return Ok(());
-    }
-    let what = format!("{gains:?}, expected three numbers of {GAIN}");
-    Err(Error::value(at, what))
 }
 
 impl Noise {
@@ -189,12 +137,12 @@ impl Noise {
         }
     }
 
-    fn check(&self, at: &str) -> Result<()> {
+    fn check(&self) -> Result<()> {
         let Self::Known { shot, read } = *self else {
             return Ok(());
         };
-        NOISE.check(&format!("{at}.known.shot"), shot)?;
-        NOISE.check(&format!("{at}.known.read"), read)
+        NOISE.check("finish.noise.known.shot", shot)?;
+        NOISE.check("finish.noise.known.read", read)
     }
 }
 
@@ -256,6 +204,7 @@ impl PostProcessRanges {
 
     /// `own` draws what differs between pictures of one sequence: noise.
     pub(super) fn draw(&self, draws: &Draws, own: &Draws) -> PostProcess {
+        let CameraNoise { shot, read } = self.camera_noise;
         PostProcess {
             exposure_ev: self.exposure_ev.draw(draws, "finish.exposure_ev"),
             white_balance: white_balance(self.white_k.draw(draws, "finish.white_k")),
@@ -265,14 +214,8 @@ impl PostProcessRanges {
             chromatic_px: self.draw_chromatic(draws),
             camera_blur_px: self.camera_blur_px.draw(draws, "finish.camera_blur_px"),
             camera_noise: CameraNoise {
-                shot: self
-                    .camera_noise
-                    .shot
-                    .draw(draws, "finish.camera_noise.shot"),
-                read: self
-                    .camera_noise
-                    .read
-                    .draw(draws, "finish.camera_noise.read"),
+                shot: shot.draw(draws, "finish.camera_noise.shot"),
+                read: read.draw(draws, "finish.camera_noise.read"),
             },
             sharpening: self.sharpening.draw(draws, "finish.sharpening"),
         }
@@ -286,9 +229,10 @@ impl PostProcessRanges {
     }
 
     fn draw_chromatic(&self, draws: &Draws) -> f64 {
-        match self.chromatic_px {
-            none if none == Range::fixed(0.0) => 0.0,
-            range => range.draw(draws, "finish.chromatic_px"),
+        if self.chromatic_px.is_zero() {
+            0.0
+        } else {
+            self.chromatic_px.draw(draws, "finish.chromatic_px")
         }
     }
 
@@ -301,21 +245,18 @@ impl PostProcessRanges {
     }
 
     pub(super) fn check(&self) -> Result<()> {
+        let CameraNoise { shot, read } = self.camera_noise;
         self.exposure_ev.check("finish.exposure_ev", &EV)?;
         self.white_k.check("finish.white_k", &WHITE)?;
         self.sharpening.check("finish.sharpening", &SHARPENING)?;
         self.chromatic_px.check("finish.chromatic_px", &CHROMATIC)?;
         self.camera_blur_px.check("finish.camera_blur_px", &BLUR)?;
-        self.camera_noise
-            .shot
-            .check("finish.camera_noise.shot", &NOISE)?;
-        self.camera_noise
-            .read
-            .check("finish.camera_noise.read", &NOISE)?;
+        shot.check("finish.camera_noise.shot", &NOISE)?;
+        read.check("finish.camera_noise.read", &NOISE)?;
         if let Blur::Known(sigma_px) = self.blur_px {
             sigma_px.check("finish.blur_px", &BLUR)?;
         }
-        self.noise.check("finish.noise")
+        self.noise.check()
     }
 }
 
@@ -368,9 +309,7 @@ mod tests {
                 ..PostProcessRanges::default()
             };
             finish.check()?;
-            finish
-                .draw(&Draws::new(3, 4), &Draws::new(3, 5))
-                .check("finish")
+            finish.draw(&Draws::new(3, 4), &Draws::new(3, 5)).check()
         };
         for end in [2000.0, 25_000.0] {
             assert!(drawn_at(end).is_ok(), "{end}");
@@ -381,30 +320,22 @@ mod tests {
 
     #[test]
     fn what_cannot_be_right_is_told() {
-        let reported = |f: PostProcess| f.check("finish").unwrap_err().to_string();
-        let good = PostProcess::default();
-        assert!(good.check("finish").is_ok());
-        assert!(
-            reported(PostProcess {
-                exposure_ev: f64::NAN,
-                ..good
-            })
-            .starts_with("finish.exposure_ev: NaN")
-        );
-        assert!(
-            reported(PostProcess {
-                white_balance: LinearRgb::BLACK,
-                ..good
-            })
-            .starts_with("finish.white_balance")
-        );
-        let noise = Noise::Known {
-            shot: -1.0,
-            read: 0.0,
+        let reported = |spoil: fn(&mut PostProcess)| {
+            let mut spoiled = PostProcess::default();
+            assert!(spoiled.check().is_ok());
+            spoil(&mut spoiled);
+            spoiled.check().unwrap_err().to_string()
         };
-        assert!(
-            reported(PostProcess { noise, ..good }).starts_with("finish.noise.known.shot: -1,")
-        );
+        assert!(reported(|f| f.exposure_ev = f64::NAN).starts_with("finish.exposure_ev: NaN"));
+        let black = reported(|f| f.white_balance = LinearRgb::BLACK);
+        assert!(black.starts_with("finish.white_balance"));
+        let negative = reported(|f| {
+            f.noise = Noise::Known {
+                shot: -1.0,
+                read: 0.0,
+            }
+        });
+        assert!(negative.starts_with("finish.noise.known.shot: -1,"));
         let read: PostProcess = toml::from_str("noise = 'match_plate'").unwrap();
         assert_eq!(read.noise, Noise::MatchPlate);
     }

@@ -121,36 +121,24 @@ impl Range {
         if min == max {
             return bounds.check(at, min);
         }
-        if self.is_within(bounds) {
+        if min < max && bounds.contains(min) && bounds.contains(max) {
             return Ok(());
         }
-        Err(Error::value(at, self.problem(bounds)))
-    }
-
-    fn is_within(&self, bounds: &Bounds) -> bool {
-        self.min < self.max && bounds.contains(self.min) && bounds.contains(self.max)
-    }
-
-    fn problem(&self, bounds: &Bounds) -> String {
-        let (min, max) = (number(self.min), number(self.max));
-        let question = bounds.question(self.max);
-        format!("[{min}, {max}], expected [min, max] within {bounds}{question}")
+        let question = bounds.question(max);
+        let (min, max) = (number(min), number(max));
+        let what = format!("[{min}, {max}], expected [min, max] within {bounds}{question}");
+        Err(Error::value(at, what))
     }
 
     /// Fails unless both ends are integers within bounds.
     pub(crate) fn check_count(&self, at: &str, bounds: &Bounds) -> Result<()> {
         self.check(at, bounds)?;
-        if self.has_integer_ends() {
+        let Self { min, max } = *self;
+        if min.fract() == 0.0 && max.fract() == 0.0 {
             return Ok(());
         }
-        Err(Error::value(
-            at,
-            format!("[{}, {}], expected integers", self.min, self.max),
-        ))
-    }
-
-    fn has_integer_ends(&self) -> bool {
-        self.min.fract() == 0.0 && self.max.fract() == 0.0
+        let what = format!("[{min}, {max}], expected integers");
+        Err(Error::value(at, what))
     }
 }
 
@@ -206,9 +194,8 @@ mod tests {
 
     #[test]
     fn a_range_that_cannot_be_right_is_told() {
-        let (scale, reported) = (Bounds::new(0.0, 9.0, ""), |e: Result<()>| {
-            e.unwrap_err().to_string()
-        });
+        let scale = Bounds::new(0.0, 9.0, "");
+        let reported = |e: Result<()>| e.unwrap_err().to_string();
         let expected = "scale: [2, 1], expected [min, max] within 0 to 9";
         assert_eq!(
             reported(Range::new(2.0, 1.0).check("scale", &scale)),

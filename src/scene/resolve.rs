@@ -200,10 +200,13 @@ impl Scene {
 
     fn known_camera(&self) -> Result<Camera> {
         let CameraSource::Known(camera) = self.camera else {
-            return Err(unsolved_camera());
+            let what = "still a rectangle in a photo; locate it first";
+            return Err(Error::value("camera", what));
         };
         if camera.image != self.image {
-            return Err(different_image(camera.image, self.image));
+            let (image, expected) = (camera.image, self.image);
+            let what = format!("{image:?}, expected the scene's image {expected:?}");
+            return Err(Error::value("camera.known.image", what));
         }
         Ok(camera)
     }
@@ -248,11 +251,9 @@ impl Scene {
         if across >= 1.0 && down >= 1.0 && (across - down).abs() < tolerance {
             return Ok(());
         }
-        let expected = format!("expected {width} x {height} or larger of that shape");
-        Err(Error::value(
-            "plate",
-            format!("{w} x {h} pixels, {expected}"),
-        ))
+        let expected = format!("{width} x {height} or larger of that shape");
+        let what = format!("{w} x {h} pixels, expected {expected}");
+        Err(Error::value("plate", what))
     }
 }
 
@@ -271,24 +272,12 @@ fn resting_card(
     look: impl Fn(&Object) -> Result<Option<Appearance>>,
 ) -> Result<Card> {
     let Placement::At(pose) = object.placement else {
-        return Err(still_falling(i));
+        let at = format!("objects[{i}].placement");
+        return Err(Error::value(at, "still falling; settle it first"));
     };
     let look = look(object)?.ok_or_else(|| unknown_asset(i, object))?;
-    Ok(look.into_card(ObjectId(object_id(i)?), object, pose))
-}
-
-fn still_falling(i: usize) -> Error {
-    let at = format!("objects[{i}].placement");
-    Error::value(at, "still falling; settle it first")
-}
-
-fn unsolved_camera() -> Error {
-    Error::value("camera", "still a rectangle in a photo; locate it first")
-}
-
-fn different_image(image: [u32; 2], expected: [u32; 2]) -> Error {
-    let what = format!("{image:?}, expected the scene's image {expected:?}");
-    Error::value("camera.known.image", what)
+    // A scene has few objects: that was checked.
+    Ok(look.into_card(ObjectId(i as u32 + 1), object, pose))
 }
 
 fn unknown_asset(i: usize, object: &Object) -> Error {
@@ -297,10 +286,6 @@ fn unknown_asset(i: usize, object: &Object) -> Error {
         object.asset, object.photo
     );
     Error::value(format!("objects[{i}].asset"), what)
-}
-
-fn object_id<T: TryFrom<usize>>(i: usize) -> Result<T> {
-    T::try_from(i + 1).map_err(|_| Error::value(format!("objects[{i}]"), "more objects than ids"))
 }
 
 #[cfg(test)]
@@ -389,31 +374,24 @@ mod tests {
             reported,
             "objects[1].placement: still falling; settle it first"
         );
-        let reported = complaint(|s| s.exposure = Exposure::MatchPlate { gain_ev: 0.0 });
-        assert_eq!(
-            reported,
-            "exposure: still to be matched to the plate; light it first"
-        );
-        let reported = complaint(|s| {
-            s.cast = LightTint::MatchSurface {
-                share: 1.0,
-                albedo: LinearRgb::WHITE,
-            }
-        });
-        assert_eq!(
-            reported,
-            "cast: still to be matched to the plate; light it first"
-        );
-        let reported = complaint(|s| s.finish.noise = Noise::MatchPlate);
-        assert_eq!(
-            reported,
-            "finish.noise: still to be matched to the plate; light it first"
-        );
-        let reported = complaint(|s| s.finish.blur_px = Blur::MatchPlate);
-        assert_eq!(
-            reported,
-            "finish.blur_px: still to be matched to the plate; light it first"
-        );
+        type Spoil = fn(&mut Scene);
+        let unmatched: [(&str, Spoil); 4] = [
+            ("exposure", |s| {
+                s.exposure = Exposure::MatchPlate { gain_ev: 0.0 }
+            }),
+            ("cast", |s| {
+                s.cast = LightTint::MatchSurface {
+                    share: 1.0,
+                    albedo: LinearRgb::WHITE,
+                }
+            }),
+            ("finish.noise", |s| s.finish.noise = Noise::MatchPlate),
+            ("finish.blur_px", |s| s.finish.blur_px = Blur::MatchPlate),
+        ];
+        for (at, spoil) in unmatched {
+            let expected = format!("{at}: still to be matched to the plate; light it first");
+            assert_eq!(complaint(spoil), expected);
+        }
         let rectangle = CameraSource::Rectangle {
             corners_px: [[0.0; 2]; 4],
             photo: [8, 6],

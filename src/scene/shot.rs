@@ -94,14 +94,12 @@ impl Card {
             back: None,
             outline_uv: corners.map(Point2::from).into(),
             grade: Grade::default(),
-            bend: Bend::FLAT,
+            bend: Bend::default(),
             refraction: Refraction::default(),
             surfaces: Default::default(),
         }
     }
-}
 
-impl Card {
     /// Inverse depth of its plane at a pixel position, 1/metres; larger is nearer.
     pub(crate) fn inverse_depth(&self, camera: &Camera, px: Point2<f64>) -> f64 {
         let plane = self.quad.plane();

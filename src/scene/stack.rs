@@ -135,32 +135,27 @@ impl DropColumn<'_> {
         for (i, object) in objects.iter().enumerate() {
             let place = match object.role {
                 Role::Object => order.len(),
-                Role::Distractor => self.draw_place(&paths[i], order.len()),
+                Role::Distractor => {
+                    let path = format!("{}.start.order", paths[i]);
+                    self.draws.choose(&path, order.len() + 1)
+                }
             };
             order.insert(place, i);
         }
         order
     }
 
-    /// A place before, between or behind so many others.
-    fn draw_place(&self, path: &str, others: usize) -> usize {
-        self.draws
-            .choose(&format!("{path}.start.order"), others + 1)
-    }
-
     fn rotation_of(&self, i: usize, object: &Object, path: &str) -> Result<UnitQuaternion<f64>> {
         let half = self.options.half_body(object);
-        self.fitting_rotation(&half, path)
-            .ok_or_else(|| Error::value(format!("objects[{i}].size"), self.fit_problem(object)))
+        self.fitting_rotation(&half, path).ok_or_else(|| {
+            let room = self.surface.size;
+            let what = too_large(&object.asset, object.size, self.background, room);
+            Error::value(format!("objects[{i}].size"), what)
+        })
     }
 
     fn draw(&self, range: &Range, path: &str, name: &str) -> f64 {
         range.draw_field(self.draws, path, name)
-    }
-
-    fn fit_problem(&self, object: &Object) -> String {
-        let room = self.surface.size;
-        too_large(&object.asset, object.size, self.background, room)
     }
 
     /// The first rotation drawn with which the body fits between the walls, tilted as it starts and
@@ -170,7 +165,7 @@ impl DropColumn<'_> {
         let room = self.surface.size;
         (0..MAX_YAW_DRAWS)
             .map(|number| self.draw_rotation(path, number))
-            .find(|rotation| fits_level_too(room, half, rotation))
+            .find(|r| fits(room, half, r) && fits(room, half, &level(r)))
             .or_else(|| self.draw_level_rotation(half, path))
     }
 
@@ -189,11 +184,8 @@ impl DropColumn<'_> {
 
     /// Half a turn about its width for what starts face down.
     fn draw_side(&self, path: &str) -> UnitQuaternion<f64> {
-        if Range::chance(
-            self.start.face_down,
-            self.draws,
-            &format!("{path}.face_down"),
-        ) {
+        let path = format!("{path}.face_down");
+        if Range::chance(self.start.face_down, self.draws, &path) {
             UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI)
         } else {
             UnitQuaternion::identity()
@@ -266,11 +258,6 @@ fn fits(surface: [f64; 2], half: &Vector3<f64>, rotation: &UnitQuaternion<f64>) 
     free.iter()
         .zip(surface)
         .all(|(free, side)| *free >= -FIT_TOLERANCE * side)
-}
-
-/// Whether a body fits as it is turned, and without its tilt.
-fn fits_level_too(surface: [f64; 2], half: &Vector3<f64>, rotation: &UnitQuaternion<f64>) -> bool {
-    fits(surface, half, rotation) && fits(surface, half, &level(rotation))
 }
 
 /// The message for a card that fits nowhere.

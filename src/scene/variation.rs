@@ -46,33 +46,16 @@ pub struct Ablation {
 impl Ablation {
     /// The paper's datasets, in its order.
     pub const PAPER: [Self; 7] = [
-        Self {
-            name: "all",
-            off: &[],
-        },
-        Self {
-            name: "original_colour",
-            off: &[Variation::Colour],
-        },
-        Self {
-            name: "single_viewpoint",
-            off: &[Variation::Viewpoint],
-        },
-        Self {
-            name: "single_photo",
-            off: &[Variation::Photo],
-        },
-        Self {
-            name: "single_light",
-            off: &[Variation::Light],
-        },
-        Self {
-            name: "repeat_selections",
-            off: &[Variation::Selection],
-        },
-        Self {
-            name: "all_off",
-            off: &Variation::ALL,
-        },
+        Self::new("all", &[]),
+        Self::new("original_colour", &[Variation::Colour]),
+        Self::new("single_viewpoint", &[Variation::Viewpoint]),
+        Self::new("single_photo", &[Variation::Photo]),
+        Self::new("single_light", &[Variation::Light]),
+        Self::new("repeat_selections", &[Variation::Selection]),
+        Self::new("all_off", &Variation::ALL),
     ];
+
+    const fn new(name: &'static str, off: &'static [Variation]) -> Self {
+        Self { name, off }
+    }
 }

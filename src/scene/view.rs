@@ -5,7 +5,6 @@ use crate::error::Result;
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
 use crate::scene::bounds::{SHIFT, TURN, ZOOM};
-use crate::scene::check::field;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 
@@ -108,12 +107,12 @@ impl View {
     }
 
     /// Fails on the first impossible value.
-    pub(super) fn check(&self, at: &str) -> Result<()> {
-        ZOOM.check(&field(at, "zoom"), self.zoom)?;
+    pub(super) fn check(&self) -> Result<()> {
+        ZOOM.check("view.zoom", self.zoom)?;
         for side in self.shift {
-            SHIFT.check(&field(at, "shift"), side)?;
+            SHIFT.check("view.shift", side)?;
         }
-        TURN.check(&field(at, "turn_deg"), self.turn_deg)
+        TURN.check("view.turn_deg", self.turn_deg)
     }
 }
 

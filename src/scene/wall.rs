@@ -47,9 +47,9 @@ impl Wall {
         })
     }
 
-    pub(super) fn check(&self, at: &str) -> Result<()> {
-        WALL_HEIGHT.check(&format!("{at}.height"), self.height)?;
-        SLOPE.check(&format!("{at}.slope_deg"), self.slope_deg)
+    pub(super) fn check(&self) -> Result<()> {
+        WALL_HEIGHT.check("surface.wall.height", self.height)?;
+        SLOPE.check("surface.wall.slope_deg", self.slope_deg)
     }
 }
 

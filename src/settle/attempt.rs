@@ -113,17 +113,14 @@ impl AttemptSeries<'_> {
             || count >= self.options.attempts as usize
     }
 
+    /// Times that the next attempt halves the step.
+    ///
     /// Bodies that have sunk in need stiffer contacts, which shorter steps bear; those that have
     /// gained energy hit too hard in one step, and would again from most heights.
-    fn needs_shorter_steps(&self, attempt: &Attempt) -> bool {
-        let sank = attempt.overlap.is_finite() && self.is_too_deep(attempt.overlap);
-        sank || matches!(attempt.verdict, SettleVerdict::Exploded(_))
-    }
-
-    /// Times that the next attempt halves the step.
     fn next_halvings(&self, attempt: &Attempt, halvings: u32) -> u32 {
-        let more = u32::from(self.needs_shorter_steps(attempt));
-        (halvings + more).min(MAX_STEP_HALVINGS)
+        let sank = attempt.overlap.is_finite() && self.is_too_deep(attempt.overlap);
+        let exploded = matches!(attempt.verdict, SettleVerdict::Exploded(_));
+        (halvings + u32::from(sank || exploded)).min(MAX_STEP_HALVINGS)
     }
 
     /// The verdict on a fall, and the deepest overlap at its end.
@@ -159,12 +156,12 @@ impl AttemptSeries<'_> {
         if self.options.mode == SettleMode::Flat {
             return SettleVerdict::Rested;
         }
-        rested_or_hanging(support::unsupported(
-            self.scene,
-            self.options,
-            bodies,
-            touching,
-        ))
+        let unsupported = support::unsupported(self.scene, self.options, bodies, touching);
+        if unsupported.is_empty() {
+            SettleVerdict::Rested
+        } else {
+            SettleVerdict::Hanging(unsupported)
+        }
     }
 
     fn is_too_deep(&self, depth: f64) -> bool {
@@ -185,14 +182,6 @@ pub(super) fn start_heights(scene: &Scene, attempt: usize) -> Vec<f64> {
         });
     }
     heights
-}
-
-fn rested_or_hanging(unsupported: Vec<usize>) -> SettleVerdict {
-    if unsupported.is_empty() {
-        SettleVerdict::Rested
-    } else {
-        SettleVerdict::Hanging(unsupported)
-    }
 }
 
 /// Raises each height by its own amount above the raise of the next lower one.

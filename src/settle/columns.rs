@@ -26,18 +26,12 @@ pub(super) fn fall(drop: &Drop) -> Result<Fall> {
         .map(|members| FallenColumn::drop_members(drop, members))
         .collect::<Result<_>>()?;
     while let Some((i, j)) = first_colliding_pair(&columns) {
-        let members = joined_members(&columns[i], &columns[j]);
+        let mut members = [&columns[i].members[..], &columns[j].members[..]].concat();
+        members.sort_unstable();
         columns.swap_remove(j);
         columns[i] = FallenColumn::drop_members(drop, members)?;
     }
     Ok(merge_columns(columns))
-}
-
-/// The members of two columns, sorted.
-fn joined_members(a: &FallenColumn, b: &FallenColumn) -> Vec<usize> {
-    let mut members = [&a.members[..], &b.members[..]].concat();
-    members.sort_unstable();
-    members
 }
 
 impl FallenColumn {
@@ -66,19 +60,14 @@ fn fall_alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Fall> 
 
 /// The first two columns, in order, whose swept spaces overlap; NaN overlaps everything.
 fn first_colliding_pair(columns: &[FallenColumn]) -> Option<(usize, usize)> {
-    pairs_up_to(columns.len()).find(|&(i, j)| !are_apart(&columns[i].fall, &columns[j].fall))
-}
-
-fn pairs_up_to(count: usize) -> impl Iterator<Item = (usize, usize)> {
-    (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)))
+    let count = columns.len();
+    let mut pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
+    pairs.find(|&(i, j)| !are_apart(&columns[i].fall, &columns[j].fall))
 }
 
 fn are_apart(a: &Fall, b: &Fall) -> bool {
-    (0..2).any(|i| are_disjoint(a.swept[i], b.swept[i]))
-}
-
-fn are_disjoint(a: [f64; 2], b: [f64; 2]) -> bool {
-    a[1] < b[0] || b[1] < a[0]
+    let mut axes = a.swept.iter().zip(&b.swept);
+    axes.any(|(a, b)| a[1] < b[0] || b[1] < a[0])
 }
 
 fn merge_columns(columns: Vec<FallenColumn>) -> Fall {
@@ -86,20 +75,15 @@ fn merge_columns(columns: Vec<FallenColumn>) -> Fall {
         rests: true,
         ..Fall::default()
     };
-    let mut poses = Vec::new();
+    let mut poses: Vec<(usize, Option<Pose>)> = Vec::new();
     for FallenColumn { members, mut fall } in columns {
         poses.extend(members.into_iter().zip(std::mem::take(&mut fall.poses)));
         all.absorb(fall);
     }
-    all.poses = sorted_poses(poses);
+    poses.sort_by_key(|(i, _)| *i);
+    all.poses = poses.into_iter().map(|(_, pose)| pose).collect();
     all.sort_samples();
     all
-}
-
-/// The poses in the order of their numbers.
-fn sorted_poses(mut numbered: Vec<(usize, Option<Pose>)>) -> Vec<Option<Pose>> {
-    numbered.sort_by_key(|(i, _)| *i);
-    numbered.into_iter().map(|(_, pose)| pose).collect()
 }
 
 impl Fall {
@@ -126,6 +110,7 @@ mod tests {
     use super::*;
     use crate::allowance::Allowance;
     use crate::scene::Placement;
+    use crate::settle::attempt::start_heights;
     use crate::settle::tests::{dropped, falling};
 
     fn drop<'a>(
@@ -144,18 +129,6 @@ mod tests {
         }
     }
 
-    fn heights(scene: &Scene) -> Vec<f64> {
-        let height = |placement: &Placement| match placement {
-            Placement::Drop { height, .. } => *height,
-            Placement::At(_) | Placement::Gone => 0.0,
-        };
-        scene
-            .objects
-            .iter()
-            .map(|object| height(&object.placement))
-            .collect()
-    }
-
     #[test]
     fn columns_apart_end_as_if_each_were_the_only_one() {
         let mut scene = falling(&[
@@ -165,7 +138,7 @@ mod tests {
             ([0.6, 0.12], 0.2),
         ]);
         scene.surface.size = [2.0, 1.0];
-        let (options, heights) = (SettleOptions::default(), heights(&scene));
+        let (options, heights) = (SettleOptions::default(), start_heights(&scene, 0));
         let allowance = Allowance::new(options.most_work);
         let drop = drop(&scene, &options, &heights, &allowance);
         let of = |members: &[usize]| drop.fall(members).unwrap().poses;
@@ -189,7 +162,7 @@ mod tests {
             };
             (object.size, object.thickness) = ([0.2, 0.08], 0.01);
         }
-        let (options, heights) = (SettleOptions::default(), heights(&scene));
+        let (options, heights) = (SettleOptions::default(), start_heights(&scene, 0));
         assert_eq!(level::columns(&scene, &options).len(), 2);
         let allowance = Allowance::new(options.most_work);
         let drop = drop(&scene, &options, &heights, &allowance);

@@ -3,7 +3,6 @@
 use super::overlap::{Solid, Touch};
 use crate::geom::Vector3;
 use nalgebra::Vector2;
-use std::cmp::Ordering;
 
 /// Direction cosine up to which `x` is far enough from a direction to span the plane across it.
 const MAX_HELPER_COSINE: f64 = 0.6;
@@ -21,31 +20,6 @@ pub(super) struct Contact {
     pub(super) normal: Vector3<f64>,
     /// Whether there is friction: everywhere but at a wall.
     pub(super) rough: bool,
-}
-
-impl Contact {
-    /// With the floor or a wall; walls are smooth.
-    fn with_room(body: usize, point: Vector3<f64>, normal: Vector3<f64>) -> Self {
-        Self {
-            body,
-            by: None,
-            point,
-            normal,
-            rough: normal.z > 0.0,
-        }
-    }
-
-    /// Of two bodies that touch, at one point.
-    fn with_body(touch: &Touch, point: Vector3<f64>) -> Self {
-        let [body, by] = touch.pair;
-        Self {
-            body,
-            by: Some(by),
-            point,
-            normal: -touch.towards,
-            rough: true,
-        }
-    }
 }
 
 /// All contacts of bodies that fell: of the pairs that touch, and with the floor and the walls over
@@ -87,7 +61,13 @@ fn room_contacts(body: usize, solid: &Solid, surface: [f64; 2], reach: f64) -> V
             let touching = solid
                 .corners()
                 .filter(move |corner| corner.dot(&normal) - distance < reach);
-            touching.map(move |point| Contact::with_room(body, point, normal))
+            touching.map(move |point| Contact {
+                body,
+                by: None,
+                point,
+                normal,
+                rough: normal.z > 0.0,
+            })
         })
         .collect()
 }
@@ -98,7 +78,13 @@ fn pair_contacts(solids: &[Solid], touch: &Touch, reach: f64) -> Vec<Contact> {
     let points = shared_points(&solids[body], &solids[by], &touch.towards, reach);
     points
         .into_iter()
-        .map(|point| Contact::with_body(touch, point))
+        .map(|point| Contact {
+            body,
+            by: Some(by),
+            point,
+            normal: -touch.towards,
+            rough: true,
+        })
         .collect()
 }
 
@@ -118,17 +104,13 @@ fn shared_points(a: &Solid, b: &Solid, towards: &Vector3<f64>, reach: f64) -> Ve
 
 /// Two unit vectors across another one.
 pub(super) fn perpendicular_axes(direction: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let u = oblique_axis(direction).cross(direction).normalize();
-    (u, direction.cross(&u))
-}
-
-/// An axis of the world that is far from parallel to a direction.
-fn oblique_axis(direction: &Vector3<f64>) -> Vector3<f64> {
-    if direction.x.abs() < MAX_HELPER_COSINE {
+    let helper = if direction.x.abs() < MAX_HELPER_COSINE {
         Vector3::x()
     } else {
         Vector3::y()
-    }
+    };
+    let u = helper.cross(direction).normalize();
+    (u, direction.cross(&u))
 }
 
 /// The corners of a body that lie farthest in a direction.
@@ -141,7 +123,8 @@ struct NearestCorners {
 impl NearestCorners {
     /// Those of a body, to within `reach`.
     fn new(solid: &Solid, towards: &Vector3<f64>, reach: f64) -> Self {
-        let height = highest_corner(solid, towards);
+        let heights = solid.corners().map(|corner| corner.dot(towards));
+        let height = heights.fold(f64::NEG_INFINITY, f64::max);
         Self {
             height,
             corners: solid
@@ -157,12 +140,6 @@ impl NearestCorners {
     }
 }
 
-/// How far a body reaches in a direction.
-fn highest_corner(solid: &Solid, direction: &Vector3<f64>) -> f64 {
-    let heights = solid.corners().map(|corner| corner.dot(direction));
-    heights.fold(f64::NEG_INFINITY, f64::max)
-}
-
 /// Twice the area of a triangle, above 0 where it turns left.
 fn turn(a: &Vector2<f64>, b: &Vector2<f64>, c: &Vector2<f64>) -> f64 {
     (b - a).perp(&(c - a))
@@ -173,7 +150,9 @@ fn turn(a: &Vector2<f64>, b: &Vector2<f64>, c: &Vector2<f64>) -> f64 {
 /// # Method
 /// Andrew 1979: the lower and the upper chain of the points in order of x.
 fn convex_hull(points: impl Iterator<Item = Vector2<f64>>) -> Vec<Vector2<f64>> {
-    let points = sorted_by_x(points);
+    let mut points: Vec<Vector2<f64>> = points.collect();
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.dedup();
     if points.len() < 3 {
         return points;
     }
@@ -181,36 +160,19 @@ fn convex_hull(points: impl Iterator<Item = Vector2<f64>>) -> Vec<Vector2<f64>> 
     [lower, hull_chain(points.iter().rev())].concat()
 }
 
-/// The points in order of x, then of y, each once.
-fn sorted_by_x(points: impl Iterator<Item = Vector2<f64>>) -> Vec<Vector2<f64>> {
-    let mut points: Vec<Vector2<f64>> = points.collect();
-    points.sort_by(by_x_then_y);
-    points.dedup();
-    points
-}
-
-fn by_x_then_y(a: &Vector2<f64>, b: &Vector2<f64>) -> Ordering {
-    a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y))
-}
-
 /// The chain of a hull along sorted points, without its last one, where the other chain begins.
 fn hull_chain<'a>(points: impl Iterator<Item = &'a Vector2<f64>>) -> Vec<Vector2<f64>> {
-    let mut chain = Vec::new();
+    let mut chain: Vec<Vector2<f64>> = Vec::new();
     for p in points {
-        drop_right_turns(&mut chain, p);
+        while let [.., a, b] = chain[..]
+            && turn(&a, &b, p) <= 0.0
+        {
+            chain.pop();
+        }
         chain.push(*p);
     }
     chain.pop();
     chain
-}
-
-/// Removes the last points of a chain that do not turn left on the way to the next one.
-fn drop_right_turns(chain: &mut Vec<Vector2<f64>>, next: &Vector2<f64>) {
-    while let [.., a, b] = chain[..]
-        && turn(&a, &b, next) <= 0.0
-    {
-        chain.pop();
-    }
 }
 
 /// Corners of what two convex rings share, each widened by `reach`.
@@ -228,15 +190,12 @@ fn crossings(a: &[Vector2<f64>], b: &[Vector2<f64>]) -> impl Iterator<Item = Vec
 
 /// The sides of a ring; one of two points, none of one.
 fn sides(ring: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 2]> {
-    (0..side_count(ring.len())).map(|i| [ring[i], ring[(i + 1) % ring.len()]])
-}
-
-fn side_count(corners: usize) -> usize {
-    match corners {
+    let count = match ring.len() {
         0 | 1 => 0,
         2 => 1,
         n => n,
-    }
+    };
+    (0..count).map(|i| [ring[i], ring[(i + 1) % ring.len()]])
 }
 
 /// Whether a point lies in a ring.

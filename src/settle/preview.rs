@@ -3,7 +3,7 @@
 
 use super::bodies::solids_at_rest;
 use super::overlap::{Solid, from_lowest};
-use crate::draw::{TextSize, class_color, ink_on, outline, rgb, text};
+use crate::draw::{class_color, ink_on, outline, rgb, text};
 use crate::geom::{Point2, Point3};
 use crate::image::Image;
 use crate::pixel::Srgb8;
@@ -108,39 +108,25 @@ impl Views {
         let color = class_color(index as u32);
         draw_faces(canvas, body, color, |p| self.seen_from_above(p));
         draw_faces(canvas, body, color, |p| self.seen_from_front(p));
-        self.draw_id(canvas, index + 1, body);
-    }
-
-    fn draw_id(&self, canvas: &mut Image<Srgb8>, id: usize, body: &Solid) {
         let at = self.seen_from_above(body.center().into());
         let at = [at.x as isize, at.y as isize];
-        let ink = ink_on(PAPER_COLOR);
-        text(canvas, at, &id.to_string(), ink, TextSize::Small);
+        text(canvas, at, &(index + 1).to_string(), ink_on(PAPER_COLOR));
     }
 }
 
+/// Draws the upper and the lower face of a body.
 fn draw_faces(
     canvas: &mut Image<Srgb8>,
     body: &Solid,
     color: Srgb8,
     project: impl Fn(Point3<f64>) -> Point2<f64>,
 ) {
-    for face in faces(body) {
-        let ring: Vec<_> = face.into_iter().map(&project).collect();
+    for z in [body.half.z, -body.half.z] {
+        let corners = body.outline.iter();
+        let corners = corners.map(|&[x, y]| body.world_from_body * Point3::new(x, y, z));
+        let ring: Vec<_> = corners.map(&project).collect();
         outline(canvas, &ring, color);
     }
-}
-
-/// The upper and the lower face of a body.
-fn faces(body: &Solid) -> [Vec<Point3<f64>>; 2] {
-    [body.half.z, -body.half.z].map(|z| face_at(body, z))
-}
-
-fn face_at(body: &Solid, z: f64) -> Vec<Point3<f64>> {
-    let corners = body.outline.iter();
-    corners
-        .map(|&[x, y]| body.world_from_body * Point3::new(x, y, z))
-        .collect()
 }
 
 #[cfg(test)]

@@ -125,13 +125,9 @@ impl SpringModel {
     /// Towards the minimum that the springs pressed at `y` would have; none where that gains
     /// nothing.
     fn newton_step(&self, y: &[f64], energy: f64) -> Option<(Vec<f64>, f64)> {
-        self.line_search(y, &self.quadratic_minimum(&self.pressed(y)), energy)
-    }
-
-    /// Which springs are shorter than at rest.
-    fn pressed(&self, y: &[f64]) -> Vec<bool> {
         let springs = self.springs.iter();
-        springs.map(|spring| spring.stretch(y) < 0.0).collect()
+        let pressed: Vec<bool> = springs.map(|spring| spring.stretch(y) < 0.0).collect();
+        self.line_search(y, &self.quadratic_minimum(&pressed), energy)
     }
 
     /// The minimum with all springs pressed, or no displacement where that has less energy.
@@ -158,19 +154,14 @@ impl SpringModel {
 
     /// That of the bodies' own springs, with room for those of the contacts.
     fn own_stiffness(&self) -> EnvelopeMatrix {
-        let mut matrix = EnvelopeMatrix::zeros(self.first_entries());
+        // The row of a body begins with the lowest that it touches.
+        let slots = self.lowest_coupled().into_iter();
+        let first = slots.flat_map(|slot| [DOF_COUNT * slot; DOF_COUNT]);
+        let mut matrix = EnvelopeMatrix::zeros(first.collect());
         for (i, mass) in self.masses.iter().enumerate() {
             matrix.add(i, i, *mass);
         }
         matrix
-    }
-
-    /// First entry of each row of the matrix: of the lowest body that the row's body touches.
-    fn first_entries(&self) -> Vec<usize> {
-        let slots = self.lowest_coupled().into_iter();
-        slots
-            .flat_map(|slot| [DOF_COUNT * slot; DOF_COUNT])
-            .collect()
     }
 
     /// For each body the slot of the lowest that it touches, or its own.
@@ -216,16 +207,12 @@ fn interpolate(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
 
 /// Mass of each body over their mean, for each degree of freedom.
 fn relative_masses(scene: &Scene, order: &[usize]) -> Vec<f64> {
-    let mean = mean_mass(scene, order);
+    let total: f64 = order.iter().map(|&i| scene.objects[i].mass).sum();
+    let mean = total / order.len().max(1) as f64;
     order
         .iter()
         .flat_map(|&i| [scene.objects[i].mass / mean; DOF_COUNT])
         .collect()
-}
-
-fn mean_mass(scene: &Scene, ids: &[usize]) -> f64 {
-    let masses = ids.iter().map(|&i| scene.objects[i].mass);
-    masses.sum::<f64>() / ids.len().max(1) as f64
 }
 
 /// The pull of gravity in each degree of freedom.
@@ -248,8 +235,12 @@ struct SpringGeometry {
 
 impl SpringGeometry {
     fn new(solids: &[Solid], order: &[usize], typical_length: f64) -> Self {
+        let mut slots = vec![None; solids.len()];
+        for (slot, &i) in order.iter().enumerate() {
+            slots[i] = Some(slot);
+        }
         Self {
-            slots: slots_of(order, solids.len()),
+            slots,
             centers_of_mass: solids.iter().map(center_of_mass).collect(),
             gyration: GYRATION_RATIO * typical_length,
         }
@@ -288,15 +279,6 @@ impl SpringGeometry {
         let wrench = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
         Some(SpringEnd { slot, wrench })
     }
-}
-
-/// Place in `order` of each of `count` bodies.
-fn slots_of(order: &[usize], count: usize) -> Vec<Option<usize>> {
-    let mut slots = vec![None; count];
-    for (slot, &i) in order.iter().enumerate() {
-        slots[i] = Some(slot);
-    }
-    slots
 }
 
 impl Spring {

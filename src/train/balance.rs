@@ -51,15 +51,12 @@ impl Balance {
         self.check_alpha()?;
         check_images("real", real)?;
         check_images("synthetic", synthetic)?;
-        Ok(self.weights_for(real as f64, synthetic as f64))
-    }
-
-    fn weights_for(&self, real: f64, synthetic: f64) -> Weights {
+        let (real, synthetic) = (real as f64, synthetic as f64);
         let scale = (synthetic + real) * if self.normalize { 1.0 } else { 0.5 };
-        Weights {
+        Ok(Weights {
             real: scale / real * self.alpha,
             synthetic: scale / synthetic * (1.0 - self.alpha),
-        }
+        })
     }
 
     fn check_alpha(&self) -> Result<()> {
@@ -83,6 +80,10 @@ fn check_images(source: &str, count: u64) -> Result<()> {
 mod tests {
     use super::*;
 
+    fn weights(alpha: f64, normalize: bool, images: [u64; 2]) -> Result<Weights> {
+        Balance { alpha, normalize }.weights(images[0], images[1])
+    }
+
     #[test]
     fn the_numbers_of_the_paper() {
         let plain = Balance::default().weights(1624, 4000).unwrap();
@@ -90,12 +91,7 @@ mod tests {
             (plain.real - 0.8658).abs() < 5e-5 && (plain.synthetic - 0.3515).abs() < 5e-5,
             "{plain:?}"
         );
-        let twice = Balance {
-            normalize: true,
-            ..Balance::default()
-        }
-        .weights(1624, 4000)
-        .unwrap();
+        let twice = weights(0.5, true, [1624, 4000]).unwrap();
         assert_eq!(
             (twice.real, twice.synthetic),
             (2.0 * plain.real, 2.0 * plain.synthetic)
@@ -104,54 +100,23 @@ mod tests {
 
     #[test]
     fn the_natural_share_is_concatenation_when_normalised_and_half_of_it_otherwise() {
-        let alpha = 1624.0 / 5624.0;
-        let one = Balance {
-            alpha,
-            normalize: true,
+        for (normalize, expected) in [(true, 1.0), (false, 0.5)] {
+            let found = weights(1624.0 / 5624.0, normalize, [1624, 4000]).unwrap();
+            assert!((found.real - expected).abs() < 1e-12);
+            assert!((found.synthetic - expected).abs() < 1e-12);
         }
-        .weights(1624, 4000)
-        .unwrap();
-        assert!((one.real - 1.0).abs() < 1e-12 && (one.synthetic - 1.0).abs() < 1e-12);
-        let half = Balance {
-            alpha,
-            normalize: false,
-        }
-        .weights(1624, 4000)
-        .unwrap();
-        assert!((half.real - 0.5).abs() < 1e-12 && (half.synthetic - 0.5).abs() < 1e-12);
     }
 
     #[test]
     fn the_ends_leave_one_source_out() {
-        let only = |alpha| {
-            Balance {
-                alpha,
-                normalize: false,
-            }
-            .weights(10, 30)
-            .unwrap()
-        };
+        let only = |alpha| weights(alpha, false, [10, 30]).unwrap();
         assert_eq!((only(0.0).real, only(1.0).synthetic), (0.0, 0.0));
     }
 
     #[test]
     fn impossible_balances_are_refused() {
-        assert!(
-            Balance {
-                alpha: 1.5,
-                normalize: false
-            }
-            .weights(1, 1)
-            .is_err()
-        );
-        assert!(
-            Balance {
-                alpha: f64::NAN,
-                normalize: false
-            }
-            .weights(1, 1)
-            .is_err()
-        );
+        assert!(weights(1.5, false, [1, 1]).is_err());
+        assert!(weights(f64::NAN, false, [1, 1]).is_err());
         let said = Balance::default().weights(0, 5).unwrap_err().to_string();
         assert_eq!(
             said,

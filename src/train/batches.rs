@@ -47,7 +47,8 @@ pub fn batches(real: usize, synthetic: usize, epoch: u64, options: &BatchOptions
     rng.set_stream(epoch);
     let mut all = Vec::new();
     for (source, count) in [(Source::Real, real), (Source::Synthetic, synthetic)] {
-        let images = shuffled_indices(count, &mut rng);
+        let mut images: Vec<usize> = (0..count).collect();
+        shuffle(&mut images, &mut rng);
         all.extend(images.chunks(options.size.max(1)).map(|images| Batch {
             source,
             images: images.to_vec(),
@@ -55,12 +56,6 @@ pub fn batches(real: usize, synthetic: usize, epoch: u64, options: &BatchOptions
     }
     shuffle(&mut all, &mut rng);
     all
-}
-
-fn shuffled_indices(count: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
-    let mut indices: Vec<usize> = (0..count).collect();
-    shuffle(&mut indices, rng);
-    indices
 }
 
 /// Fisher and Yates.

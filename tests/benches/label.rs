@@ -2,7 +2,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use petcomp::camera::Camera;
-use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
+use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector3};
 use petcomp::label::{LabelOptions, label};
 use petcomp::scene::Card;
 use petcomp::{DeepImage, DeepSample};
@@ -12,13 +12,7 @@ use std::hint::black_box;
 const CARDS: u32 = 30;
 
 fn shot() -> Shot {
-    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-    let camera = Camera {
-        image: [640, 480],
-        focal_px: Vector2::new(700.0, 700.0),
-        principal_px: Point2::new(320.0, 240.0),
-        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
-    };
+    let camera = Camera::looking_down(1.0, 700.0, [640, 480]);
     (1..=CARDS)
         .map(card)
         .fold(Shot::new(camera), Shot::with_card)

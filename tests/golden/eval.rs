@@ -1,6 +1,7 @@
 //! Average precision against the values of pycocotools and of YOLOv5's own code.
 
 use crate::case::Case;
+use crate::color::Tolerance;
 use petcomp::eval::{self, Detection, EvalImage, GroundTruth, Scores};
 use petcomp::geom::BBox;
 use serde::Deserialize;
@@ -39,12 +40,10 @@ struct Yolov5 {
 pub(crate) fn run(case: &Case) -> Result<(), String> {
     let boxes: Boxes = json(&case.dir.join("boxes.json"))?;
     let reference: Reference = json(&case.dir.join("reference.json"))?;
-    let fail = case.table["tolerance"]["fail"]
-        .as_float()
-        .ok_or("tolerance.fail: expected a number")?;
+    let near = Tolerance::of(case, "tolerance");
     let sheets = sheets(&boxes);
-    coco(&sheets, &reference.coco, fail)?;
-    yolov5(&sheets, &reference.yolov5, fail)
+    coco(&sheets, &reference.coco, near)?;
+    yolov5(&sheets, &reference.yolov5, near)
 }
 
 fn json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, String> {
@@ -80,7 +79,7 @@ fn sheets(boxes: &Boxes) -> Vec<EvalImage> {
     sheets
 }
 
-fn coco(sheets: &[EvalImage], theirs: &Coco, fail: f64) -> Result<(), String> {
+fn coco(sheets: &[EvalImage], theirs: &Coco, near: Tolerance) -> Result<(), String> {
     let ours = eval::coco(sheets, &[]);
     let some = |v: Option<f64>| v.unwrap_or(-1.0);
     let over = |value: f64| {
@@ -101,12 +100,7 @@ fn coco(sheets: &[EvalImage], theirs: &Coco, fail: f64) -> Result<(), String> {
         .chain(ours.ar_by_count)
         .chain(ours.ar_by_area)
         .map(some);
-    near(
-        "coco stats",
-        ap.into_iter().chain(rest),
-        &theirs.stats,
-        fail,
-    )?;
+    near.check("coco stats", ap.into_iter().chain(rest), &theirs.stats)?;
     let there: Vec<(usize, &Vec<f64>)> = theirs
         .ap
         .iter()
@@ -117,37 +111,25 @@ fn coco(sheets: &[EvalImage], theirs: &Coco, fail: f64) -> Result<(), String> {
         "coco",
         &ours.scores,
         there.iter().map(|&(c, ap)| (c as u32, ap)),
-        fail,
+        near,
     )
 }
 
-fn yolov5(sheets: &[EvalImage], theirs: &Yolov5, fail: f64) -> Result<(), String> {
+fn yolov5(sheets: &[EvalImage], theirs: &Yolov5, near: Tolerance) -> Result<(), String> {
     let ours = eval::yolov5(sheets, &[]);
-    per_class(
-        "yolov5",
-        &ours,
-        theirs.classes.iter().copied().zip(&theirs.ap),
-        fail,
-    )?;
-    near(
-        "yolov5 precision",
-        ours.classes.iter().map(|c| c.precision),
-        &theirs.precision,
-        fail,
-    )?;
-    near(
-        "yolov5 recall",
-        ours.classes.iter().map(|c| c.recall),
-        &theirs.recall,
-        fail,
-    )
+    let aps = theirs.classes.iter().copied().zip(&theirs.ap);
+    per_class("yolov5", &ours, aps, near)?;
+    let precision = ours.classes.iter().map(|c| c.precision);
+    near.check("yolov5 precision", precision, &theirs.precision)?;
+    let recall = ours.classes.iter().map(|c| c.recall);
+    near.check("yolov5 recall", recall, &theirs.recall)
 }
 
 fn per_class<'a>(
     what: &str,
     ours: &Scores,
     theirs: impl Iterator<Item = (u32, &'a Vec<f64>)>,
-    fail: f64,
+    near: Tolerance,
 ) -> Result<(), String> {
     let theirs: Vec<_> = theirs.collect();
     let classes: Vec<u32> = ours.classes.iter().map(|c| c.class).collect();
@@ -160,32 +142,5 @@ fn per_class<'a>(
     ours.classes
         .iter()
         .zip(theirs)
-        .try_for_each(|(c, (class, ap))| near(&format!("{what} class {class}"), c.ap, ap, fail))
-}
-
-fn near(
-    what: &str,
-    ours: impl IntoIterator<Item = f64>,
-    theirs: &[f64],
-    fail: f64,
-) -> Result<(), String> {
-    let ours: Vec<f64> = ours.into_iter().collect();
-    if ours.len() != theirs.len() {
-        return Err(format!(
-            "{what}: {} values, expected {}",
-            ours.len(),
-            theirs.len()
-        ));
-    }
-    let far = ours
-        .iter()
-        .zip(theirs)
-        .enumerate()
-        .find(|(_, (a, b))| (*a - *b).abs() > fail || a.is_nan());
-    far.map_or(Ok(()), |(i, (a, b))| {
-        Err(format!(
-            "{what}: value {i} is {a}, expected {b}, {:e} apart",
-            (a - b).abs()
-        ))
-    })
+        .try_for_each(|(c, (class, ap))| near.check(&format!("{what} class {class}"), c.ap, ap))
 }

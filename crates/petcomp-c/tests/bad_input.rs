@@ -19,11 +19,12 @@ fn assert_fails(status: Status, expected: Status, what: &str) {
     assert_eq!((status, message().as_str()), (expected, what));
 }
 
-fn key(pixels: &[f32], size: [usize; 3], options: *const c_char) -> Status {
+/// Width, height and row stride; the matte, as far as there is one.
+fn keyed(pixels: &[f32], size: [usize; 3], options: *const c_char) -> (Status, [f32; 64]) {
     let screen = [0.1, 0.8, 0.1];
     let mut matte = [0.0; 64];
     // SAFETY: the sizes of the tests are at most these.
-    unsafe {
+    let status = unsafe {
         petcomp_key(
             pixels.as_ptr(),
             size[0],
@@ -32,6 +33,28 @@ fn key(pixels: &[f32], size: [usize; 3], options: *const c_char) -> Status {
             screen.as_ptr(),
             options,
             matte.as_mut_ptr(),
+            null_mut(),
+        )
+    };
+    (status, matte)
+}
+
+fn key(pixels: &[f32], size: [usize; 3], options: *const c_char) -> Status {
+    keyed(pixels, size, options).0
+}
+
+fn solve(corners: [f64; 8], size: [f64; 2], image: [u32; 2], focal_px: f64) -> Status {
+    let mut camera = bytemuck::Zeroable::zeroed();
+    // SAFETY: arrays of the right length.
+    unsafe {
+        petcomp_camera_solve(
+            corners.as_ptr(),
+            size.as_ptr(),
+            image.as_ptr(),
+            focal_px,
+            &mut camera,
+            null_mut(),
+            0,
             null_mut(),
         )
     }
@@ -70,21 +93,7 @@ fn rows_may_have_gaps() {
         .flat_map(|row| [row, &[f32::NAN; 3]].concat())
         .collect();
     let mattes = [(&tight, 8), (&gaps, 11)].map(|(pixels, stride)| {
-        let mut matte = [0.0_f32; 4];
-        let screen = [0.1, 0.8, 0.1];
-        // SAFETY: two rows of two pixels.
-        let status = unsafe {
-            petcomp_key(
-                pixels.as_ptr(),
-                2,
-                2,
-                stride,
-                screen.as_ptr(),
-                null(),
-                matte.as_mut_ptr(),
-                null_mut(),
-            )
-        };
+        let (status, matte) = keyed(pixels, [2, 2, stride], null());
         assert_eq!(status, Status::Ok, "{}", message());
         matte
     });
@@ -175,62 +184,23 @@ fn what_is_closed_is_known_to_be() {
 #[test]
 fn corners_that_no_camera_can_have_seen_are_refused() {
     let corners = [0.0, 0.0, 10.0, 0.0, 5.0, 1.0, 0.0, 10.0];
-    let mut camera = bytemuck::Zeroable::zeroed();
-    // SAFETY: arrays of the right length.
-    let status = unsafe {
-        petcomp_camera_solve(
-            corners.as_ptr(),
-            [0.5, 0.4].as_ptr(),
-            [100, 100].as_ptr(),
-            f64::NAN,
-            &mut camera,
-            null_mut(),
-            0,
-            null_mut(),
-        )
-    };
     assert_fails(
-        status,
+        solve(corners, [0.5, 0.4], [100, 100], f64::NAN),
         Status::BadArgument,
         "focal_px: NaN, expected pixels, or 0 for an unknown focal length",
     );
-    // SAFETY: as above.
-    let status = unsafe {
-        petcomp_camera_solve(
-            corners.as_ptr(),
-            [0.5, 0.4].as_ptr(),
-            [100, 100].as_ptr(),
-            0.0,
-            &mut camera,
-            null_mut(),
-            0,
-            null_mut(),
-        )
-    };
+    let status = solve(corners, [0.5, 0.4], [100, 100], 0.0);
     assert_eq!(status, Status::Camera, "{}", message());
 }
 
 #[test]
 fn a_rectangle_in_millimetres_is_refused() {
     let corners = [236.0, 239.0, 1020.0, 216.0, 1009.0, 701.0, 276.0, 739.0];
-    let mut camera = bytemuck::Zeroable::zeroed();
     for (size, told) in [
         ([560.0, 370.0], "surface.width_m: 560"),
         ([45.0, 30.0], "surface: the camera would be"),
     ] {
-        // SAFETY: arrays of the right length.
-        let status = unsafe {
-            petcomp_camera_solve(
-                corners.as_ptr(),
-                size.as_ptr(),
-                [1280, 853].as_ptr(),
-                0.0,
-                &mut camera,
-                null_mut(),
-                0,
-                null_mut(),
-            )
-        };
+        let status = solve(corners, size, [1280, 853], 0.0);
         assert_eq!(status, Status::Value, "{}", message());
         assert!(message().starts_with(told), "{}", message());
     }
@@ -338,19 +308,5 @@ fn camera_by_chance(random: &mut ChaCha8Rng) -> Status {
     let corners: [f64; 8] = std::array::from_fn(|_| number(random));
     let size = [number(random), number(random)];
     let image = [random.random_range(0..400), random.random_range(0..400)];
-    let focal = number(random);
-    let mut camera = bytemuck::Zeroable::zeroed();
-    // SAFETY: arrays of the right length.
-    unsafe {
-        petcomp_camera_solve(
-            corners.as_ptr(),
-            size.as_ptr(),
-            image.as_ptr(),
-            focal,
-            &mut camera,
-            null_mut(),
-            0,
-            null_mut(),
-        )
-    }
+    solve(corners, size, image, number(random))
 }

@@ -432,7 +432,8 @@ impl AddPhotoArgs {
         asset::check_not_written_over(&entries, &self.output)?;
         let (mut added, mut batch) = (0, FileBatch::default());
         for entry in &entries {
-            match self.add_photo(entry, &options, global) {
+            let record = asset::add_photo(&self.output, entry, &self.classes, &options);
+            match record.map(|record| report_added(&record, global)) {
                 Err(error) if entries.len() == 1 || matches!(error, Error::Value { .. }) => {
                     return Err(error);
                 }
@@ -443,17 +444,6 @@ impl AddPhotoArgs {
             }
         }
         Ok((added, batch))
-    }
-
-    fn add_photo(
-        &self,
-        entry: &PhotoEntry,
-        options: &CutOutOptions,
-        global: &GlobalArgs,
-    ) -> petcomp::Result<()> {
-        let record = asset::add_photo(&self.output, entry, &self.classes, options)?;
-        report_added(&record, global);
-        Ok(())
     }
 
     /// One for each cut-out; all photos of a capture are of one.
@@ -510,17 +500,14 @@ fn extremes_mm(metres: &[[f64; 2]], i: usize) -> [f64; 2] {
     ends.map(|metres| 1e3 * metres)
 }
 
-fn numbered(classes: &[String]) -> Vec<String> {
-    let classes = classes.iter().enumerate();
-    classes.map(|(i, class)| format!("{i} {class}")).collect()
-}
-
 /// Shows which number each class has, and how to change that; distractors alone have none.
 fn show_classes(classes: &[String], how: &str, global: &GlobalArgs) {
     if classes.is_empty() {
         return;
     }
-    let list = numbered(classes).join(", ");
+    let numbered = classes.iter().enumerate();
+    let numbered = numbered.map(|(i, class)| format!("{i} {class}"));
+    let list = numbered.collect::<Vec<_>>().join(", ");
     global.print_status(format_args!(
         "classes {list}; another order: {how}, into a new folder"
     ));

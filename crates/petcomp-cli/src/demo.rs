@@ -55,10 +55,6 @@ impl DemoArgs {
         self.output.join("dataset")
     }
 
-    fn relative_backgrounds(&self) -> petcomp::Result<PathBuf> {
-        io::relative_on_disk(&self.samples.join("backgrounds"), &self.output)
-    }
-
     /// A recipe file that names its folders and nothing else, or the one that is there: a person
     /// may have changed it.
     fn recipe(&self) -> petcomp::Result<PathBuf> {
@@ -66,7 +62,8 @@ impl DemoArgs {
         if path.exists() {
             return Ok(path);
         }
-        let backgrounds = self.relative_backgrounds()?;
+        let backgrounds = self.samples.join("backgrounds");
+        let backgrounds = io::relative_on_disk(&backgrounds, &self.output)?;
         // A JSON string is a TOML string.
         let backgrounds = serde_json::Value::from(backgrounds.to_string_lossy());
         let text = format!("assets = \"assets\"\nbackgrounds = {backgrounds}\n");

@@ -189,11 +189,15 @@ impl PicturePair {
         }
     }
 
+    /// Their stored values, made into pixels.
     fn rows<P: Copy + Send>(
         &self,
         pixel: impl Fn([f32; 4]) -> P + Copy + Sync,
     ) -> [impl RowSource<P>; 2] {
-        [&self.a, &self.b].map(|picture| pixel_rows(picture, pixel))
+        [&self.a, &self.b].map(|picture| RowsFromFn {
+            size: picture.size(),
+            make: move |rows| stored_values(picture, rows).map(pixel),
+        })
     }
 
     fn write_difference(&self, path: &Path, scale: f32) -> petcomp::Result<()> {
@@ -240,17 +244,6 @@ fn opaque([r, g, b, _]: [f32; 4]) -> LinearRgb {
 /// A difference of alpha alone is one to be seen, too.
 fn with_alpha([r, g, b, a]: [f32; 4]) -> LinearRgb {
     LinearRgb::new(r.max(a), g.max(a), b.max(a))
-}
-
-/// The values of a picture's rows, made into pixels.
-fn pixel_rows<P: Copy + Send>(
-    picture: &Picture,
-    pixel: impl Fn([f32; 4]) -> P + Sync,
-) -> impl RowSource<P> {
-    RowsFromFn {
-        size: picture.size(),
-        make: move |rows| stored_values(picture, rows).map(&pixel),
-    }
 }
 
 /// The values as the file stores them, which is what `idiff` compares: codes of integer formats as

@@ -2,7 +2,7 @@
 
 use crate::{exit, print};
 use petcomp::io::ToFile;
-use petcomp::{Image, PremulRgba, Srgba8, io};
+use petcomp::{Error, Image, PremulRgba, Srgba8, io};
 use std::process::Command;
 
 /// Something that petcomp needs does not work.
@@ -15,7 +15,9 @@ pub(crate) struct DoctorArgs {}
 pub(crate) fn run(_: &DoctorArgs) -> anyhow::Result<u8> {
     print::line(format_args!("petcomp {}", env!("CARGO_PKG_VERSION")));
     print::line(format_args!("threads  {}", rayon::current_num_threads()));
-    print::line(format_args!("blender  {}", blender_version()));
+    let missing = "not found (only `make golden` needs it)";
+    let blender = blender_version().unwrap_or_else(|| missing.into());
+    print::line(format_args!("blender  {blender}"));
     let outcomes = [
         #[cfg(feature = "oiio")]
         report_check("oiio", worker_answers()),
@@ -30,9 +32,11 @@ pub(crate) fn run(_: &DoctorArgs) -> anyhow::Result<u8> {
     })
 }
 
-fn blender_version() -> String {
-    let missing = "not found (only `make golden` needs it)";
-    version_of("blender").unwrap_or_else(|| missing.into())
+/// First line of `blender --version`.
+fn blender_version() -> Option<String> {
+    let output = Command::new("blender").arg("--version").output().ok()?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    text.lines().next().map(str::to_owned)
 }
 
 /// Prints what a check found; whether it passed.
@@ -44,23 +48,10 @@ fn report_check(name: &str, outcome: anyhow::Result<String>) -> bool {
     outcome.is_ok()
 }
 
-/// First line of `program --version`.
-fn version_of(program: &str) -> Option<String> {
-    let output = Command::new(program).arg("--version").output().ok()?;
-    String::from_utf8_lossy(&output.stdout)
-        .lines()
-        .next()
-        .map(str::to_owned)
-}
-
 /// The worker that reads what only OpenImageIO can.
 #[cfg(feature = "oiio")]
 fn worker_answers() -> anyhow::Result<String> {
     Ok(io::worker_version()?)
-}
-
-fn temporary_folder() -> petcomp::Result<tempfile::TempDir> {
-    tempfile::tempdir().map_err(|e| petcomp::Error::file(std::env::temp_dir(), e))
 }
 
 const HALF_WHITE: Srgba8 = Srgba8 {
@@ -91,7 +82,7 @@ fn exr_round_trip() -> anyhow::Result<String> {
 
 /// Writes a picture of one value and reads its last pixel.
 fn round_trip<P: ToFile + Copy>(name: &str, value: P) -> anyhow::Result<PremulRgba> {
-    let folder = temporary_folder()?;
+    let folder = tempfile::tempdir().map_err(|e| Error::file(std::env::temp_dir(), e))?;
     let path = folder.path().join(name);
     io::write(&path, &Image::filled(2, 2, value))?;
     Ok(io::read::<PremulRgba>(&path)?[(1, 1)])

@@ -96,16 +96,12 @@ impl GlobalArgs {
     }
 
     fn read_options(&self) -> anyhow::Result<ReadOptions> {
+        let mut limits = self.limits.iter();
         Ok(ReadOptions {
-            limits: self.limits()?,
+            limits: limits.try_fold(Limits::default(), Limits::with)?,
             fallback: self.oiio.fallback()?,
             ..Default::default()
         })
-    }
-
-    fn limits(&self) -> petcomp::Result<Limits> {
-        let mut overrides = self.limits.iter();
-        overrides.try_fold(Limits::default(), Limits::with)
     }
 
     /// Only results and errors are asked for.

@@ -32,7 +32,7 @@ pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let labels = labels.map_err(|e| e.in_file(&args.scene.path))?;
     io::write_json(&args.output, &labels)?;
     args.write_polygons(&labels, &pipeline)?;
-    args.report(&labels, global);
+    global.print_written(&args.output, count_objects(&labels));
     Ok(())
 }
 
@@ -64,10 +64,6 @@ impl LabelArgs {
         };
         let simplify = pipeline.config().labels.simplify;
         io::write_json(path, &label::borders(labels, simplify))
-    }
-
-    fn report(&self, labels: &Labels, global: &GlobalArgs) {
-        global.print_written(&self.output, count_objects(labels));
     }
 }
 

@@ -32,12 +32,8 @@ pub(crate) fn counted(count: usize, thing: &str) -> String {
 pub(crate) fn usage(message: &clap::Error) -> u8 {
     match print_usage(message) {
         Err(error) if !message.use_stderr() => exit_unwritable(&error),
-        _ => usage_exit_code(message),
+        _ => u8::try_from(message.exit_code()).unwrap_or(u8::MAX),
     }
-}
-
-fn usage_exit_code(message: &clap::Error) -> u8 {
-    u8::try_from(message.exit_code()).unwrap_or(u8::MAX)
 }
 
 /// With its colours, unless an argument brings some of its own.

@@ -50,10 +50,6 @@ impl ProgressDisplay {
             self.restart_bar(done, total);
         }
         self.bar.set_position(done);
-        self.update_log(done, total);
-    }
-
-    fn update_log(&self, done: u64, total: u64) {
         if let Some(Ok(mut log)) = self.log.as_ref().map(Mutex::lock) {
             log.update(done, total);
         }

@@ -121,19 +121,14 @@ fn write_picture(
     frame: &Image<PremulRgba>,
     options: &WriteOptions,
 ) -> petcomp::Result<()> {
-    match extension_of(path).as_str() {
-        "exr" | "tif" | "tiff" => io::write_with(path, frame, options),
-        _ => io::write_with(path, &displayed(frame), options),
+    let with_alpha = ["exr", "tif", "tiff"];
+    match with_alpha.iter().any(|end| io::has_extension(path, end)) {
+        true => io::write_with(path, frame, options),
+        false => io::write_with(path, &displayed(frame), options),
     }
 }
 
 /// The picture over black.
 fn displayed(frame: &Image<PremulRgba>) -> Image<LinearRgb> {
     frame.map(PremulRgba::color)
-}
-
-fn extension_of(path: &Path) -> String {
-    path.extension()
-        .map(|e| e.to_string_lossy().to_lowercase())
-        .unwrap_or_default()
 }

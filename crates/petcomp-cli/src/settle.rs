@@ -34,7 +34,7 @@ const TRACE_RATE: f64 = 60.0;
 
 pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     args.check_targets()?;
-    io::check_distinct(args.inputs(), args.targets())?;
+    io::check_distinct(args.options.iter().chain([&args.scene]), args.targets())?;
     let scene: Scene = io::read_document(&args.scene)?;
     let options = args.options_for(&scene)?;
     let settled = args.settle(scene, &options)?;
@@ -49,10 +49,6 @@ pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> 
 }
 
 impl SettleArgs {
-    fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
-        self.options.iter().chain([&self.scene])
-    }
-
     /// Refuses what could not be written before anything falls.
     fn check_targets(&self) -> petcomp::Result<()> {
         check_scene_target(&self.output)?;

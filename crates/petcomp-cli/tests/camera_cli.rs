@@ -1,9 +1,8 @@
 //! Labels and cameras as a person meets them: the real program in an empty folder.
-#![expect(clippy::unwrap_used, reason = "helpers of tests are tests")]
 
 mod desk;
 
-use desk::{Desk, text};
+use desk::{Desk, SAMPLES, text, words};
 use petcomp::camera::CameraFile;
 use petcomp::camera::simulate::{Scenario, View};
 use petcomp::{Camera, Image, LinearRgb, Srgb8, io};
@@ -43,11 +42,9 @@ impl Desk {
     fn refused(&self, args: &[&str]) -> String {
         let output = self.run(args);
         let err = text(&output.stderr);
+        let code = output.status.code();
         assert!(
-            output
-                .status
-                .code()
-                .is_some_and(|code| code != 0 && code != 101),
+            code.is_some_and(|code| code != 0 && code != 101),
             "petcomp {args:?}: {err}"
         );
         err
@@ -58,19 +55,9 @@ impl Desk {
         let view = view_of(image);
         let [w, h] = image.map(|side| side as usize);
         std::fs::create_dir_all(self.path("bg")).unwrap();
-        io::write(
-            self.path(format!("bg/{name}.png")),
-            &Image::filled(
-                w,
-                h,
-                Srgb8 {
-                    r: 90,
-                    g: 90,
-                    b: 90,
-                },
-            ),
-        )
-        .unwrap();
+        let [r, g, b] = [90; 3];
+        let grey = Image::filled(w, h, Srgb8 { r, g, b });
+        io::write(self.path(format!("bg/{name}.png")), &grey).unwrap();
         json!({
             "format": "plane-label", "version": 1,
             "image": { "file": format!("{name}.png"), "width": image[0], "height": image[1] },
@@ -135,14 +122,7 @@ fn a_label_with_its_sides_exchanged_is_refused_by_every_command() {
         &["camera", "solve", "bg/a.label.json"][..],
         &["camera", "joint", "bg/a.label.json"],
         &["camera", "doctor", "bg/a.label.json"],
-        &[
-            "camera",
-            "rectify",
-            "bg/a.png",
-            "bg/a.label.json",
-            "-o",
-            "top.png",
-        ],
+        &words("camera rectify bg/a.png bg/a.label.json -o top.png")[..],
         &["scene", "draw", "recipe.toml", "-o", "scene.json"],
         &generate,
     ] {
@@ -390,14 +370,7 @@ fn a_photo_that_is_not_the_label_s_is_noticed() {
     let mut label = desk.photo("a", IMAGE);
     desk.label("a", &label);
     desk.photo("upright", [480, 640]);
-    let rectify = [
-        "camera",
-        "rectify",
-        "bg/upright.png",
-        "bg/a.label.json",
-        "-o",
-        "top.png",
-    ];
+    let rectify = words("camera rectify bg/upright.png bg/a.label.json -o top.png");
     let said = desk.refused(&rectify);
     assert!(
         said.contains("480 x 640 pixels, expected the shape"),
@@ -457,15 +430,8 @@ fn the_corners_of_a_marker_are_added_to_a_label() {
     map["markers"] =
         json!({ "family": "DICT_4X4_50", "size_m": 0.06, "map": { "0": [0.1, 0.0, 0.0] } });
     desk.write("map.json", map.to_string());
-    let [said, _] = desk.ok(&[
-        "camera",
-        "markers",
-        "a.png",
-        "--map",
-        "map.json",
-        "-o",
-        "a.label.json",
-    ]);
+    let markers = words("camera markers a.png --map map.json -o a.label.json");
+    let [said, _] = desk.ok(&markers);
     assert!(said.contains("4 marker corners"), "{said}");
     let label: Value = io::read_json(desk.path("a.label.json")).unwrap();
     let truth = [
@@ -528,17 +494,9 @@ fn corners_that_are_given_stand_in_for_markers_that_are_not_found() {
 fn corners_of_a_larger_size_of_the_photo_are_asked_about() {
     let desk = Desk::with_recipe();
     desk.photo("a b", IMAGE);
-    let corners = "300,200 1200,210 1190,900 290,890";
-    let init = [
-        "camera",
-        "init",
-        "bg/a b.png",
-        "--size",
-        "0.56x0.37",
-        "--corners",
-        corners,
-    ];
-    let said = desk.ok(&init).concat();
+    let init = ["camera", "init", "bg/a b.png", "--size", "0.56x0.37"];
+    let corners = ["--corners", "300,200 1200,210 1190,900 290,890"];
+    let said = desk.ok(&[&init[..], &corners].concat()).concat();
     let question = "3 of 4 corners lie outside the 640 x 480 picture";
     assert!(said.contains(question), "{said}");
     // The command that is proposed is one for the shell.
@@ -575,36 +533,27 @@ fn a_label_comes_from_nothing() {
     let [said, _] = desk.ok(&["camera", "init", "bg/a.png", "--size", "0.56x0.37"]);
     assert!(said.contains("fill in surface.corners_px"), "{said}");
     let again = ["camera", "init", "bg/a.png", "--size", "1x1"];
-    assert!(
-        desk.refused(&again)
-            .contains("already exists; --force replaces it")
-    );
+    for (args, why) in [
+        (&again[..], "already exists; --force replaces it"),
+        (
+            &["camera", "solve", "bg/a.label.json"],
+            "corners_px is missing or not filled in",
+        ),
+        (
+            &["camera", "solve", "bg/a.png"],
+            "bg/a.label.json lies beside it",
+        ),
+    ] {
+        let told = desk.refused(args);
+        assert!(told.contains(why), "{told}");
+    }
     assert_eq!(desk.run(&again).status.code(), Some(4));
-    assert!(
-        desk.refused(&["camera", "solve", "bg/a.label.json"])
-            .contains("corners_px is missing or not filled in")
-    );
-    assert!(
-        desk.refused(&["camera", "solve", "bg/a.png"])
-            .contains("bg/a.label.json lies beside it")
-    );
-    let corners: Vec<[f64; 2]> =
-        serde_json::from_value(label["surface"]["corners_px"].clone()).unwrap();
-    let corners = corners
-        .iter()
+    let corners = corners_of(&label)
         .map(|[x, y]| format!("{x},{y}"))
-        .collect::<Vec<_>>()
         .join(" ");
-    desk.ok(&[
-        "camera",
-        "init",
-        "bg/a.png",
-        "--size",
-        "0.56x0.37",
-        "--corners",
-        &corners,
-        "--force",
-    ]);
+    let init = ["camera", "init", "bg/a.png", "--size", "0.56x0.37"];
+    let more = ["--force", "--corners", &corners];
+    desk.ok(&[&init[..], &more].concat());
     let [said, _] = desk.ok(&["camera", "solve", "bg/a.label.json"]);
     assert!(said.contains("tilt 30."), "{said}");
     assert!(desk.path("bg/a.overlay.png").is_file());
@@ -640,26 +589,22 @@ fn a_size_in_millimetres_is_asked_about_before_a_label_is_written() {
     assert!(!desk.path("bg/a.label.json").exists());
 }
 
+fn corners_of(label: &Value) -> [[f64; 2]; 4] {
+    serde_json::from_value(label["surface"]["corners_px"].clone()).unwrap()
+}
+
 /// The same four corners as other programs write them.
 fn drawn(label: &Value) -> [(&'static str, String); 3] {
-    let corners: Vec<[f64; 2]> =
-        serde_json::from_value(label["surface"]["corners_px"].clone()).unwrap();
+    let corners = corners_of(label);
     let [w, h] = IMAGE;
     let labelme = json!({ "version": "5.4.1", "imagePath": "a.png", "imageData": null, "imageWidth": w, "imageHeight": h,
-        "shapes": corners.iter().map(|p| json!({ "label": "tray", "points": [p], "shape_type": "point" })).collect::<Vec<_>>() });
-    let points = corners
-        .iter()
-        .map(|[x, y]| format!("{x},{y}"))
-        .collect::<Vec<_>>()
-        .join(";");
+        "shapes": corners.map(|p| json!({ "label": "tray", "points": [p], "shape_type": "point" })) });
+    let points = corners.map(|[x, y]| format!("{x},{y}")).join(";");
     let cvat = format!(
         "<?xml version=\"1.0\"?><annotations><version>1.1</version><image id=\"0\" name=\"a.png\" width=\"{w}\" \
          height=\"{h}\"><polygon label=\"tray\" points=\"{points}\"/></image></annotations>"
     );
-    let percent: Vec<[f64; 2]> = corners
-        .iter()
-        .map(|[x, y]| [100.0 * x / f64::from(w), 100.0 * y / f64::from(h)])
-        .collect();
+    let percent = corners.map(|[x, y]| [100.0 * x / f64::from(w), 100.0 * y / f64::from(h)]);
     let studio = json!([{ "id": 1, "data": { "image": "/data/upload/1/01234567-a.png" }, "annotations": [{ "result": [{
         "original_width": w, "original_height": h, "image_rotation": 0, "type": "polygonlabels",
         "value": { "points": percent, "closed": true, "polygonlabels": ["tray"] } }] }] }]);
@@ -704,23 +649,14 @@ fn labels_of_other_programs_are_labels_everywhere() {
 fn an_image_beyond_the_dataset_is_refused() {
     let desk = Desk::with_recipe();
     desk.label("a", &desk.photo("a", IMAGE));
-    let generate = [
-        "dataset",
-        "generate",
-        "recipe.toml",
-        "-n",
-        "60",
-        "-o",
-        "out",
-        "--only",
-    ];
-    let told = desk.refused(&[&generate[..], &["60"]].concat());
+    let generate = "dataset generate recipe.toml -n 60 -o out --only";
+    let told = desk.refused(&words(&format!("{generate} 60")));
     assert!(
         told.contains("only: 60, expected a number below that of the images, 60"),
         "{told}"
     );
     assert!(!desk.path("out").exists());
-    desk.ok(&[&generate[..], &["59"]].concat());
+    desk.ok(&words(&format!("{generate} 59")));
 }
 
 #[test]
@@ -774,16 +710,7 @@ fn warnings_about_a_background_are_said_where_it_is_solved_and_in_the_report() {
     let [_, solved] = desk.ok(&["camera", "solve", "bg/a.label.json"]);
     assert!(solved.contains("known"), "{solved}");
     assert_eq!(desk.scene(&[]).1, "");
-    desk.ok(&[
-        "dataset",
-        "generate",
-        "-q",
-        "recipe.toml",
-        "-n",
-        "1",
-        "-o",
-        "out",
-    ]);
+    desk.ok(&words("dataset generate -q recipe.toml -n 1 -o out"));
     desk.ok(&["dataset", "report", "out"]);
     let page = std::fs::read_to_string(desk.path("out/report.html")).unwrap();
     assert!(
@@ -864,15 +791,8 @@ fn the_top_view_of_a_reduced_photo_is_as_reduced() {
     desk.label("a", &desk.photo("a", IMAGE));
     desk.photo("small", IMAGE.map(|side| side / 4));
     let width = |name: &str| {
-        let photo = format!("bg/{name}.png");
-        desk.ok(&[
-            "camera",
-            "rectify",
-            &photo,
-            "bg/a.label.json",
-            "-o",
-            "top.png",
-        ]);
+        let rectify = format!("camera rectify bg/{name}.png bg/a.label.json -o top.png");
+        desk.ok(&words(&rectify));
         io::read_header(desk.path("top.png")).unwrap().width
     };
     assert!(width("a").abs_diff(4 * width("small")) <= 4);
@@ -895,7 +815,7 @@ fn the_overlay_has_a_legend_below_the_photo() {
 fn the_samples_are_taken_with_their_cameras() {
     // The label of a sample, its sides exchanged: the case that was reported.
     let desk = Desk::with_recipe();
-    let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/samples/backgrounds");
+    let samples = Path::new(SAMPLES).join("backgrounds");
     std::fs::create_dir_all(desk.path("bg")).unwrap();
     std::fs::copy(samples.join("bg0000.jpg"), desk.path("bg/bg0000.jpg")).unwrap();
     let label: Value = io::read_json(samples.join("bg0000.label.json")).unwrap();

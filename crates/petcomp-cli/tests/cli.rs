@@ -2,11 +2,40 @@
 
 mod desk;
 
-use desk::{Desk, PETCOMP, text};
+use desk::{Desk, PETCOMP, SAMPLES, text, words};
+use petcomp::io::{self, FromFile, ToFile};
+use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 impl Desk {
+    fn write_picture(&self, name: &str, picture: &Image<impl ToFile>) {
+        let path = self.path(name);
+        std::fs::create_dir_all(path.parent().expect("inside the desk")).expect("a folder");
+        io::write(path, picture).expect("a picture");
+    }
+
+    fn read<P: FromFile>(&self, name: &str) -> Image<P> {
+        io::read(self.path(name)).expect("a picture")
+    }
+
+    /// Of all files, in the order of their names.
+    fn content(&self) -> Vec<Vec<u8>> {
+        let files = self.files().into_iter();
+        files
+            .map(|file| std::fs::read(file).expect("a file"))
+            .collect()
+    }
+
+    fn bytes(&self, name: &str) -> Vec<u8> {
+        std::fs::read(self.path(name)).expect("a file")
+    }
+
+    fn text(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).expect("a text")
+    }
+
     /// Runs what must succeed and returns what it printed.
     fn ok(&self, args: &[&str]) -> String {
         let output = self.run(args);
@@ -57,31 +86,18 @@ fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-fn samples() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/samples")
-}
-
 fn sample(name: &str) -> String {
-    samples().join(name).to_string_lossy().into_owned()
-}
-
-/// The arguments of a command line without spaces in them.
-fn words(line: &str) -> Vec<&str> {
-    line.split(' ').collect()
+    format!("{SAMPLES}/{name}")
 }
 
 /// A sample dataset of one picture, in the folder `demo`.
 fn demo(desk: &Desk) {
-    desk.ok(&[
-        "demo",
-        "--samples",
-        &sample(""),
-        "-n",
-        "1",
-        "-q",
-        "-o",
-        "demo",
-    ]);
+    demo_into(desk, "demo", "-n 1");
+}
+
+fn demo_into(desk: &Desk, folder: &str, more: &str) {
+    let demo = format!("demo -q {more} -o {folder} --samples");
+    desk.ok(&[&words(&demo)[..], &[SAMPLES]].concat());
 }
 
 /// A label file with these corners for a picture that need not exist.
@@ -424,14 +440,7 @@ fn pages_of_a_longer_contact_sheet_do_not_stay() {
 fn another_photo_of_the_same_name_replaces_a_cut_out_with_a_warning() {
     let desk = Desk::new();
     write_slab(&desk.path("x/slab.png"));
-    let other = petcomp::Image::from_fn(120, 80, |x, y| {
-        match (30..70).contains(&x) && (25..55).contains(&y) {
-            true => petcomp::LinearRgb::new(0.6, 0.05, 0.05),
-            false => petcomp::LinearRgb::new(0.04, 0.4, 0.08),
-        }
-    });
-    std::fs::create_dir(desk.path("y")).expect("a folder");
-    petcomp::io::write(desk.path("y/slab.png"), &other).expect("a picture");
+    desk.write_picture("y/slab.png", &red_on_green(30..70, 25..55));
     let warning = "slab/slab.exr: replaces the cut-out of another photo";
     for (photo, is_told) in [("x", false), ("x", false), ("y", true)] {
         let said = add_ring(&desk, &format!("{photo}/slab.png"), "assets");
@@ -454,13 +463,7 @@ fn spaces_around_the_names_of_classes_are_none_of_them() {
 fn a_scale_that_is_wrong_for_one_photo_does_not_stop_the_others() {
     let desk = Desk::new();
     write_slab(&desk.path("one.png"));
-    let small = petcomp::Image::from_fn(120, 80, |x, y| {
-        match (50..62).contains(&x) && (30..40).contains(&y) {
-            true => petcomp::LinearRgb::new(0.6, 0.05, 0.05),
-            false => petcomp::LinearRgb::new(0.04, 0.4, 0.08),
-        }
-    });
-    petcomp::io::write(desk.path("small.png"), &small).expect("a picture");
+    desk.write_picture("small.png", &red_on_green(50..62, 30..40));
     let line = "asset add small.png one.png --class ring --scale 3000 -o assets";
     let done = desk.run(&words(line));
     let told = text(&done.stderr);
@@ -479,7 +482,7 @@ fn a_list_whose_only_photo_a_person_rejected_leaves_an_empty_sheet() {
     desk.write("photos.csv", "file,asset,class,length\none.png,a,cap,0.3\n");
     let build = ["asset", "build", "photos.csv", "-o", "built"];
     let height = || {
-        let sheet = petcomp::io::read_header(desk.path("built/contact_sheet.png"));
+        let sheet = io::read_header(desk.path("built/contact_sheet.png"));
         sheet.expect("a sheet").height
     };
     desk.ok(&build);
@@ -493,9 +496,7 @@ fn a_list_whose_only_photo_a_person_rejected_leaves_an_empty_sheet() {
     // What gives no cut-out any more keeps its earlier one, on the sheet too.
     std::fs::remove_file(desk.path("one.review.json")).expect("a review");
     desk.ok(&build);
-    let screen = petcomp::LinearRgb::new(0.04, 0.4, 0.08);
-    let empty = petcomp::Image::filled(120, 80, screen);
-    petcomp::io::write(desk.path("one.png"), &empty).expect("a picture");
+    desk.write_picture("one.png", &Image::filled(120, 80, GREEN));
     assert!(!desk.run(&build).status.success());
     assert!(height() == full && desk.path("built/a/one.png").exists());
 }
@@ -530,12 +531,7 @@ fn an_asset_of_two_classes_or_roles_is_refused_before_any_work() {
 fn a_build_without_one_of_its_photos_is_incomplete() {
     let desk = Desk::new();
     write_slab(&desk.path("one.png"));
-    let empty = petcomp::LinearRgb::new(0.04, 0.4, 0.08);
-    petcomp::io::write(
-        desk.path("two.png"),
-        &petcomp::Image::filled(120, 80, empty),
-    )
-    .expect("a picture");
+    desk.write_picture("two.png", &Image::filled(120, 80, GREEN));
     let list = "file,asset,class,length\none.png,a,cap,0.3\ntwo.png,b,cap,0.3\n";
     desk.write("photos.csv", list);
     let built = desk.run(&["asset", "build", "photos.csv", "-o", "built", "-q"]);
@@ -585,64 +581,40 @@ fn a_progress_bar_begins_at_nothing() {
 }
 
 #[test]
-fn a_missing_file_is_named() {
-    let error = Desk::new().refused(&["matte", "cut", "nowhere.png", "-o", "out.exr"]);
-    assert!(error.contains("nowhere.png: no such file"), "{error}");
-}
-
-#[test]
-fn text_named_png_is_not_a_picture() {
+fn what_is_no_picture_is_refused_by_name() {
     let desk = Desk::new();
+    let whole = std::fs::read(sample("bottles/b0000_0.png")).expect("a sample");
     desk.write("note.png", "this is a note");
-    let error = desk.refused(&["matte", "cut", "note.png", "-o", "out.exr"]);
-    assert!(
-        error.contains("note.png") && error.contains("expected"),
-        "{error}"
-    );
-}
-
-#[test]
-fn a_truncated_png_is_refused() {
-    let desk = Desk::new();
-    let whole = std::fs::read(samples().join("bottles/b0000_0.png")).expect("a sample");
     desk.write("half.png", &whole[..whole.len() / 2]);
-    let error = desk.refused(&["matte", "cut", "half.png", "-o", "out.exr"]);
-    assert!(error.contains("half.png"), "{error}");
+    let mut without_pixels = whole;
+    without_pixels[16..24].fill(0);
+    desk.write("empty.png", without_pixels);
+    for (name, why) in [
+        ("nowhere.png", "nowhere.png: no such file"),
+        ("note.png", "expected"),
+        ("half.png", ""),
+        ("empty.png", ""),
+    ] {
+        let told = desk.refused(&["matte", "cut", name, "-o", "out.exr"]);
+        assert!(told.contains(name) && told.contains(why), "{name}: {told}");
+    }
 }
 
 #[test]
-fn a_picture_without_pixels_is_refused() {
+fn labels_of_three_corners_or_of_none_that_are_convex_are_refused() {
     let desk = Desk::new();
-    let mut png = std::fs::read(samples().join("bottles/b0000_0.png")).expect("a sample");
-    png[16..24].fill(0);
-    desk.write("empty.png", png);
-    let error = desk.refused(&["matte", "cut", "empty.png", "-o", "out.exr"]);
-    assert!(error.contains("empty.png"), "{error}");
-}
-
-#[test]
-fn a_label_with_three_corners_is_refused() {
-    let desk = Desk::new();
-    desk.write(
-        "a.label.json",
-        label("[[100, 100], [500, 110], [510, 400]]"),
-    );
-    let error = desk.refused(&["camera", "solve", "a.label.json"]);
-    assert!(
-        error.contains("a.label.json") && error.contains("corners_px"),
-        "{error}"
-    );
-}
-
-#[test]
-fn corners_that_are_not_convex_are_refused() {
-    let desk = Desk::new();
-    desk.write(
-        "a.label.json",
-        label("[[100, 100], [500, 110], [200, 150], [90, 390]]"),
-    );
-    let error = desk.refused(&["camera", "solve", "a.label.json"]);
-    assert!(error.contains("not convex"), "{error}");
+    for (last, why) in [
+        ("[510, 400]", "corners_px"),
+        ("[200, 150], [90, 390]", "not convex"),
+    ] {
+        let corners = format!("[[100, 100], [500, 110], {last}]");
+        desk.write("a.label.json", label(&corners));
+        let told = desk.refused(&["camera", "solve", "a.label.json"]);
+        assert!(
+            told.contains("a.label.json") && told.contains(why),
+            "{told}"
+        );
+    }
 }
 
 #[test]
@@ -661,31 +633,30 @@ fn crossed_corners_are_put_in_order_and_said() {
 }
 
 #[test]
-fn an_unknown_key_is_met_with_the_one_that_was_meant() {
+fn an_unknown_key_is_met_with_the_one_that_was_meant_and_an_impossible_range_is_named() {
     let desk = Desk::new();
-    desk.write("recipe.toml", "[scene]\nobjcts = [1, 2]\n");
-    let error = desk.refused(&["dataset", "generate", "recipe.toml", "-n", "1", "-o", "out"]);
-    assert!(
-        error.contains("recipe.toml: scene: unknown key \"objcts\", did you mean \"objects\"?"),
-        "{error}"
-    );
+    for (wrong, why) in [
+        (
+            "objcts = [1, 2]",
+            "scene: unknown key \"objcts\", did you mean \"objects\"?",
+        ),
+        ("scale = [0.0, -1.0]", "scene.scale"),
+    ] {
+        desk.write("recipe.toml", format!("[scene]\n{wrong}\n"));
+        let told = desk.refused(&words("dataset generate recipe.toml -n 1 -o out"));
+        assert!(told.contains(&format!("recipe.toml: {why}")), "{told}");
+    }
 }
 
 #[test]
 fn ablations_differ_in_the_switch_that_is_asked_for() {
     let desk = Desk::new();
     desk.write("recipe.toml", "[scene]\nobjects = 3\n");
-    let ablate = ["dataset", "ablate", "recipe.toml", "-n", "0", "-o"];
-    let switches = [
-        "--switch",
-        "scene.friction=0.1",
-        "--switch",
-        "scene.scale=1.5",
-    ];
-    let out = desk.ok(&[&ablate[..], &["mine"], &switches[..]].concat());
+    let ablate = "dataset ablate recipe.toml -n 0 -o";
+    let switches = "--switch scene.friction=0.1 --switch scene.scale=1.5";
+    let out = desk.ok(&words(&format!("{ablate} mine {switches}")));
     assert_eq!(out.lines().count(), 3, "{out}");
-    let recipe =
-        |folder: &str| std::fs::read_to_string(desk.path(folder).join("recipe.toml")).unwrap();
+    let recipe = |folder: &str| desk.text(&format!("{folder}/recipe.toml"));
     let all = recipe("mine/all");
     let own_lines = |folder: &str| {
         let written = recipe(folder);
@@ -700,10 +671,11 @@ fn ablations_differ_in_the_switch_that_is_asked_for() {
     );
     assert_eq!(own_lines("mine/scene.friction=0.1"), ["friction = 0.1"]);
     assert_eq!(own_lines("mine/scene.scale=1.5"), ["scale = 1.5"]);
-    let paper = desk.ok(&[&ablate[..], &["paper"]].concat());
+    let paper = desk.ok(&words(&format!("{ablate} paper")));
     assert_eq!(paper.lines().count(), 7, "{paper}");
-    let wrong = [&ablate[..], &["never", "--switch", "scene.frictoin=0.1"]].concat();
-    assert!(desk.refused(&wrong).contains("did you mean \"friction\"?"));
+    let wrong = format!("{ablate} never --switch scene.frictoin=0.1");
+    let told = desk.refused(&words(&wrong));
+    assert!(told.contains("did you mean \"friction\"?"), "{told}");
 }
 
 #[test]
@@ -741,8 +713,7 @@ fn a_recipe_beside_a_dataset_is_not_written_over() {
     desk.ok(&ablate);
     std::fs::create_dir(desk.path("out/scene.scale=1.5/dataset")).unwrap();
     desk.ok(&ablate);
-    let read = |name: &str| std::fs::read_to_string(desk.path("out").join(name)).unwrap();
-    let recipes = || ["all/recipe.toml", "scene.scale=1.5/recipe.toml"].map(read);
+    let recipes = || ["all", "scene.scale=1.5"].map(|s| desk.text(&format!("out/{s}/recipe.toml")));
     let before = recipes();
     let refused = desk.refused(&[&ablate[..], &["--set", "scene.objects=4"]].concat());
     assert!(
@@ -790,26 +761,18 @@ fn a_folder_takes_no_scratch_folder() {
 }
 
 #[test]
-fn an_impossible_range_is_named() {
-    let desk = Desk::new();
-    desk.write("recipe.toml", "[scene]\nscale = [0.0, -1.0]\n");
-    let error = desk.refused(&["dataset", "generate", "recipe.toml", "-n", "1", "-o", "out"]);
-    assert!(error.contains("recipe.toml: scene.scale"), "{error}");
-}
-
-#[test]
 fn an_output_folder_that_is_a_file_is_refused() {
     let desk = Desk::new();
     desk.write("taken", "a file");
-    let error = desk.refused(&["demo", "--samples", &sample(""), "-o", "taken"]);
+    let error = desk.refused(&["demo", "--samples", SAMPLES, "-o", "taken"]);
     assert!(error.contains("taken"), "{error}");
 }
 
 /// Writes a picture of green that gets brighter from left to right.
 fn write_green_ramp(path: &Path, brightest: f32) {
-    let green = |x: usize| petcomp::LinearRgb::new(0.02, brightest * x as f32 / 24.0, 0.05);
-    let ramp = petcomp::Image::from_fn(24, 4, |x, _| green(x));
-    petcomp::io::write(path, &ramp).expect("a picture");
+    let green = |x: usize| LinearRgb::new(0.02, brightest * x as f32 / 24.0, 0.05);
+    let ramp = Image::from_fn(24, 4, |x, _| green(x));
+    io::write(path, &ramp).expect("a picture");
 }
 
 #[test]
@@ -825,12 +788,9 @@ fn the_frames_of_a_sequence_are_keyed_into_folders() {
     let frames = ["shot/0.png", "shot/1.png", "shot/2.png"];
     let folders = ["-o", "keyed", "--matte", "mattes"];
     desk.ok(&[&["matte", "key"][..], &frames, &folders, &screen].concat());
-    let read = |name: String| std::fs::read(desk.path(name)).expect("a picture");
     for k in 0..3 {
-        assert_eq!(
-            read(format!("keyed/{k}.exr")),
-            read(format!("alone_{k}.exr"))
-        );
+        let [together, alone] = ["keyed/", "alone_"].map(|at| desk.bytes(&format!("{at}{k}.exr")));
+        assert_eq!(together, alone);
         assert!(desk.path(format!("mattes/{k}.exr")).exists());
     }
     let same = ["matte", "key", "shot/0.png", "shot/0.png", "-o", "twice"];
@@ -842,41 +802,27 @@ fn the_frames_of_a_sequence_are_keyed_into_folders() {
 fn nothing_that_a_keyer_reads_is_written_over() {
     let desk = Desk::new();
     std::fs::create_dir(desk.path("shot")).expect("a folder");
-    let frames = ["shot/0.exr", "shot/1.exr"];
-    for frame in frames {
+    for frame in ["shot/0.exr", "shot/1.exr"] {
         write_green_ramp(&desk.path(frame), 0.5);
     }
-    let content = || frames.map(|frame| std::fs::read(desk.path(frame)).expect("a picture"));
-    let before = content();
-    let refused = |frames: &[&str], more: &[&str]| {
-        let screen = ["--screen", "0.02,0.6,0.05"];
-        desk.refused(&[&["matte", "key"][..], frames, more, &screen].concat())
+    let before = desk.content();
+    let refused = |line: &str| {
+        let key = format!("matte key {line} --screen 0.02,0.6,0.05");
+        desk.refused(&words(&key))
     };
-    for more in [
-        &["-o", "shot"][..],
-        &["-o", "keyed", "--matte", "./shot"],
-        &["-o", "keyed", "--edges", "shot/../shot"],
+    for line in [
+        "shot/0.exr shot/1.exr -o shot",
+        "shot/0.exr shot/1.exr -o keyed --matte ./shot",
+        "shot/0.exr shot/1.exr -o keyed --edges shot/../shot",
+        "shot/0.exr -o shot/0.exr",
+        "shot/0.exr -o 0.exr --garbage shot/1.exr --matte shot/1.exr",
     ] {
-        let told = refused(&frames, more);
+        let told = refused(line);
         assert!(told.contains("is read and would be written over"), "{told}");
     }
-    for more in [
-        &["-o", "shot/0.exr"][..],
-        &[
-            "-o",
-            "0.exr",
-            "--garbage",
-            "shot/1.exr",
-            "--matte",
-            "shot/1.exr",
-        ],
-    ] {
-        let told = refused(&frames[..1], more);
-        assert!(told.contains("is read and would be written over"), "{told}");
-    }
-    let told = refused(&frames[..1], &["-o", "0.exr", "--matte", "./0.exr"]);
+    let told = refused("shot/0.exr -o 0.exr --matte ./0.exr");
     assert!(told.contains("two files would go here"), "{told}");
-    assert!(content() == before && !desk.path("keyed").exists());
+    assert!(desk.content() == before && !desk.path("keyed").exists());
 }
 
 #[test]
@@ -908,68 +854,48 @@ fn no_command_writes_over_what_it_reads() {
     desk.write("photos/1.txt", "");
     desk.write("metrics.json", "{}");
     desk.write("res/factors.csv", "image,light\n");
-    let files = [
-        "a.png",
-        "a.label.json",
-        "set/data.yaml",
-        "b/train.txt",
-        "b/val.txt",
-        "recipe.toml",
-        "s.toml",
-        "c/data.yaml",
-        "c/images/0.png",
-        "c/images/train/000000.png",
-        "c/index.jsonl",
-        "c/annotations/instances_train.json",
-        "c/webdataset/train-000000.tar",
-        "photos/1.png",
-        "photos/1.txt",
-        "metrics.json",
-        "res/factors.csv",
-    ];
-    let content = || files.map(|name| std::fs::read(desk.path(name)).ok());
-    let before = content();
-    for words in [
-        &["matte", "cut", "a.png", "-o", "a.png"][..],
-        &["matte", "color-spill", "a.png", "-o", "./a.png"],
-        &["matte", "film", "a.exr", "-o", "a.exr"],
-        &["camera", "rectify", "a.png", "a.label.json", "-o", "a.png"],
-        &["camera", "solve", "a.label.json", "-o", "a.label.json"],
-        &words("camera init a.png --size 1x1 --force -o a.png")[..],
-        &words("camera markers a.png --map a.label.json -o a.png")[..],
-        &words("camera export e.json --to opencv -o e.json")[..],
-        &["diff", "a.png", "a.png", "-o", "a.png"],
-        &["scene", "draw", "recipe.toml", "-o", "recipe.toml"],
-        &["label", "s.toml", "-o", "s.toml"],
-        &words("render s.toml recipe.toml -o f.png --resolved recipe.toml")[..],
-        &words("render s.toml -o f.png --resolved ./s.toml")[..],
-        &words("settle s.toml -o s.toml")[..],
-        &words("settle s.toml -o rest.toml --options o.toml --trace o.toml")[..],
-        &["dataset", "split", "set", "-o", "./set"],
-        &["dataset", "subset", "set", "--head", "0.5", "-o", "set"],
-        &["dataset", "split", "a", "-o", "b"],
-        &["dataset", "subset", "a", "--head", "0.5", "-o", "b"],
-        &words("dataset batches --real c --synthetic a -o c/data.yaml")[..],
-        &words("dataset batches --real c --synthetic a -o ./c/images/0.png")[..],
-        &words("dataset report c -o c/data.yaml")[..],
-        &words("dataset sheet c -o ./c/index.jsonl")[..],
-        &words("dataset sheet c -o c/images/train/000000.png")[..],
-        &words("dataset sheet c -o c/annotations/instances_train.json")[..],
-        &words("dataset report c -o c/webdataset/train-000000.tar")[..],
-        &words("dataset report a -o b/val.txt")[..],
-        &words("dataset report c --beside a -o b/val.txt")[..],
-        &words("dataset report c --beside photos -o photos/1.txt")[..],
-        &words("dataset fit --recipe recipe.toml -o recipe.toml")[..],
-        &words("dataset fit --recipe recipe.toml -o f.toml --page ./recipe.toml")[..],
-        &words("dataset fit c --recipe recipe.toml -o f.toml --page c/data.yaml")[..],
-        &words("dataset fit c --recipe recipe.toml -o c/images/0.png")[..],
-        &words("eval p.json metrics.json -o .")[..],
-        &words("eval p.json t.json --tags res/factors.csv -o res")[..],
+    let before = desk.content();
+    for line in [
+        "matte cut a.png -o a.png",
+        "matte color-spill a.png -o ./a.png",
+        "matte film a.exr -o a.exr",
+        "camera rectify a.png a.label.json -o a.png",
+        "camera solve a.label.json -o a.label.json",
+        "camera init a.png --size 1x1 --force -o a.png",
+        "camera markers a.png --map a.label.json -o a.png",
+        "camera export e.json --to opencv -o e.json",
+        "diff a.png a.png -o a.png",
+        "scene draw recipe.toml -o recipe.toml",
+        "label s.toml -o s.toml",
+        "render s.toml recipe.toml -o f.png --resolved recipe.toml",
+        "render s.toml -o f.png --resolved ./s.toml",
+        "settle s.toml -o s.toml",
+        "settle s.toml -o rest.toml --options o.toml --trace o.toml",
+        "dataset split set -o ./set",
+        "dataset subset set --head 0.5 -o set",
+        "dataset split a -o b",
+        "dataset subset a --head 0.5 -o b",
+        "dataset batches --real c --synthetic a -o c/data.yaml",
+        "dataset batches --real c --synthetic a -o ./c/images/0.png",
+        "dataset report c -o c/data.yaml",
+        "dataset sheet c -o ./c/index.jsonl",
+        "dataset sheet c -o c/images/train/000000.png",
+        "dataset sheet c -o c/annotations/instances_train.json",
+        "dataset report c -o c/webdataset/train-000000.tar",
+        "dataset report a -o b/val.txt",
+        "dataset report c --beside a -o b/val.txt",
+        "dataset report c --beside photos -o photos/1.txt",
+        "dataset fit --recipe recipe.toml -o recipe.toml",
+        "dataset fit --recipe recipe.toml -o f.toml --page ./recipe.toml",
+        "dataset fit c --recipe recipe.toml -o f.toml --page c/data.yaml",
+        "dataset fit c --recipe recipe.toml -o c/images/0.png",
+        "eval p.json metrics.json -o .",
+        "eval p.json t.json --tags res/factors.csv -o res",
     ] {
-        let told = desk.refused(words);
+        let told = desk.refused(&words(line));
         assert!(told.contains("is read and would be written over"), "{told}");
     }
-    assert!(content() == before);
+    assert!(desk.content() == before);
 }
 
 #[test]
@@ -1036,19 +962,15 @@ fn no_picture_of_a_scene_goes_over_what_it_is_made_from() {
     let desk = Desk::new();
     demo(&desk);
     for name in ["bg0003.jpg", "bg0003.label.json"] {
-        let file = std::fs::read(samples().join("backgrounds").join(name));
-        desk.write(Path::new("places").join(name), file.expect("a sample"));
+        let file = std::fs::read(sample(&format!("backgrounds/{name}")));
+        desk.write(format!("places/{name}"), file.expect("a sample"));
     }
     let draw = |scene| {
         let args = words("scene draw demo/recipe.toml --set backgrounds=\"../places\" -o");
         [&args[..], &[scene]].concat()
     };
     desk.ok(&draw("s.json"));
-    let content = || -> Vec<_> {
-        let files = desk.files().into_iter();
-        files.map(|file| std::fs::read(file).ok()).collect()
-    };
-    let before = content();
+    let before = desk.content();
     for args in [
         words("render s.json -o places/bg0003.jpg"),
         words("render s.json -o f.png --preview places/bg0003.jpg"),
@@ -1061,7 +983,7 @@ fn no_picture_of_a_scene_goes_over_what_it_is_made_from() {
         let told = desk.refused(&args);
         assert!(told.contains("is read and would be written over"), "{told}");
     }
-    assert!(content() == before);
+    assert!(desk.content() == before);
 }
 
 #[test]
@@ -1143,23 +1065,23 @@ fn one_frame_goes_into_a_folder_and_several_into_no_file() {
 #[test]
 fn what_is_keyed_lies_where_its_exr_does_and_lost_pixels_are_told() {
     let desk = Desk::new();
-    let canvas = petcomp::io::Canvas {
+    let canvas = io::Canvas {
         at: [-3, 7],
         pixel_aspect: 2.0,
     };
-    let placed = petcomp::io::WriteOptions {
+    let placed = io::WriteOptions {
         canvas,
-        ..petcomp::io::WriteOptions::default()
+        ..Default::default()
     };
-    let grey = petcomp::Image::filled(24, 4, petcomp::LinearRgb::grey(0.3));
+    let grey = Image::filled(24, 4, LinearRgb::grey(0.3));
     let photo = desk.path("a.exr");
-    petcomp::io::write_with(&photo, &grey, &placed).expect("a picture");
+    io::write_with(&photo, &grey, &placed).expect("a picture");
+    let header = |name: &str| io::read_header(desk.path(name)).expect("an EXR");
     let key = words("matte key a.exr -o cut.exr --matte m.exr --screen 0.02,0.6,0.05");
     let warned = "24 x 4 stored pixels, those outside the display window are not kept";
     assert!(!text(&desk.run(&key).stderr).contains(warned));
     for name in ["cut.exr", "m.exr"] {
-        let header = petcomp::io::read_header(desk.path(name)).expect("an EXR");
-        assert_eq!(header.canvas, canvas, "{name}");
+        assert_eq!(header(name).canvas, canvas, "{name}");
     }
     // The last column of the display window, 20, moves four to the left.
     let mut bytes = std::fs::read(&photo).expect("an EXR");
@@ -1170,15 +1092,14 @@ fn what_is_keyed_lies_where_its_exr_does_and_lost_pixels_are_told() {
     std::fs::write(&photo, bytes).expect("a file");
     let told = text(&desk.run(&key).stderr);
     assert!(told.contains(warned), "{told}");
-    let header = petcomp::io::read_header(desk.path("cut.exr")).expect("an EXR");
-    assert_eq!((header.width, header.height), (20, 4));
+    let cut = header("cut.exr");
+    assert_eq!((cut.width, cut.height), (20, 4));
     // So it is under any name.
     std::fs::rename(&photo, desk.path("a.sxr")).expect("a file");
     let key = words("matte key a.sxr -o other.exr --screen 0.02,0.6,0.05");
     let told = text(&desk.run(&key).stderr);
     assert!(told.contains(warned), "{told}");
-    let header = petcomp::io::read_header(desk.path("other.exr")).expect("an EXR");
-    assert_eq!(header.canvas, canvas);
+    assert_eq!(header("other.exr").canvas, canvas);
 }
 
 #[test]
@@ -1259,8 +1180,8 @@ fn a_keyer_asks_for_a_screen_in_linear_light_or_for_a_plate() {
 fn photos_of_different_size_are_refused() {
     let desk = Desk::new();
     for (name, w, h) in [("a.png", 48, 36), ("b.png", 36, 48)] {
-        let photo = petcomp::Image::filled(w, h, petcomp::LinearRgb::new(0.02, 0.6, 0.05));
-        petcomp::io::write(desk.path(name), &photo).expect("a picture");
+        let screen = LinearRgb::new(0.02, 0.6, 0.05);
+        desk.write_picture(name, &Image::filled(w, h, screen));
     }
     let told = desk.refused(&["matte", "triangulate", "a.png", "b.png", "-o", "film.exr"]);
     assert!(
@@ -1311,16 +1232,16 @@ fn each_way_to_film_has_an_example_of_its_own_options() {
 fn an_object_of_the_hue_of_the_screen_is_warned_of_once_and_a_spot_is_not() {
     let desk = Desk::new();
     for (photo, columns, warnings) in [("half.png", 80..160, 1), ("spot.png", 100..124, 0)] {
-        let slab = petcomp::Image::from_fn(240, 160, |x, y| {
+        let slab = Image::from_fn(240, 160, |x, y| {
             if columns.contains(&x) && (60..100).contains(&y) {
-                petcomp::LinearRgb::new(0.25, 0.8, 0.3)
+                LinearRgb::new(0.25, 0.8, 0.3)
             } else if (60..180).contains(&x) && (50..110).contains(&y) {
-                petcomp::LinearRgb::new(0.6, 0.05, 0.05)
+                RED
             } else {
-                petcomp::LinearRgb::new(0.04, 0.4, 0.08)
+                GREEN
             }
         });
-        petcomp::io::write(desk.path(photo), &slab).expect("a picture");
+        desk.write_picture(photo, &slab);
         let add = ["asset", "add", photo, "--class", "can", "--length", "0.2"];
         let done = desk.run(&[&add[..], &["-o", "assets"]].concat());
         let said = text(&done.stderr);
@@ -1329,16 +1250,19 @@ fn an_object_of_the_hue_of_the_screen_is_warned_of_once_and_a_spot_is_not() {
     }
 }
 
+const RED: LinearRgb = LinearRgb::new(0.6, 0.05, 0.05);
+const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
+
+/// A red slab on a green screen.
+fn red_on_green(columns: Range<usize>, rows: Range<usize>) -> Image<LinearRgb> {
+    let is_slab = |x: usize, y: usize| columns.contains(&x) && rows.contains(&y);
+    Image::from_fn(120, 80, |x, y| if is_slab(x, y) { RED } else { GREEN })
+}
+
 /// A red slab in the middle of a green screen.
 fn write_slab(path: &Path) {
-    let slab = petcomp::Image::from_fn(120, 80, |x, y| {
-        match (30..90).contains(&x) && (25..55).contains(&y) {
-            true => petcomp::LinearRgb::new(0.6, 0.05, 0.05),
-            false => petcomp::LinearRgb::new(0.04, 0.4, 0.08),
-        }
-    });
     std::fs::create_dir_all(path.parent().expect("inside the desk")).expect("a folder");
-    petcomp::io::write(path, &slab).expect("a picture");
+    io::write(path, &red_on_green(30..90, 25..55)).expect("a picture");
 }
 
 #[test]
@@ -1346,11 +1270,12 @@ fn every_step_of_a_search_is_a_picture() {
     let desk = Desk::new();
     write_slab(&desk.path("slab.png"));
     desk.ok(&["matte", "segment", "slab.png", "-o", "steps"]);
-    let read = |name: &str| -> petcomp::Image<petcomp::Coverage> {
-        let files = desk.files().into_iter();
-        let mut found = files.filter(|file| file.to_string_lossy().ends_with(name));
-        petcomp::io::read(found.next().expect("a step")).expect("a picture")
+    let step = |name: &str| {
+        let mut files = desk.files().into_iter();
+        let found = files.find(|file| file.to_string_lossy().ends_with(name));
+        found.expect("a step")
     };
+    let read = |name: &str| io::read::<Coverage>(step(name)).expect("a picture");
     let (middle, corner) = ((60, 40), (5, 5));
     for (name, inside) in [
         ("_hull.png", 1.0),
@@ -1363,23 +1288,21 @@ fn every_step_of_a_search_is_a_picture() {
         assert_eq!(step[corner].0, 1.0 - inside, "{name}");
     }
     assert_eq!(read("_core.png")[corner].0, 0.0);
-    let files = desk.files().into_iter();
-    let mut steps = files.filter(|file| file.to_string_lossy().ends_with("_hull.png"));
-    let step = steps.next().expect("a step");
-    write_slab(&step);
-    let photo = step.to_str().expect("letters");
+    let hull = step("_hull.png");
+    write_slab(&hull);
+    let photo = hull.to_str().expect("letters");
     let told = desk.refused(&["matte", "segment", photo, "-o", "steps"]);
     assert!(told.contains("is read and would be written over"), "{told}");
 }
 
 /// Folded film that mirrors light, in an ellipse: what it reflects, and what it lets through.
-fn film_at(x: usize, y: usize) -> Option<(petcomp::LinearRgb, petcomp::LinearRgb)> {
+fn film_at(x: usize, y: usize) -> Option<(LinearRgb, LinearRgb)> {
     let (x, y) = (x as f64, y as f64);
     let (u, v) = ((x - 80.0) / 60.0, (y - 50.0) / 35.0);
     let fold = (0.75 + 0.2 * (0.23 * x + 0.011 * y * y).sin()) as f32;
     let glint = (0.12 * (0.17 * x - 0.29 * y).sin().powi(8)) as f32;
-    let reflected = petcomp::LinearRgb::new(0.03, 0.05, 0.07).map(|light| light + glint);
-    let passed = petcomp::LinearRgb::new(0.25, 0.45, 0.6).scale(fold);
+    let reflected = LinearRgb::new(0.03, 0.05, 0.07).map(|light| light + glint);
+    let passed = LinearRgb::new(0.25, 0.45, 0.6).scale(fold);
     (u * u + v * v < 1.0).then_some((reflected, passed))
 }
 
@@ -1387,34 +1310,26 @@ fn film_at(x: usize, y: usize) -> Option<(petcomp::LinearRgb, petcomp::LinearRgb
 fn film_on_three_screens_is_what_it_was_made_from() {
     let desk = Desk::new();
     let size = (160, 100);
-    let mask = petcomp::Image::from_fn(size.0, size.1, |x, y| {
-        petcomp::Coverage(f32::from(u8::from(film_at(x, y).is_some())))
+    let mask = Image::from_fn(size.0, size.1, |x, y| {
+        Coverage(f32::from(film_at(x, y).is_some()))
     });
-    petcomp::io::write(desk.path("mask.png"), &mask).expect("a picture");
+    desk.write_picture("mask.png", &mask);
     for (name, screen) in [
         ("a.exr", [0.045, 0.42, 0.085]),
         ("b.exr", [0.03, 0.095, 0.52]),
         ("c.exr", [0.5, 0.04, 0.05]),
     ] {
-        let screen = petcomp::LinearRgb::from(screen);
-        let photo = petcomp::Image::from_fn(size.0, size.1, |x, y| match film_at(x, y) {
+        let screen = LinearRgb::from(screen);
+        let photo = Image::from_fn(size.0, size.1, |x, y| match film_at(x, y) {
             Some((reflected, passed)) => reflected + passed * screen,
             None => screen,
         });
-        petcomp::io::write(desk.path(name), &photo).expect("a picture");
+        desk.write_picture(name, &photo);
     }
-    let photos = ["a.exr", "b.exr", "c.exr"];
-    let more = [
-        "--mask",
-        "mask.png",
-        "-o",
-        "film.exr",
-        "--plate-out",
-        "plate.exr",
-    ];
-    desk.ok(&[&["matte", "triangulate"][..], &photos, &more].concat());
-    let film: petcomp::Image<petcomp::PremulRgba> =
-        petcomp::io::read(desk.path("film.exr")).expect("film");
+    desk.ok(&words(
+        "matte triangulate a.exr b.exr c.exr --mask mask.png -o film.exr --plate-out plate.exr",
+    ));
+    let film = desk.read::<PremulRgba>("film.exr");
     let (mut error, mut count) = (0.0, 0.0);
     for (x, y) in (0..size.1).flat_map(|y| (0..size.0).map(move |x| (x, y))) {
         match film_at(x, y) {
@@ -1427,28 +1342,22 @@ fn film_on_three_screens_is_what_it_was_made_from() {
     }
     // Half floats in the photos; exact but for these.
     assert!(error / count < 2e-3, "{}", error / count);
-    let plate: petcomp::Image<petcomp::LinearRgb> =
-        petcomp::io::read(desk.path("plate.exr")).expect("a plate");
+    let plate = desk.read::<LinearRgb>("plate.exr");
     assert!((plate[(80, 50)].g - 0.42).abs() < 2e-3);
 }
 
 #[test]
 fn a_difference_key_goes_by_the_mean_difference_of_the_channels() {
     let desk = Desk::new();
-    let grey = |light: f32| petcomp::LinearRgb::new(light, light, light);
-    let clean = petcomp::Image::filled(3, 1, grey(0.25));
-    let photo = petcomp::Image::from_fn(3, 1, |x, _| grey([0.25, 0.375, 1.0][x]));
-    for (name, picture) in [("clean.exr", &clean), ("photo.exr", &photo)] {
-        petcomp::io::write(desk.path(name), picture).expect("a picture");
-    }
+    let lights = [0.25, 0.375, 1.0].map(LinearRgb::grey);
+    desk.write_picture("clean.exr", &Image::filled(3, 1, lights[0]));
+    desk.write_picture("photo.exr", &Image::from_fn(3, 1, |x, _| lights[x]));
     desk.ok(&words(
         "matte difference-key photo.exr --clean clean.exr -o cut.exr --matte matte.exr \
          --set key.tolerance=0.0625 --set key.falloff=0.25",
     ));
-    let matte: petcomp::Image<petcomp::Coverage> =
-        petcomp::io::read(desk.path("matte.exr")).expect("a matte");
-    let cut: petcomp::Image<petcomp::PremulRgba> =
-        petcomp::io::read(desk.path("cut.exr")).expect("a cut-out");
+    let matte = desk.read::<Coverage>("matte.exr");
+    let cut = desk.read::<PremulRgba>("cut.exr");
     // (0.125 - 0.0625) / 0.25 in the middle.
     for (x, share, light) in [(0, 0.0, 0.25), (1, 0.25, 0.375), (2, 1.0, 1.0)] {
         assert_eq!(matte[(x, 0)].0, share);
@@ -1459,14 +1368,11 @@ fn a_difference_key_goes_by_the_mean_difference_of_the_channels() {
 #[test]
 fn color_spill_limits_green_by_red_and_has_no_matte() {
     let desk = Desk::new();
-    let photo = petcomp::Image::from_fn(2, 1, |x, _| {
-        petcomp::LinearRgb::new(0.25, [0.125, 0.75][x], 0.5)
-    });
-    petcomp::io::write(desk.path("photo.exr"), &photo).expect("a picture");
+    let photo = Image::from_fn(2, 1, |x, _| LinearRgb::new(0.25, [0.125, 0.75][x], 0.5));
+    desk.write_picture("photo.exr", &photo);
     let spill = ["matte", "color-spill", "photo.exr", "-o", "clean.exr"];
     desk.ok(&spill);
-    let clean: petcomp::Image<petcomp::PremulRgba> =
-        petcomp::io::read(desk.path("clean.exr")).expect("a picture");
+    let clean = desk.read::<PremulRgba>("clean.exr");
     for (x, green) in [(0, 0.125), (1, 0.25)] {
         let p = clean[(x, 0)];
         assert_eq!([p.r, p.g, p.b, p.a], [0.25, green, 0.5, 1.0]);
@@ -1479,16 +1385,14 @@ fn color_spill_limits_green_by_red_and_has_no_matte() {
 fn diff_speaks_like_idiff() {
     let desk = Desk::new();
     let (a, b) = (sample("bottles/b0000_0.png"), sample("bottles/b0001_0.png"));
-    assert_eq!(desk.run(&["diff", &a, &a]).status.code(), Some(0));
-    assert_eq!(desk.run(&["diff", &a, &b]).status.code(), Some(3));
-    assert_eq!(
-        desk.run(&["diff", "-fail", "0.1", &a, "nowhere.png"])
-            .status
-            .code(),
-        Some(4)
-    );
-    let behind_options = ["-j", "1", "diff", "-fail", "0.1", &a, &a];
-    assert_eq!(desk.run(&behind_options).status.code(), Some(0));
+    for (args, code) in [
+        (&["diff", &a, &a][..], 0),
+        (&["diff", &a, &b], 3),
+        (&["diff", "-fail", "0.1", &a, "nowhere.png"], 4),
+        (&["-j", "1", "diff", "-fail", "0.1", &a, &a], 0),
+    ] {
+        assert_eq!(desk.run(args).status.code(), Some(code), "{args:?}");
+    }
     for limit in ["--fail", "-warn", "--hardfail", "-failrelative"] {
         let refused = desk.refused(&["diff", limit, "nan", &a, &b]);
         assert!(
@@ -1538,15 +1442,13 @@ fn diff_compares_codes_as_they_are_whatever_the_profile() {
 fn a_written_difference_shows_one_of_alpha_alone() {
     let desk = Desk::new();
     for (name, alpha) in [("a.exr", 0.25), ("b.exr", 0.5)] {
-        let clear = petcomp::PremulRgba::new(0.0, 0.0, 0.125, alpha);
-        let picture = petcomp::Image::filled(1, 1, clear);
-        petcomp::io::write(desk.path(name), &picture).expect("a picture");
+        let clear = PremulRgba::new(0.0, 0.0, 0.125, alpha);
+        desk.write_picture(name, &Image::filled(1, 1, clear));
     }
     let output = desk.run(&words("diff a.exr b.exr --scale 2 -o difference.exr"));
     assert_eq!(output.status.code(), Some(2));
-    let written: petcomp::Image<petcomp::LinearRgb> =
-        petcomp::io::read(desk.path("difference.exr")).expect("a picture");
-    assert_eq!(written[(0, 0)], petcomp::LinearRgb::grey(0.5));
+    let written = desk.read::<LinearRgb>("difference.exr");
+    assert_eq!(written[(0, 0)], LinearRgb::grey(0.5));
 }
 
 #[test]
@@ -1555,7 +1457,7 @@ fn diff_tells_channels_that_it_passes_over() {
     let write = |name: &str, channels: &[&str]| {
         let grey = [0.5; 4];
         let channels: Vec<(&str, &[f32])> = channels.iter().map(|&c| (c, &grey[..])).collect();
-        petcomp::io::exr::write_channels(desk.path(name), (2, 2), &channels, &[]).expect("an EXR");
+        io::exr::write_channels(desk.path(name), (2, 2), &channels, &[]).expect("an EXR");
     };
     write("colours.exr", &["R", "G", "B"]);
     write("depth.exr", &["R", "G", "B", "Z"]);
@@ -1571,31 +1473,16 @@ fn diff_tells_channels_that_it_passes_over() {
 fn the_demo_goes_by_the_recipe_that_is_there() {
     let desk = Desk::new();
     desk.write("demo/recipe.toml", "[scene]\nobjcts = 3\n");
-    let error = desk.refused(&["demo", "--samples", &sample("")]);
+    let error = desk.refused(&["demo", "--samples", SAMPLES]);
     assert!(error.contains("scene: unknown key \"objcts\""), "{error}");
-    let text = std::fs::read_to_string(desk.path("demo/recipe.toml")).expect("the recipe");
-    assert_eq!(text, "[scene]\nobjcts = 3\n");
+    assert_eq!(desk.text("demo/recipe.toml"), "[scene]\nobjcts = 3\n");
 }
 
 #[test]
 fn the_demo_makes_the_same_files_at_any_thread_count() {
     let desk = Desk::new();
     let demo = |threads: &str, folder: &str| {
-        let args = [
-            "demo",
-            "--samples",
-            &sample(""),
-            "-n",
-            "4",
-            "--seed",
-            "0",
-            "-q",
-            "-j",
-            threads,
-            "-o",
-            folder,
-        ];
-        desk.ok(&args);
+        demo_into(&desk, folder, &format!("-n 4 --seed 0 -j {threads}"));
         let root = desk.path(folder);
         let mut files = Vec::new();
         walk(&root, &mut files);
@@ -1639,12 +1526,12 @@ fn pin(root: &Path) -> String {
 fn content(file: &Path) -> Option<Vec<u8>> {
     match file.extension()?.to_str()? {
         "exr" => {
-            let (_, channels) = petcomp::io::exr::read_channels(file).unwrap();
+            let (_, channels) = io::exr::read_channels(file).unwrap();
             let samples = channels.iter().flat_map(|channel| &channel.samples);
             Some(samples.flat_map(|v| v.to_le_bytes()).collect())
         }
         "png" if file.components().any(|c| c.as_os_str() == "images") => {
-            let picture = petcomp::io::read::<petcomp::LinearRgb>(file).unwrap();
+            let picture = io::read::<LinearRgb>(file).unwrap();
             Some(bytemuck::cast_slice(picture.pixels()).to_vec())
         }
         "txt" => std::fs::read(file).ok(),
@@ -1670,9 +1557,7 @@ fn files_that_are_written_behind_a_link_name_their_inputs() {
     let desk = Desk::new();
     std::fs::create_dir_all(desk.path("real/a/b")).expect("a folder");
     std::os::unix::fs::symlink("real/a/b", desk.path("link")).expect("a link");
-    let samples = sample("");
-    let demo = words("demo -n 1 -q -o link/demo --samples");
-    desk.ok(&[&demo[..], &[samples.as_str()]].concat());
+    demo_into(&desk, "link/demo", "-n 1");
     desk.ok(&words(
         "scene draw link/demo/recipe.toml -k 3 --seed 5 -o scene.toml",
     ));
@@ -1691,10 +1576,7 @@ fn a_scene_goes_through_the_stages_one_by_one() {
     desk.ok(&words(
         "settle scene.toml -o rest.json --trace fall.csv --preview rest.png",
     ));
-    assert!(
-        std::fs::read_to_string(desk.path("fall.csv"))
-            .is_ok_and(|csv| csv.starts_with("seconds,object,x,y,z,"))
-    );
+    assert!(desk.text("fall.csv").starts_with("seconds,object,x,y,z,"));
     assert!(desk.path("rest.png").exists());
     desk.ok(&["render", "rest.json", "demo/recipe.toml", "-o", "frame.exr"]);
     desk.ok(&words("render scene.toml demo/recipe.toml -o again.exr"));
@@ -1710,12 +1592,9 @@ fn a_scene_goes_through_the_stages_one_by_one() {
         let args = words("label rest.json demo/recipe.toml -o again.json --polygons borders.json");
         desk.ok(&[&args[..], &["--set", &set]].concat());
         let borders: Vec<petcomp::label::Border> =
-            petcomp::io::read_json(desk.path("borders.json")).unwrap();
-        borders
-            .iter()
-            .flat_map(|border| &border.amodal)
-            .map(Vec::len)
-            .sum()
+            io::read_json(desk.path("borders.json")).unwrap();
+        let rings = borders.iter().flat_map(|border| &border.amodal);
+        rings.map(Vec::len).sum()
     };
     let [all, few] = ["0", "2"].map(corners);
     assert!(few >= 3 && all > 4 * few, "{all} {few}");
@@ -1737,44 +1616,29 @@ fn a_scene_goes_through_the_stages_one_by_one() {
     assert!(4 * poor < plain, "{poor} {plain}");
 
     // The same picture in parts, at another quality, and for Blender.
-    let parts = words("render rest.json demo/recipe.toml -o parts.exr --quality draft");
-    desk.ok(&[
-        &parts[..],
-        &[
-            "--aov",
-            "beauty,id,depth,cryptomatte,layers",
-            "--preview",
-            "look.png",
-        ],
-    ]
-    .concat());
+    let parts = "render rest.json demo/recipe.toml -o parts.exr --quality draft --aov";
+    desk.ok(&words(&format!(
+        "{parts} beauty,id,depth,cryptomatte,layers --preview look.png"
+    )));
     assert!(desk.path("look.png").exists());
     let told = text(&desk.run(&["diff", "frame.exr", "parts.exr"]).stdout);
     assert!(
         told.contains("SSIM = 0.9") && told.contains("FLIP = 0.0"),
         "{told}"
     );
-    assert!(
-        text(
-            &desk
-                .run(&[&parts[..], &["--aov", "normals"]].concat())
-                .stderr
-        )
-        .contains("expected some of beauty")
-    );
+    let told = text(&desk.run(&words(&format!("{parts} normals"))).stderr);
+    assert!(told.contains("expected some of beauty"), "{told}");
     desk.ok(&words(
         "scene export rest.json demo/recipe.toml --to cycles blender",
     ));
-    assert!(
-        [
-            "scene.json",
-            "plate.exr",
-            "card_1.exr",
-            "scene_reference.py"
-        ]
-        .iter()
-        .all(|f| desk.path("blender").join(f).exists())
-    );
+    for file in [
+        "scene.json",
+        "plate.exr",
+        "card_1.exr",
+        "scene_reference.py",
+    ] {
+        assert!(desk.path("blender").join(file).exists(), "{file}");
+    }
 }
 
 #[test]
@@ -1795,24 +1659,14 @@ fn objects_need_be_large_enough_in_the_whole_picture_alone() {
 fn an_environment_map_lies_beside_its_recipe() {
     let desk = Desk::new();
     demo(&desk);
-    let sky = petcomp::Image::filled(8, 4, petcomp::LinearRgb::new(0.2, 0.4, 0.9));
-    petcomp::io::write(desk.path("demo/sky.exr"), &sky).unwrap();
-    let set = ["--set", "scene.environment.files=[\"sky.exr\"]"];
-    desk.ok(&[
-        &words("dataset generate demo/recipe.toml -n 1 -o out")[..],
-        &set,
-    ]
-    .concat());
+    let sky = Image::filled(8, 4, LinearRgb::new(0.2, 0.4, 0.9));
+    desk.write_picture("demo/sky.exr", &sky);
+    let set = "--set scene.environment.files=[\"sky.exr\"]";
+    let generate = format!("dataset generate demo/recipe.toml -o out {set} -n");
+    desk.ok(&words(&format!("{generate} 1")));
     // Its content decides the pictures, so another one is another dataset.
-    petcomp::io::write(desk.path("demo/sky.exr"), &sky.map(|p| p.scale(2.0))).unwrap();
-    let again = desk.run(
-        &[
-            &words("dataset generate demo/recipe.toml -n 2 -o out")[..],
-            &set,
-        ]
-        .concat(),
-    );
-    let told = text(&again.stderr);
+    desk.write_picture("demo/sky.exr", &sky.map(|p| p.scale(2.0)));
+    let told = text(&desk.run(&words(&format!("{generate} 2"))).stderr);
     assert!(
         told.contains(
             "out/dataset.json: recipe.environments[sky.exr].content: the dataset was begun with"
@@ -1820,19 +1674,14 @@ fn an_environment_map_lies_beside_its_recipe() {
         "{told}"
     );
     // A scene file names it as the recipe does, and no file of elsewhere.
-    desk.ok(&[
-        &["scene", "draw", "demo/recipe.toml", "-o", "scene.toml"][..],
-        &set,
-    ]
-    .concat());
-    let render = words("render scene.toml demo/recipe.toml -o frame.png");
-    desk.ok(&[&render[..], &set].concat());
-    desk.ok(&render);
-    let scene = std::fs::read_to_string(desk.path("scene.toml"))
-        .unwrap()
-        .replace("sky.exr", "../sky.exr");
+    let draw = format!("scene draw demo/recipe.toml -o scene.toml {set}");
+    desk.ok(&words(&draw));
+    let render = "render scene.toml demo/recipe.toml -o frame.png";
+    desk.ok(&words(&format!("{render} {set}")));
+    desk.ok(&words(render));
+    let scene = desk.text("scene.toml").replace("sky.exr", "../sky.exr");
     desk.write("scene.toml", scene);
-    let refused = desk.refused(&render);
+    let refused = desk.refused(&words(render));
     assert!(
         refused.contains(
             "scene.toml: environment.file: \"../sky.exr\", expected one that the recipe lists"
@@ -1855,57 +1704,45 @@ const DENTED_LABEL: &str = r#"{
 fn a_scene_is_rendered_without_its_recipe() {
     let desk = Desk::new();
     demo(&desk);
-    let sky = petcomp::Image::filled(8, 4, petcomp::LinearRgb::new(0.2, 0.4, 0.9));
-    petcomp::io::write(desk.path("demo/sky.exr"), &sky).unwrap();
+    let sky = Image::filled(8, 4, LinearRgb::new(0.2, 0.4, 0.9));
+    desk.write_picture("demo/sky.exr", &sky);
     std::fs::create_dir_all(desk.path("far/off")).unwrap();
-    let set = [
-        "--set",
-        "scene.environment.files=[\"sky.exr\"]",
-        "--set",
-        "render.subsamples=3",
-        "--set",
-        "scene.settle.max_overlap=0.002",
-    ];
+    let set = words(
+        "--set scene.environment.files=[\"sky.exr\"] --set render.subsamples=3 \
+         --set scene.settle.max_overlap=0.002",
+    );
     let with_set = |args: &[&str]| desk.ok(&[args, &set].concat());
     let scene = "far/off/scene.toml";
     with_set(&["scene", "draw", "demo/recipe.toml", "-k", "2", "-o", scene]);
     with_set(&["render", scene, "demo/recipe.toml", "-o", "recipe.png"]);
     with_set(&["label", scene, "demo/recipe.toml", "-o", "recipe.json"]);
 
-    desk.ok(&[
-        "render",
-        scene,
-        "-o",
-        "alone.png",
-        "--resolved",
-        "resolved.json",
-    ]);
-    desk.ok(&["label", scene, "-o", "alone.json"]);
-    desk.ok(&["settle", scene, "-o", "rest.json"]);
-    desk.ok(&["render", "rest.json", "-o", "rest.png"]);
-    desk.ok(&["render", "resolved.json", "-o", "resolved.png"]);
-    let bytes = |name: &str| std::fs::read(desk.path(name)).unwrap();
-    for name in ["alone.png", "rest.png", "resolved.png"] {
-        assert!(bytes(name) == bytes("recipe.png"), "{name} differs");
+    for line in [
+        "render far/off/scene.toml -o alone.png --resolved resolved.json",
+        "label far/off/scene.toml -o alone.json",
+        "settle far/off/scene.toml -o rest.json",
+        "render rest.json -o rest.png",
+        "render resolved.json -o resolved.png",
+    ] {
+        desk.ok(&words(line));
     }
-    assert!(bytes("alone.json") == bytes("recipe.json"));
+    for name in ["alone.png", "rest.png", "resolved.png"] {
+        assert!(
+            desk.bytes(name) == desk.bytes("recipe.png"),
+            "{name} differs"
+        );
+    }
+    assert!(desk.bytes("alone.json") == desk.bytes("recipe.json"));
 
     // What a mask beside the photo hides is hidden in labels, with a picture of them and without.
-    let plate = petcomp::io::read_document::<petcomp::Scene>(desk.path(scene))
-        .unwrap()
-        .plate;
-    std::fs::create_dir_all(desk.path("places")).unwrap();
+    let petcomp::Scene { plate, .. } = io::read_document(desk.path(scene)).unwrap();
+    let front = Image::from_fn(1280, 960, |x, _| Coverage(f32::from(x < 640)));
+    desk.write_picture(&format!("places/{plate}.front.png"), &front);
     for end in ["jpg", "label.json"] {
         let name = format!("{plate}.{end}");
-        let place = samples().join("backgrounds").join(&name);
+        let place = sample(&format!("backgrounds/{name}"));
         std::fs::copy(place, desk.path("places").join(name)).unwrap();
     }
-    let front = petcomp::Image::from_fn(1280, 960, |x, _| petcomp::Coverage(f32::from(x < 640)));
-    petcomp::io::write(
-        desk.path("places").join(format!("{plate}.front.png")),
-        &front,
-    )
-    .unwrap();
     // Nor does it matter that no camera fits the label of another photo, but where all are opened.
     desk.write("places/other.label.json", DENTED_LABEL);
     let places = ["--set", "backgrounds=\"../places\""];
@@ -1920,18 +1757,15 @@ fn a_scene_is_rendered_without_its_recipe() {
     let over_places = ["render", scene, "demo/recipe.toml", "-o", "hidden.exr"];
     with_set(&[&over_places[..], &places].concat());
     let boxes = |name: &str| -> Vec<_> {
-        let labels: petcomp::label::Labels = petcomp::io::read_json(desk.path(name)).unwrap();
-        labels
-            .objects
-            .iter()
-            .map(|object| object.visible_box)
-            .collect()
+        let labels: petcomp::label::Labels = io::read_json(desk.path(name)).unwrap();
+        let objects = labels.objects.iter();
+        objects.map(|object| object.visible_box).collect()
     };
     assert_eq!(boxes("hidden.json"), boxes("shown.json"));
     assert_ne!(boxes("hidden.json"), boxes("recipe.json"));
 
     // What is missing is named.
-    let text = std::fs::read_to_string(desk.path(scene)).unwrap();
+    let text = desk.text(scene);
     let bare = text.split("[files]").next().unwrap();
     desk.write("far/off/bare.toml", bare);
     let refused = desk.refused(&["render", "far/off/bare.toml", "-o", "no.png"]);
@@ -1951,8 +1785,7 @@ fn a_scene_has_its_own_size_whatever_the_recipe_says() {
     ));
     desk.ok(&words("render s.toml -o alone.png"));
     desk.ok(&words("render s.toml demo/recipe.toml -o recipe.png"));
-    let bytes = |name: &str| std::fs::read(desk.path(name)).expect("a picture");
-    assert!(bytes("alone.png") == bytes("recipe.png"));
+    assert!(desk.bytes("alone.png") == desk.bytes("recipe.png"));
     for recipe in ["", " demo/recipe.toml"] {
         let set = format!("render s.toml{recipe} -o no.exr --set scene.gain_ev=5");
         let told = desk.refused(&words(&set));
@@ -1988,27 +1821,8 @@ fn a_summary_tells_what_is_there_and_is_a_result() {
     let desk = Desk::new();
     demo(&desk);
     let made = |folder: &str, set: &str| {
-        let few = [
-            "--set",
-            "scene.objects=6",
-            "--set",
-            "scene.image=[160,120]",
-            "--set",
-            set,
-        ];
-        let call = [
-            "-q",
-            "dataset",
-            "generate",
-            "demo/recipe.toml",
-            "-n",
-            "3",
-            "--seed",
-            "2",
-            "-o",
-            folder,
-        ];
-        desk.ok(&[&call[..], &few].concat())
+        let few = format!("-n 3 --seed 2 --set scene.objects=6 --set {set}");
+        generate_small(&desk, folder, &few)
     };
     let told = made("keep", "labels.obstructed=\"keep\"");
     assert!(
@@ -2037,24 +1851,21 @@ fn a_summary_tells_what_is_there_and_is_a_result() {
     assert!(places.iter().all(|place| desk.path(place).is_file()));
 }
 
-/// Makes a few small pictures of the demo's recipe with these settings.
-fn generate_small(desk: &Desk, folder: &str, count: &str, settings: &[&str]) {
-    let mut call = words("-q dataset generate demo/recipe.toml --set scene.image=[160,120]");
-    call.extend(["--set", "scene.objects=4", "-n", count, "-o", folder]);
-    for &setting in settings {
-        call.extend(["--set", setting]);
-    }
-    desk.ok(&call);
+/// Makes small pictures of the demo's recipe with more options.
+fn generate_small(desk: &Desk, folder: &str, more: &str) -> String {
+    let small = "-q dataset generate demo/recipe.toml --set scene.image=[160,120]";
+    desk.ok(&words(&format!("{small} -o {folder} {more}")))
 }
 
 #[test]
 fn a_report_tells_chances_by_their_shares_and_what_does_not_vary() {
     let desk = Desk::new();
     demo(&desk);
-    let chances = ["scene.start.face_down=0.3", "scene.negatives=0.2"];
-    generate_small(&desk, "out", "5", &chances);
+    let chances = "--set scene.start.face_down=0.3 --set scene.negatives=0.2";
+    let more = format!("-n 5 --set scene.objects=4 {chances}");
+    generate_small(&desk, "out", &more);
     desk.ok(&["dataset", "report", "out"]);
-    let page = std::fs::read_to_string(desk.path("out/report.html")).unwrap();
+    let page = desk.text("out/report.html");
     for row in [
         "<td>start.face_down</td><td>0.3</td><td>0.",
         "<td>negative</td><td>0.2</td><td>0.",
@@ -2071,11 +1882,10 @@ fn a_report_tells_chances_by_their_shares_and_what_does_not_vary() {
 fn one_light_gives_the_same_picture_at_any_power() {
     let desk = Desk::new();
     demo(&desk);
-    for (folder, lights) in [
-        ("bright", "scene.lights=[{power=10}]"),
-        ("dim", "scene.lights=[{power=1e-9}]"),
-    ] {
-        generate_small(&desk, folder, "1", &["scene.ambient=0", lights]);
+    let small = "-n 1 --set scene.objects=4 --set scene.ambient=0 --set";
+    for (folder, power) in [("bright", "10"), ("dim", "1e-9")] {
+        let more = format!("{small} scene.lights=[{{power={power}}}]");
+        generate_small(&desk, folder, &more);
     }
     // A code is 1/255.
     let [bright, dim] = ["bright", "dim"].map(|folder| format!("{folder}/images/val/000000.png"));
@@ -2097,50 +1907,38 @@ fn one_camera_solve_says_what_it_found() {
 fn one_word_says_how_finely_every_stage_works() {
     let desk = Desk::new();
     demo(&desk);
-    let made = |quality: &[&str], folder: &str| {
-        let call = [
-            "dataset",
-            "generate",
-            "demo/recipe.toml",
-            "-n",
-            "1",
-            "-q",
-            "-o",
-            folder,
-        ];
-        desk.ok(&[&call[..], quality].concat());
+    let generate = "dataset generate demo/recipe.toml -n 1";
+    let made = |options: &str, folder: &str| {
+        desk.ok(&words(&format!("{generate} {options} -o {folder}")));
         let at = |part: &str| desk.path(folder).join(format!("images/{part}/000000.png"));
         std::fs::read(at("train"))
             .or_else(|_| std::fs::read(at("val")))
             .expect("a picture")
     };
-    let usual = made(&[], "usual");
+    let usual = made("-q", "usual");
     assert!(
-        usual == made(&["--quality", "normal"], "normal"),
+        usual == made("-q --quality normal", "normal"),
         "normal is what there is without a word"
     );
-    let draft = made(&["--quality", "draft"], "draft");
+    let draft = made("-q --quality draft", "draft");
     assert!(usual != draft);
-    let finer = ["--set", "render.subsamples=2", "--quality", "draft"];
-    assert!(draft != made(&finer, "finer"), "what is set goes first");
-    let told = desk.refused(&words(
-        "dataset generate demo/recipe.toml -n 1 -o x --quality fast",
-    ));
+    let finer = made("-q --set render.subsamples=2 --quality draft", "finer");
+    assert!(draft != finer, "what is set goes first");
+    let told = desk.refused(&words(&format!("{generate} -o x --quality fast")));
     assert!(told.contains("draft, normal, reference"), "{told}");
 }
 
 /// Photos of the frames of a folder with a grey slab on them, three eighths as wide as the display.
 fn photos_of_frames(desk: &Desk, names: &[&str]) -> Vec<String> {
     let photo = |name: &&str| {
-        let shown: petcomp::Image<petcomp::LinearRgb> =
-            petcomp::io::read(desk.path(format!("frames/{name}.png"))).expect("a frame");
-        let seen = petcomp::Image::from_fn(shown.width(), shown.height(), |x, y| {
+        let shown = desk.read::<LinearRgb>(&format!("frames/{name}.png"));
+        let seen = Image::from_fn(shown.width(), shown.height(), |x, y| {
             let inside = (200..440).contains(&x) && (150..250).contains(&y);
             let (reflected, passed) = if inside { (0.05, 0.45) } else { (0.01, 0.85) };
             shown[(x, y)].map(|light| reflected + passed * light)
         });
         let file = format!("photo_{name}.png");
-        petcomp::io::write(desk.path(&file), &seen).expect("a photo");
+        desk.write_picture(&file, &seen);
         file
     };
     names.iter().map(photo).collect()
@@ -2155,24 +1953,15 @@ fn an_object_on_a_display_is_measured() {
         said.contains("frames: 2 frames") && said.contains("show.html"),
         "{said}"
     );
-    let photos = photos_of_frames(&desk, &["00_black", "01_white"]);
-    let add = |more: &[&'static str]| -> Vec<String> {
-        let words = [
-            "asset", "add", &photos[0], &photos[1], "--class", "cup", "-o", "assets",
-        ];
-        let display = ["--captured", "--display", "frames/display.toml"];
-        let words = words.iter().chain(&display).chain(more);
-        words.map(|word| (*word).to_owned()).collect()
-    };
-    let run = |words: Vec<String>| desk.ok(&words.iter().map(String::as_str).collect::<Vec<_>>());
-    let refused =
-        |words: Vec<String>| desk.refused(&words.iter().map(String::as_str).collect::<Vec<_>>());
-    let width = refused(add(&[]));
+    let photos = photos_of_frames(&desk, &["00_black", "01_white"]).join(" ");
+    let add = format!("asset add {photos} --class cup -o assets --captured");
+    let add = format!("{add} --display frames/display.toml");
+    let width = desk.refused(&words(&add));
     assert!(
         width.contains("captured.width: missing, expected the width of the whole picture"),
         "{width}"
     );
-    let said = run(add(&["--display-width", "0.4"]));
+    let said = desk.ok(&words(&format!("{add} --display-width 0.4")));
     assert!(
         said.contains("captured: 2 photos, transmittance to 0.0"),
         "{said}"
@@ -2192,9 +1981,10 @@ fn an_object_on_a_display_is_measured() {
         said.contains("captured: 2 photos") && said.contains(unknown),
         "{said}"
     );
-    run(add(&["--display-width", "0.4", "--thickness", "0.005"]));
+    let thick = format!("{add} --display-width 0.4 --thickness 0.005");
+    desk.ok(&words(&thick));
     assert!(!checked().contains(unknown));
-    let screen = refused(add(&["--screen", "0.1,0.5,0.2"]));
+    let screen = desk.refused(&words(&format!("{add} --screen 0.1,0.5,0.2")));
     assert!(screen.contains("cannot be used with"), "{screen}");
     let list = "[[photos]]\nfile = \"photo_00_black.png\"\nasset = \"a\"\nclass = \"cup\"\n\
                 [photos.captured]\nphotos = [\"photo_01_white.png\"]\ndisplay = \"frames/display.toml\"\nwidth = 0.4\n";
@@ -2230,26 +2020,18 @@ fn a_capture_that_cannot_be_measured_says_why() {
     let small = desk.refused(&frames("640x200"));
     assert!(small.contains("size_px: 200, expected 400 to"), "{small}");
     desk.ok(&[&frames("640x400")[..], &["--diagonal", "20"]].concat());
-    let photos = photos_of_frames(&desk, &["01_white"]);
-    let add = [
-        "asset",
-        "add",
-        &photos[0],
-        "--class",
-        "cup",
-        "-o",
-        "assets",
-        "--captured",
-    ];
-    let one = desk.refused(&add);
+    photos_of_frames(&desk, &["01_white"]);
+    let add = "asset add photo_01_white.png --class cup -o assets --captured";
+    let one = desk.refused(&words(add));
     assert!(
         one.contains("captured.photos: no second photo, expected one of a black"),
         "{one}"
     );
-    let display = desk.refused(&[&add[..], &[&photos[0]]].concat());
+    let beside = format!("{add} photo_01_white.png");
+    let display = desk.refused(&words(&beside));
     assert!(display.contains("display.toml"), "{display}");
-    let beside = [&add[..], &[&photos[0], "--display", "frames/display.toml"]].concat();
-    let black = desk.refused(&beside);
+    let black = format!("{beside} --display frames/display.toml");
+    let black = desk.refused(&words(&black));
     assert!(
         black.contains("no photo of the black frame among photo_01_white.png"),
         "{black}"

@@ -2,6 +2,7 @@
 //! `-q` the answer still.
 #![cfg(unix)]
 
+#[allow(dead_code, reason = "other tests need the rest of it")]
 mod desk;
 
 use desk::{Desk, text};

@@ -1,38 +1,45 @@
 //! The real program under bad luck: broken inputs among good ones, little memory, signals, many
 //! runs on one folder.
 #![cfg(unix)]
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 mod desk;
 
-use desk::{Desk, PETCOMP, text};
+use desk::{Desk, PETCOMP, SAMPLES, text, words};
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 impl Desk {
+    fn shell(&self, script: &str) -> Command {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", script]).current_dir(self.folder());
+        shell
+    }
+
     /// The program in a shell that may map so many KiB of memory, and take ten seconds of a
     /// processor.
     fn run_within(&self, kib: u64, args: &str) -> Output {
         let script = format!("ulimit -v {kib}; ulimit -t 10; exec {PETCOMP} {args}");
-        Command::new("sh")
-            .args(["-c", &script])
-            .current_dir(self.folder())
-            .output()
-            .unwrap()
+        self.shell(&script).output().unwrap()
     }
+
+    /// A run of [`GENERATE`] with more options.
+    fn generate(&self, more: &str) -> Command {
+        self.command(&words(&format!("{GENERATE} {more}")))
+    }
+}
+
+const GENERATE: &str = "dataset generate demo/recipe.toml";
+
+/// Starts a program that nobody listens to.
+fn start(command: &mut Command) -> Child {
+    let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
+    quiet.spawn().unwrap()
 }
 
 fn said(output: &Output) -> String {
     text(&output.stdout) + &text(&output.stderr)
-}
-
-fn samples() -> String {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../tests/samples")
-        .to_string_lossy()
-        .into_owned()
 }
 
 const LABEL: &str = r#"{"format": "plane-label", "version": 1, "image": {"file": "none.jpg", "width": 640, "height": 480},
@@ -45,21 +52,11 @@ fn a_broken_file_among_good_ones_is_named_and_the_rest_done() {
         desk.write(format!("{name}.label.json"), LABEL);
     }
     desk.write("b.label.json", "{");
-    assert!(
-        Command::new("mkfifo")
-            .arg(desk.path("d.label.json"))
-            .status()
-            .unwrap()
-            .success()
-    );
-    let files = [
-        "a.label.json",
-        "b.label.json",
-        "c.label.json",
-        "d.label.json",
-        "e.label.json",
-    ];
-    let output = desk.run(&[&["camera", "solve"], files.as_slice()].concat());
+    let pipe = desk.shell("mkfifo d.label.json").status();
+    assert!(pipe.unwrap().success());
+    let labels = ["a", "b", "c", "d", "e"].map(|name| format!("{name}.label.json"));
+    let solve = format!("camera solve {}", labels.join(" "));
+    let output = desk.run(&words(&solve));
     let said = said(&output);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(
@@ -154,27 +151,27 @@ fn ends(mut child: Child) -> std::process::ExitStatus {
     }
 }
 
+/// Waits for something, and not for ever.
+fn wait_until(missing: &str, is_there: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !is_there() {
+        assert!(start.elapsed() < HANGS, "{missing} in {HANGS:?}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
 /// Until a run has finished its first picture, and so listens to signals.
 fn wait_for_a_sample(folder: &Path) {
-    let start = Instant::now();
-    while std::fs::metadata(folder.join("index.jsonl")).map_or(0, |m| m.len()) == 0 {
-        assert!(start.elapsed() < HANGS, "no picture in {HANGS:?}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    let journal = folder.join("index.jsonl");
+    wait_until("no picture", || {
+        journal.metadata().is_ok_and(|about| about.len() > 0)
+    });
 }
 
 /// A recipe and what it needs.
 fn demo(desk: &Desk) {
-    let output = desk.run(&[
-        "demo",
-        "--samples",
-        &samples(),
-        "-n",
-        "1",
-        "-q",
-        "-o",
-        "demo",
-    ]);
+    let demo = words("demo -n 1 -q -o demo --samples");
+    let output = desk.run(&[&demo[..], &[SAMPLES]].concat());
     assert!(output.status.success(), "{}", said(&output));
 }
 
@@ -182,28 +179,12 @@ fn demo(desk: &Desk) {
 fn twenty_runs_on_one_folder_make_one_dataset() {
     let desk = Desk::new();
     demo(&desk);
-    let args = [
-        "dataset",
-        "generate",
-        "demo/recipe.toml",
-        "-n",
-        "4",
-        "--seed",
-        "1",
-        "-q",
-        "-j",
-        "1",
-        "-o",
-        "out",
-    ];
-    let start = || {
-        desk.command(&args)
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap()
+    let start = |_| {
+        let mut run = desk.generate("-n 4 --seed 1 -q -j 1 -o out");
+        let heard = run.stdout(Stdio::null()).stderr(Stdio::piped());
+        heard.spawn().unwrap()
     };
-    let runs: Vec<Child> = (0..20).map(|_| start()).collect();
+    let runs: Vec<Child> = (0..20).map(start).collect();
     let outcomes: Vec<Output> = runs
         .into_iter()
         .map(|run| run.wait_with_output().unwrap())
@@ -227,14 +208,8 @@ fn twenty_runs_on_one_folder_make_one_dataset() {
 /// By the shell's own `kill`: the program of that name is not on every machine.
 fn send(signal: &str, child: &std::process::Child) {
     let line = format!("kill -s {signal} {}", child.id());
-    assert!(
-        Command::new("sh")
-            .args(["-c", &line])
-            .status()
-            .unwrap()
-            .success(),
-        "{line}"
-    );
+    let sent = Command::new("sh").args(["-c", &line]).status();
+    assert!(sent.unwrap().success(), "{line}");
 }
 
 /// The same command, which hears interrupts also where the tests run in the background of a script,
@@ -257,23 +232,8 @@ fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
     demo(&desk);
     for signal in ["INT", "TERM"] {
         let run = |count: &str| {
-            let args = [
-                "dataset",
-                "generate",
-                "demo/recipe.toml",
-                "-n",
-                count,
-                "-q",
-                "-j",
-                "2",
-                "-o",
-                signal,
-            ];
-            hearing(&desk.command(&args))
-                .stdout(Stdio::null())
-                .stderr(Stdio::null())
-                .spawn()
-                .unwrap()
+            let more = format!("-n {count} -q -j 2 -o {signal}");
+            start(&mut hearing(&desk.generate(&more)))
         };
         let child = run("100000");
         wait_for_a_sample(&desk.path(signal));
@@ -316,18 +276,13 @@ fn a_signal_stops_a_sequence_between_frames_and_leaves_whole_pictures_alone() {
         std::fs::copy(desk.path("0.png"), desk.path(&frame)).unwrap();
         args.push(frame);
     }
-    let more = "-o keyed -q -j 2 --screen 0.02,0.6,0.05";
-    args.extend(more.split(' ').map(String::from));
-    let child = hearing(&desk.command(&args))
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let (folder, start) = (desk.path("keyed"), Instant::now());
-    while !names_in(&folder).iter().any(|name| name.ends_with(".exr")) {
-        assert!(start.elapsed() < HANGS, "no picture in {HANGS:?}");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    let more = words("-o keyed -q -j 2 --screen 0.02,0.6,0.05");
+    args.extend(more.into_iter().map(String::from));
+    let child = start(&mut hearing(&desk.command(&args)));
+    let folder = desk.path("keyed");
+    wait_until("no picture", || {
+        names_in(&folder).iter().any(|name| name.ends_with(".exr"))
+    });
     send("TERM", &child);
     assert_eq!(ends(child).code(), Some(130));
     let names = names_in(&folder);
@@ -339,14 +294,9 @@ fn a_signal_stops_a_sequence_between_frames_and_leaves_whole_pictures_alone() {
 fn signals_that_a_run_was_started_to_ignore_do_not_stop_it() {
     let desk = Desk::new();
     demo(&desk);
-    let run = "dataset generate demo/recipe.toml -n 100000 --yes -q -j 1 -o out";
-    let mut child = Command::new("sh")
-        .args(["-c", &format!("trap '' HUP INT; exec {PETCOMP} {run}")])
-        .current_dir(desk.folder())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let run = format!("{GENERATE} -n 100000 --yes -q -j 1 -o out");
+    let script = format!("trap '' HUP INT; exec {PETCOMP} {run}");
+    let mut child = start(&mut desk.shell(&script));
     wait_for_a_sample(&desk.path("out"));
     // Two signals end a run at once.
     send("HUP", &child);
@@ -358,48 +308,21 @@ fn signals_that_a_run_was_started_to_ignore_do_not_stop_it() {
 }
 
 /// Pictures that take minutes: heaps of 250 at the shortest steps, and room for such work.
-const LONG_FALL: [&str; 8] = [
-    "--set",
-    "scene.objects=[250,250]",
-    "--set",
-    "scene.scale=0.4",
-    "--set",
-    "scene.settle.step=0.0001",
-    "--set",
-    "scene.settle.most_work=1000000000000",
-];
+const LONG_FALL: &str = "--set scene.objects=[250,250] --set scene.scale=0.4 \
+    --set scene.settle.step=0.0001 --set scene.settle.most_work=1000000000000";
 
 /// A run whose first picture takes minutes, once it listens to signals.
 fn long_run(desk: &Desk, folder: &str) -> Child {
-    let args = [
-        "dataset",
-        "generate",
-        "demo/recipe.toml",
-        "-n",
-        "1",
-        "-q",
-        "-j",
-        "1",
-        "-o",
-        folder,
-    ];
-    let mut command = desk.command(&[&args[..], &LONG_FALL].concat());
-    let child = command
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let more = format!("-n 1 -q -j 1 -o {folder} {LONG_FALL}");
+    let child = start(&mut desk.generate(&more));
     await_lock(desk, folder);
     child
 }
 
 /// Waits until a dataset is begun.
 fn await_lock(desk: &Desk, folder: &str) {
-    let (start, lock) = (Instant::now(), desk.path(folder).join("index.jsonl"));
-    while !lock.exists() {
-        assert!(start.elapsed() < HANGS, "did not begin");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    let lock = desk.path(folder).join("index.jsonl");
+    wait_until("no beginning", || lock.exists());
 }
 
 /// Several times what it takes, 8 s after one signal and none after two.
@@ -425,16 +348,8 @@ fn one_signal_ends_a_long_picture_soon_and_two_at_once() {
             start.elapsed()
         );
         // The folder goes on: with the recipe that it was begun with.
-        let said = said(&desk.run(&[
-            "dataset",
-            "generate",
-            "demo/recipe.toml",
-            "-n",
-            "1",
-            "-q",
-            "-o",
-            &folder,
-        ]));
+        let mut again = desk.generate(&format!("-n 1 -q -o {folder}"));
+        let said = said(&again.output().unwrap());
         assert!(said.contains("recipe.scene.objects"), "{said}");
     }
 }
@@ -443,24 +358,14 @@ fn one_signal_ends_a_long_picture_soon_and_two_at_once() {
 fn a_number_that_is_too_great_is_refused_at_once() {
     let desk = Desk::new();
     demo(&desk);
-    let run = |args: &[&str]| {
-        let all = [
-            &["dataset", "generate", "demo/recipe.toml", "-q", "-o", "out"],
-            args,
-        ]
-        .concat();
-        let child = desk
-            .command(&all)
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let output = child.wait_with_output().unwrap();
+    let run = |more: &str| {
+        let mut generate = desk.generate(&format!("-q -o out {more}"));
+        let output = generate.stdout(Stdio::null()).output().unwrap();
         (output.status.code(), said(&output))
     };
     for number in ["1000000000000", "18446744073709551615"] {
         for flag in ["-n", "--only", "--preview"] {
-            let (code, said) = run(&[flag, number]);
+            let (code, said) = run(&format!("{flag} {number}"));
             assert_eq!(code, Some(3), "{flag} {number}: {said}");
             assert!(
                 said.contains("samples, expected at most 1000000000"),
@@ -469,7 +374,7 @@ fn a_number_that_is_too_great_is_refused_at_once() {
         }
     }
     assert!(!desk.path("out").exists());
-    assert_eq!(run(&["--only", "999999999"]).0, Some(0));
+    assert_eq!(run("--only 999999999").0, Some(0));
 }
 
 /// A fall ends between two steps: the picture in hand is left to the run that goes on, and what is
@@ -478,23 +383,9 @@ fn a_number_that_is_too_great_is_refused_at_once() {
 fn a_signal_stops_a_fall() {
     let desk = Desk::new();
     demo(&desk);
-    let args = [
-        "dataset",
-        "generate",
-        "demo/recipe.toml",
-        "-n",
-        "2",
-        "-j",
-        "2",
-        "-o",
-        "out",
-    ];
-    let mut command = desk.command(&[&args[..], &LONG_FALL].concat());
-    let child = command
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut command = desk.generate(&format!("-n 2 -j 2 -o out {LONG_FALL}"));
+    let heard = command.stdout(Stdio::null()).stderr(Stdio::piped());
+    let child = heard.spawn().unwrap();
     await_lock(&desk, "out");
     std::thread::sleep(Duration::from_millis(500));
     send("TERM", &child);
@@ -509,16 +400,8 @@ fn a_reader_that_goes_away_is_no_crash() {
     let desk = Desk::new();
     for args in ["--help", "doctor", "dataset --help"] {
         let script = format!("{PETCOMP} {args} | true");
-        let output = Command::new("sh")
-            .args(["-c", &script])
-            .current_dir(desk.folder())
-            .output()
-            .unwrap();
-        assert!(
-            !said(&output).contains("panicked"),
-            "{args}: {}",
-            said(&output)
-        );
+        let said = said(&desk.shell(&script).output().unwrap());
+        assert!(!said.contains("panicked"), "{args}: {said}");
     }
 }
 
@@ -529,21 +412,8 @@ fn an_output_folder_with_a_link_inside_is_refused() {
     let (inside, outside) = (desk.path("out/images"), tempfile::tempdir().unwrap());
     desk.write("out/dataset.json", "{}");
     std::os::unix::fs::symlink(outside.path(), &inside).unwrap();
-    let output = desk.run(&[
-        "dataset",
-        "generate",
-        "demo/recipe.toml",
-        "-n",
-        "1",
-        "-q",
-        "-o",
-        "out",
-    ]);
-    assert!(
-        said(&output).contains("out/images: is a link to a folder"),
-        "{}",
-        said(&output)
-    );
+    let said = said(&desk.generate("-n 1 -q -o out").output().unwrap());
+    assert!(said.contains("out/images: is a link to a folder"), "{said}");
     assert_eq!(std::fs::read_dir(outside.path()).unwrap().count(), 0);
 }
 

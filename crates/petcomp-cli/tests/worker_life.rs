@@ -2,7 +2,6 @@
 //!
 //! A program of its own: it counts workers and kills them, which must be nobody else's.
 #![cfg(target_os = "linux")]
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 #[path = "io/make.rs"]
 #[allow(dead_code, reason = "other tests need the rest of it")]

@@ -189,7 +189,6 @@ fn record(label: &Label, solution: &Solution) -> serde_json::Value {
         "p_value": solution.fit.p_value,
         "focal_sigma": solution.sigma.ln_focal,
         "tilt_sigma": solution.sigma.tilt,
-        "height_sigma_px": solution.sigma.height_px,
         "warnings": solution.warnings,
         "file": CameraFile::new(label, solution),
     })

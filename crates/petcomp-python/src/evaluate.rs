@@ -12,13 +12,6 @@ use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::slice;
 
-/// Files of predictions and of the truth.
-struct Files {
-    predictions: PathBuf,
-    truth: PathBuf,
-    size: Option<[u32; 2]>,
-}
-
 /// What is asked of the scores: names of the classes, rounds of the bootstrap, its seed.
 type Question = (Vec<String>, usize, u64);
 
@@ -48,42 +41,42 @@ pub(crate) fn evaluate_files(
     output: Option<PathBuf>,
     question: Question,
 ) -> PyResult<String> {
-    let files = Files {
-        predictions,
-        truth,
-        size,
-    };
     work::run(py, move || {
-        files.evaluate(options_of(question)?, output.as_deref())
+        let (options, output) = (options_of(question)?, output.as_deref());
+        scores_of(&predictions, &truth, size, output, options)
     })
 }
 
-impl Files {
-    fn evaluate(&self, mut options: EvalReportOptions, output: Option<&Path>) -> Result<String> {
-        let name = page::run_name(&self.predictions);
-        if let Some(folder) = output {
-            let inputs = [&self.predictions, &self.truth];
-            page::check_inputs_stay(inputs, folder, slice::from_ref(&name))?;
-        }
-        let truth = self.read_truth()?;
-        let sheets = truth.with_detections(&self.predictions)?;
-        truth.describe(&mut options);
-        let run = Run { name, sheets };
-        if let Some(folder) = output {
-            page::write(folder, slice::from_ref(&run), &options)?;
-        }
-        let metrics = Metrics::of(&run, &options);
-        page::warn_of_empty_truth(&self.truth, slice::from_ref(&metrics));
-        metrics_json(&metrics, &options)
+fn scores_of(
+    predictions: &Path,
+    truth_path: &Path,
+    size: Option<[u32; 2]>,
+    output: Option<&Path>,
+    mut options: EvalReportOptions,
+) -> Result<String> {
+    let name = page::run_name(predictions);
+    if let Some(folder) = output {
+        let inputs = [predictions, truth_path];
+        page::check_inputs_stay(inputs, folder, slice::from_ref(&name))?;
     }
+    let truth = read_truth(truth_path, size)?;
+    let sheets = truth.with_detections(predictions)?;
+    truth.describe(&mut options);
+    let run = Run { name, sheets };
+    if let Some(folder) = output {
+        page::write(folder, slice::from_ref(&run), &options)?;
+    }
+    let metrics = Metrics::of(&run, &options);
+    page::warn_of_empty_truth(truth_path, slice::from_ref(&metrics));
+    metrics_json(&metrics, &options)
+}
 
-    fn read_truth(&self) -> Result<EvalTruth> {
-        if self.size.is_some() && EvalTruth::is_coco(&self.truth) {
-            let what = "given without a folder of YOLO labels as truth: COCO has sizes itself";
-            return Err(Error::value("size", what));
-        }
-        EvalTruth::read(&self.truth, None, self.size)
+fn read_truth(path: &Path, size: Option<[u32; 2]>) -> Result<EvalTruth> {
+    if size.is_some() && EvalTruth::is_coco(path) {
+        let what = "given without a folder of YOLO labels as truth: COCO has sizes itself";
+        return Err(Error::value("size", what));
     }
+    EvalTruth::read(path, None, size)
 }
 
 fn metrics_json(metrics: &Metrics, options: &EvalReportOptions) -> Result<String> {

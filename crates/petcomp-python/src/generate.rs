@@ -6,10 +6,7 @@ use crate::lock::locked;
 use crate::pipeline::Pipeline;
 use crate::sample::Sample;
 use crate::work::{self, Stop};
-use petcomp::dataset::{
-    self, DatasetCounts, LabelConfig, Pictures, Plan, Progress, SampleRange, Shard, Sidecar, Split,
-    Writer,
-};
+use petcomp::dataset::{self, DatasetConfig, Plan, Progress, SampleRange, Shard, Sidecar, Writer};
 use petcomp::{Error, Result};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -56,13 +53,8 @@ impl Steps {
         stop: &AtomicBool,
     ) -> Result<String> {
         let report = |progress| locked(&self.0).push(progress);
-        let counts = dataset::generate(plan, make, &report, stop)?;
-        counts_json(&counts)
+        text(&dataset::generate(plan, make, &report, stop)?)
     }
-}
-
-fn counts_json(counts: &DatasetCounts) -> Result<String> {
-    text(counts)
 }
 
 /// Where a dataset is written, and which samples: folder, count, seed, the only one, the shard.
@@ -98,38 +90,28 @@ pub(crate) fn generate_from(
     })
 }
 
-/// How a dataset of a function's pictures is written.
-struct DatasetLayout {
-    labels: LabelConfig,
-    pictures: Pictures,
-    split: Split,
-}
+/// How a dataset of a function's pictures is written: tables of a recipe, checked as those are.
+struct DatasetLayout(DatasetConfig);
 
 impl DatasetLayout {
     fn new([labels, pictures, split]: &[String; 3]) -> Result<Self> {
-        let layout = Self {
+        let config = DatasetConfig {
             labels: parse("labels", labels)?,
             pictures: parse("pictures", pictures)?,
             split: parse("split", split)?,
-        };
-        // The checks of a recipe, whose tables these are.
-        let config = dataset::DatasetConfig {
-            labels: layout.labels.clone(),
-            pictures: layout.pictures.clone(),
-            split: layout.split,
             ..Default::default()
         };
         config.check()?;
-        Ok(layout)
+        Ok(Self(config))
     }
 
     fn plan(&self, classes: &[String], target: Target) -> Result<Plan> {
         let (folder, count, seed, only, shard) = target;
-        let (range, obstructed) = (range_of(only, shard)?, self.labels.obstructed);
+        let (range, obstructed) = (range_of(only, shard)?, self.0.labels.obstructed);
         Ok(Plan {
             range,
             seed,
-            split: self.split,
+            split: self.0.split,
             obstructed,
             writers: self.writers(),
             ..Plan::new(
@@ -143,7 +125,7 @@ impl DatasetLayout {
     /// Refuses a sample whose labels no file would hold: an archive takes them from what other
     /// writers write, and a [`Sidecar`] is only of samples with a scene.
     fn checked(&self, sample: dataset::Sample, k: u64) -> Result<dataset::Sample> {
-        if sample.provenance.is_some() || self.labels.archives().is_none() {
+        if sample.provenance.is_some() || self.0.labels.archives().is_none() {
             return Ok(sample);
         }
         let what = format!(
@@ -155,8 +137,8 @@ impl DatasetLayout {
 
     fn writers(&self) -> Vec<Arc<dyn Writer>> {
         let mut writers: Vec<Arc<dyn Writer>> =
-            vec![Arc::new(self.pictures.clone()), Arc::new(Sidecar)];
-        writers.extend(self.labels.writers(&self.pictures));
+            vec![Arc::new(self.0.pictures.clone()), Arc::new(Sidecar)];
+        writers.extend(self.0.labels.writers(&self.0.pictures));
         writers
     }
 }

@@ -149,7 +149,7 @@ pub(crate) fn cut_out<'py>(
 fn cut_out_of(photo: Given, empty: Option<Given>, options: &CutOutOptions) -> Result<CutOut> {
     let photo = photo.decoded("image")?.into_opaque("image")?;
     let empty = empty.map(|e| e.decoded("empty")?.into_opaque("empty"));
-    matte::cut_out_on(&photo, empty.transpose()?.as_ref(), options)
+    matte::cut_out_corrected(&photo, empty.transpose()?.as_ref(), &[], options)
 }
 
 fn cut_out_record(cut: &CutOut) -> serde_json::Value {
@@ -159,7 +159,6 @@ fn cut_out_record(cut: &CutOut) -> serde_json::Value {
         "roi": [cut.roi.x, cut.roi.y, cut.roi.width, cut.roi.height],
         "scale": cut.scale,
         "screen": cut.screen.channels(),
-        "unevenness": cut.unevenness,
         "method": cut.method.to_string(),
         "residual_matte": cut.residual_matte,
         "diagnostics": cut.diagnostics,

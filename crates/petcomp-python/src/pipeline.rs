@@ -1,10 +1,10 @@
 //! The pipeline: recipe and number in, labelled picture out.
 
-use crate::document::text;
+use crate::document::{parse, text};
 use crate::errors::{closed, to_python};
 use crate::lock::locked;
 use crate::sample::{PictureFile, Policy, Sample};
-use crate::scene::{config_of, scene_of};
+use crate::scene::scene_of;
 use crate::work::{self, Stop};
 use petcomp::dataset::{self, DatasetConfig};
 use petcomp::io::Override;
@@ -28,38 +28,29 @@ pub(crate) struct Opened {
     policy: Policy,
 }
 
-/// What a pipeline is opened from, and values to be changed.
-struct RecipeSource {
-    /// The recipe file; of a document, the folder that its environment maps are named from.
+/// The recipe of a file, or of a document, whose environment maps are named from the folder `path`.
+/// Values to be changed are those of the quality, then its own.
+fn config_of(
     path: PathBuf,
-    json: Option<String>,
-    overrides: Vec<String>,
-    quality: Option<String>,
-}
-
-impl RecipeSource {
-    fn read(&self) -> Result<DatasetConfig> {
-        let overrides = self.overrides_at_quality()?;
-        match &self.json {
-            None => DatasetConfig::read(&self.path, &overrides),
-            Some(json) => Ok(DatasetConfig {
-                folder: self.path.clone(),
-                ..config_of(json, &overrides)?
-            }),
-        }
-    }
-
-    /// Those of the quality, then its own.
-    fn overrides_at_quality(&self) -> Result<Vec<Override>> {
-        let named: Result<Vec<Override>> = self.overrides.iter().map(|o| o.parse()).collect();
-        let quality = self.quality.as_deref().map(str::parse::<Quality>);
-        Ok(Quality::overrides_at(quality.transpose()?, named?))
+    json: Option<&str>,
+    overrides: &[String],
+    quality: Option<&str>,
+) -> Result<DatasetConfig> {
+    let named: Result<Vec<Override>> = overrides.iter().map(|o| o.parse()).collect();
+    let quality = quality.map(str::parse::<Quality>).transpose()?;
+    let overrides = Quality::overrides_at(quality, named?);
+    match json {
+        None => DatasetConfig::read(&path, &overrides),
+        Some(json) => Ok(DatasetConfig {
+            folder: path,
+            ..DatasetConfig::from_table(parse("recipe", json)?, &overrides)?
+        }),
     }
 }
 
 impl Opened {
-    fn new(source: &RecipeSource) -> Result<Self> {
-        let pipeline = dataset::Pipeline::open(source.read()?)?;
+    fn new(config: DatasetConfig) -> Result<Self> {
+        let pipeline = dataset::Pipeline::open(config)?;
         let labels = &pipeline.config().labels;
         let policy = Policy {
             classes: labels.obstructed.classes(&pipeline.library().classes)?,
@@ -101,13 +92,10 @@ impl Pipeline {
         overrides: Vec<String>,
         quality: Option<String>,
     ) -> PyResult<Self> {
-        let source = RecipeSource {
-            path,
-            json,
-            overrides,
-            quality,
-        };
-        let opened = work::run(py, move || Opened::new(&source))?;
+        let opened = work::run(py, move || {
+            let (json, quality) = (json.as_deref(), quality.as_deref());
+            Opened::new(config_of(path, json, &overrides, quality)?)
+        })?;
         Ok(Self {
             opened: Mutex::new(Some(opened)),
         })

@@ -140,10 +140,6 @@ impl Facts {
         obstructed.labelled(&self.labels, count, &[*extent])
     }
 
-    fn mask_of<'a>(&self, label: &LabelledObject<'a>) -> &'a RleMask {
-        self.policy.extent.of(label.object).1
-    }
-
     fn mask(&self, place: usize) -> PyResult<&RleMask> {
         let labelled = self.labelled();
         let label = labelled.get(place).ok_or_else(|| {
@@ -152,7 +148,7 @@ impl Facts {
                 labelled.len()
             ))
         })?;
-        Ok(self.mask_of(label))
+        Ok(self.policy.extent.of(label.object).1)
     }
 
     /// Of the objects in front; infinite where there is none.

@@ -3,8 +3,6 @@
 use crate::document::{parse, text};
 use crate::errors::to_python;
 use crate::work;
-use petcomp::dataset::DatasetConfig;
-use petcomp::io::Override;
 use petcomp::scene::{CameraSource, Surface};
 use petcomp::{Camera, Result, Scene, io};
 use pyo3::prelude::*;
@@ -39,10 +37,6 @@ pub(crate) fn scene_of(json: &str) -> Result<Scene> {
     let scene: Scene = parse("scene", json)?;
     scene.check()?;
     Ok(scene)
-}
-
-pub(crate) fn config_of(json: &str, overrides: &[Override]) -> Result<DatasetConfig> {
-    DatasetConfig::from_table(parse("recipe", json)?, overrides)
 }
 
 /// An empty scene that this camera sees.

@@ -192,25 +192,19 @@ fn start<T: Send + 'static>(
     let (outcome, own) = (outcome.clone(), pool.clone());
     pool.pool.spawn(move || {
         let result = catch_unwind(AssertUnwindSafe(job)).map_err(|panic| panic_message(&*panic));
-        if let Some(pool) = Arc::into_inner(own) {
-            give_back(pool);
-        }
+        give_back(own);
         *locked(&outcome.0) = Some(result);
         outcome.1.notify_all();
     });
-    give_back_last(pool);
+    give_back(pool);
     Ok(())
 }
 
-/// The starting thread's share of a pool, where the job has ended already.
-fn give_back_last(pool: Arc<IdlePool>) {
+/// Of the job and the thread that started it, whichever is done with the pool last gives it back.
+fn give_back(pool: Arc<IdlePool>) {
     if let Some(pool) = Arc::into_inner(pool) {
-        give_back(pool);
+        locked(&IDLE_POOLS).push(pool);
     }
-}
-
-fn give_back(pool: IdlePool) {
-    locked(&IDLE_POOLS).push(pool);
 }
 
 fn idle_pool() -> PyResult<IdlePool> {

@@ -10,38 +10,39 @@ use super::{
     Diagram, camera, color, encode, keying, label, light, machine, matte, peers, render, scale,
     settle, stability, work,
 };
-use petcomp::Quality;
-use petcomp::Result;
-use petcomp::plot::Table;
+use petcomp::{Quality, Result};
 use std::path::{Path, PathBuf};
 
-/// What the report is made from.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[expect(
+    missing_docs,
+    reason = "its documentation would be the program's: clap prints it"
+)]
+#[derive(clap::Args)]
 pub struct AllOptions {
-    /// Folder of golden scenes; one without scenes is left out. Default: `golden/render`.
-    pub golden: PathBuf,
-    /// Folder of other programs' measurements ([`peers`]); one that is not there is left out.
-    /// Default: `target/peers`.
-    pub peers: PathBuf,
-    /// Folder of photos with known mattes, as the sample world has them; empty = photos made in
-    /// code. Default: empty.
-    pub truth: PathBuf,
-    /// Fewer runs and inputs: half a minute, with noisier times. Default: no.
-    pub quick: bool,
-    /// When it was made, as the report shows it. Default: nothing.
-    pub date: String,
-}
-
-impl Default for AllOptions {
-    fn default() -> Self {
-        Self {
-            golden: "golden/render".into(),
-            peers: "target/peers".into(),
-            truth: PathBuf::new(),
-            quick: false,
-            date: String::new(),
-        }
-    }
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
+    pub output: PathBuf,
+    /// Other programs' measurements, as `make peers` writes them; left out where there are none
+    #[arg(long, value_name = "FOLDER", default_value = "target/peers")]
+    peers: PathBuf,
+    /// Photos with their truth, as the sample world has them, for the mattes; by default photos
+    /// made in code
+    #[arg(long, value_name = "FOLDER")]
+    truth: Option<PathBuf>,
+    /// Golden scenes with Cycles' pictures; left out where there are none
+    #[arg(long, value_name = "FOLDER", default_value = "golden/render")]
+    golden: PathBuf,
+    /// Fewer runs and inputs: a preview in half a minute, with noisier times
+    #[arg(long)]
+    quick: bool,
+    /// Date to show on the page
+    #[arg(
+        long,
+        value_name = "TEXT",
+        default_value = "",
+        hide_default_value = true
+    )]
+    date: String,
 }
 
 /// How much is measured.
@@ -66,28 +67,13 @@ const FULL_AMOUNT: Amount = Amount {
     runs: 5,
 };
 
-impl AllOptions {
-    fn amount(&self) -> Amount {
-        if self.quick {
-            QUICK_AMOUNT
-        } else {
-            FULL_AMOUNT
-        }
-    }
-
-    /// Sections that take their time.
-    fn slow_sections(&self) -> &'static [fn() -> Result<Section>] {
-        if self.quick { &[] } else { &SLOW_SECTIONS }
-    }
-}
-
 /// One thing to measure: the diagrams of a stage.
 type Measure = fn(&AllOptions, &Amount) -> Result<Vec<Diagram>>;
 
 /// What is measured, in the order of the data.
 const STAGES: [Measure; 10] = [
     |_, _| color::diagrams(),
-    |options, _| matte::diagrams(&options.truth),
+    |options, _| matte::diagrams(options.truth.as_deref()),
     |_, amount| matte::searches(amount.bottles),
     |_, _| keying::diagrams(),
     |_, amount| Ok(camera::diagrams(amount.views)),
@@ -105,12 +91,8 @@ const SLOW_SECTIONS: [fn() -> Result<Section>; 3] =
 ///
 /// Times are CPU seconds of one thread. Takes about three minutes on two to four cores, half a
 /// minute when it is to be quick, which leaves out extreme cases, counted work and scale.
-///
-/// # Errors
-/// An input that cannot be read; a thread or scratch folder that cannot be made; memory and scale
-/// need Linux's `/proc`.
-pub fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Document> {
-    let slow = options.slow_sections();
+fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Document> {
+    let slow: &[fn() -> Result<Section>] = if options.quick { &[] } else { &SLOW_SECTIONS };
     let steps = (STAGES.len() + slow.len()) as u64;
     let mut sections = quick_sections(options, |done| progress(done, steps))?;
     for (done, section) in (STAGES.len() as u64..).zip(slow) {
@@ -136,7 +118,11 @@ fn quick_sections(options: &AllOptions, progress: impl Fn(u64)) -> Result<Vec<Se
 }
 
 fn measure_stages(options: &AllOptions, progress: impl Fn(u64)) -> Result<Vec<Diagram>> {
-    let amount = options.amount();
+    let amount = if options.quick {
+        QUICK_AMOUNT
+    } else {
+        FULL_AMOUNT
+    };
     let mut diagrams = Vec::new();
     for (done, stage) in (0..).zip(STAGES) {
         progress(done);
@@ -149,11 +135,11 @@ fn measure_stages(options: &AllOptions, progress: impl Fn(u64)) -> Result<Vec<Di
 /// (`.csv`) into a folder.
 ///
 /// # Errors
-/// As [`measure`]; files that cannot be written. Nothing is written before everything is measured.
-pub fn write(folder: &Path, options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Document> {
-    let document = measure(options, progress)?;
-    document.write(folder)?;
-    Ok(document)
+/// An input that cannot be read; a thread or scratch folder that cannot be made; memory and scale
+/// need Linux's `/proc`; files that cannot be written. Nothing is written before everything is
+/// measured.
+pub fn write(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<()> {
+    measure(options, progress)?.write(&options.output)
 }
 
 fn about_report(options: &AllOptions) -> Section {
@@ -198,33 +184,19 @@ fn other_programs(comparisons: &[peers::PeerComparison], folder: &Path) -> Secti
             "There are no measurements in {folder}: `make peers` runs the other programs that are available."
         ));
     }
+    let diagrams = comparisons.iter().map(peers::PeerComparison::diagram);
+    let diagrams: Vec<_> = diagrams.filter(|d| !d.points.is_empty()).collect();
     comparisons
         .iter()
-        .fold(section, |section, c| section.text(missing_note(c)))
+        .fold(section, |section, c| section.text(c.missing()))
         .text("Measured in one run of `make peers`, on the same cores and the same input.")
         .table("peers", peers::ratios(comparisons))
-        .diagrams(&peer_diagrams(comparisons))
+        .diagrams(&diagrams)
         .table("peers_commands", peers::commands(comparisons))
 }
 
-/// What is missing in a comparison; empty where nothing is.
-fn missing_note(comparison: &peers::PeerComparison) -> String {
-    match comparison.missing() {
-        text if text.is_empty() => text,
-        text => format!("{}: {text}", comparison.stage),
-    }
-}
-
-fn peer_diagrams(comparisons: &[peers::PeerComparison]) -> Vec<Diagram> {
-    comparisons
-        .iter()
-        .map(peers::PeerComparison::diagram)
-        .filter(|diagram| !diagram.points.is_empty())
-        .collect()
-}
-
 fn stability_of_stages() -> Result<Section> {
-    let rows = stability::measure(|_, _| ())?;
+    let rows = stability::measure("", |_, _| ())?;
     let passed = rows.iter().filter(|row| row.outcome.passed).count();
     Ok(Section::new("Stability")
         .text(format!(
@@ -248,25 +220,17 @@ fn counted_work() -> Result<Section> {
 }
 
 fn memory_and_scale() -> Result<Section> {
-    let measured = scale::measure(&scale::ScaleOptions::default(), |_, _| ())?;
+    let measured = scale::measure(scale::DEFAULT_SECONDS, scale::core_count(), |_, _| ())?;
     let tables = scale::tables(&measured)?;
     let mut section = Section::new("Memory and scale");
     for (svg, caption) in scale::charts(&measured)? {
-        section = section.figure("scale_points", svg, caption, first_table(&tables));
+        section = section.figure("scale_points", svg, caption, tables[0].1.clone());
     }
-    Ok(tables.into_iter().fold(section, with_titled_table))
-}
-
-fn first_table(tables: &[(String, Table)]) -> Table {
-    tables
-        .first()
-        .map(|(_, table)| table.clone())
-        .unwrap_or_default()
-}
-
-fn with_titled_table(section: Section, (title, table): (String, Table)) -> Section {
-    let file = title.to_lowercase().replace(' ', "_");
-    section
-        .text(format!("{title}:"))
-        .table(format!("scale_{file}"), table)
+    for (title, table) in tables {
+        let file = title.to_lowercase().replace(' ', "_");
+        section = section
+            .text(format!("{title}:"))
+            .table(format!("scale_{file}"), table);
+    }
+    Ok(section)
 }

@@ -9,19 +9,17 @@ mod diagram;
 mod method;
 mod show;
 
-pub use coverage::StatedErrors;
-pub use diagram::diagrams;
-pub use method::{Lens, SolveMethod};
+pub(crate) use diagram::diagrams;
 
 use super::clock::cpu_seconds;
 use super::files::write_texts;
 use super::statistics::{median_and_95, quantile};
-use method::PHOTOS_TOGETHER;
+use method::{Lens, PHOTOS_TOGETHER, SolveMethod};
 use petcomp::camera::distorted;
 use petcomp::camera::simulate::View;
 use petcomp::camera::{Solution, SolveOptions};
 use petcomp::geom::Point3;
-use petcomp::{Error, Result, io};
+use petcomp::{Result, io};
 use std::path::Path;
 
 /// Noise of the corners, pixels.
@@ -35,55 +33,39 @@ const ERROR_HEIGHT_M: f64 = 0.05;
 const ERROR_GRID_SIDE: usize = 4;
 const US_PER_SECOND: f64 = 1e6;
 
-/// Options of the report.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CameraReportOptions {
-    /// Views per kind of camera, noise and tilt. Default: 200.
-    pub views: u64,
-}
-
-impl Default for CameraReportOptions {
-    fn default() -> Self {
-        Self { views: 200 }
-    }
-}
-
 /// Errors and run time of a method over many views.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CameraRow {
-    /// The kind of camera.
-    pub lens: Lens,
+#[derive(Clone, Copy)]
+struct CameraRow {
+    lens: Lens,
     /// Noise of the corners, pixels.
-    pub noise_px: f64,
+    noise_px: f64,
     /// Angle from straight above, degrees.
-    pub tilt_deg: f64,
-    /// How the camera was found.
-    pub method: SolveMethod,
+    tilt_deg: f64,
+    method: SolveMethod,
     /// How many views there were, and how many of them gave no camera; those count as infinitely
     /// wrong.
-    pub views: usize,
-    /// See [`views`](Self::views).
-    pub failed: usize,
+    views: usize,
+    failed: usize,
     /// Error of the focal length, percent: median and 95 % quantile.
-    pub focal_percent: [f64; 2],
+    focal_percent: [f64; 2],
     /// Error of where points 50 mm above the surface are seen, root mean square over the
     /// rectangle, pixels: median and 95 % quantile.
-    pub height_px: [f64; 2],
+    height_px: [f64; 2],
     /// Median CPU time of a photo, microseconds.
-    pub time_us: f64,
+    time_us: f64,
 }
 
-/// Measures every method on every kind of view; `progress` gets the number of the step and of all
-/// steps.
+/// Measures every method on so many views of every kind; `progress` gets the number of the step and
+/// of all steps.
 ///
 /// One thread, so that run times mean something: about twenty seconds for 100 views on one core of
 /// a desktop of 2020.
-pub fn measure(options: &CameraReportOptions, progress: impl Fn(u64, u64)) -> Vec<CameraRow> {
+fn measure(views: u64, progress: impl Fn(u64, u64)) -> Vec<CameraRow> {
     let kinds = ViewKind::all();
     let mut rows = Vec::new();
     for (done, kind) in kinds.iter().enumerate() {
         progress(done as u64, kinds.len() as u64);
-        rows.extend(kind.rows(&SolveMethod::ALL, options.views));
+        rows.extend(kind.rows(&SolveMethod::ALL, views));
     }
     rows
 }
@@ -211,9 +193,11 @@ fn squared_offset_px(view: &View, solution: &Solution, place: [f64; 2]) -> f64 {
     let found = distorted(&solution.camera, solution.kappa, expected);
     let seen = distorted(&view.camera, view.kappa, point_above(place, view.size));
     let squared = (found - seen).norm_squared();
-    Some(squared)
-        .filter(|v| v.is_finite())
-        .unwrap_or(f64::INFINITY)
+    if squared.is_finite() {
+        squared
+    } else {
+        f64::INFINITY
+    }
 }
 
 fn point_above([x, y]: [f64; 2], [w, h]: [f64; 2]) -> Point3<f64> {
@@ -221,20 +205,14 @@ fn point_above([x, y]: [f64; 2], [w, h]: [f64; 2]) -> Point3<f64> {
 }
 
 /// Writes `camera.csv`, `camera_coverage.csv`, `camera.md` and the plots `camera_tilt_LENS.svg`,
-/// `camera_height_LENS.svg` and `camera_time_LENS.svg` into a folder.
+/// `camera_height_LENS.svg` and `camera_time_LENS.svg` into a folder: of so many views per kind of
+/// camera, noise and tilt, at least one. Returns the number of lines of `camera.csv`.
 ///
 /// # Errors
-/// [`Error::Value`] for no views; files that cannot be written.
-pub fn write(
-    folder: &Path,
-    options: &CameraReportOptions,
-    progress: impl Fn(u64, u64),
-) -> Result<Vec<CameraRow>> {
-    if options.views == 0 {
-        return Err(Error::value("views", "0, expected at least 1"));
-    }
-    let rows = measure(options, progress);
-    let coverage = coverage::measure(options.views);
+/// Files that cannot be written.
+pub fn write(folder: &Path, views: u64, progress: impl Fn(u64, u64)) -> Result<usize> {
+    let rows = measure(views, progress);
+    let coverage = coverage::measure(views);
     let text = show::markdown(&rows) + &coverage::markdown(&coverage);
     let files = [
         ("camera.csv", &*show::csv(&rows)),
@@ -243,7 +221,7 @@ pub fn write(
     ];
     write_texts(folder, files)?;
     write_charts(folder, &rows)?;
-    Ok(rows)
+    Ok(rows.len())
 }
 
 fn write_charts(folder: &Path, rows: &[CameraRow]) -> Result<()> {

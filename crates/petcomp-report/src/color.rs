@@ -23,10 +23,7 @@ const MAX_CODE_16: f64 = 65_535.0;
 const ROUNDING_RMS: f64 = 0.288_675_134_594_812_9;
 
 /// Encoding and decoding, a point for each form.
-///
-/// # Errors
-/// A thread that cannot be had.
-pub fn diagrams() -> Result<Vec<Diagram>> {
+pub(crate) fn diagrams() -> Result<Vec<Diagram>> {
     Ok(vec![encoding()?, decoding()?])
 }
 

@@ -17,6 +17,16 @@ pub(crate) fn table_of<'a, R: 'a>(
     table
 }
 
+/// A number with four decimals.
+pub(crate) fn four(number: f64) -> String {
+    format!("{number:.4}")
+}
+
+/// A number with so many decimals; nothing where there is none.
+pub(crate) fn number_or_empty(number: Option<f64>, decimals: usize) -> String {
+    number.map_or_else(String::new, |v| format!("{v:.decimals$}"))
+}
+
 /// A table of lines that are there already.
 pub(crate) fn table_from<const N: usize>(
     titles: [&str; N],

@@ -14,58 +14,49 @@ const INVISIBLE_ERROR: f64 = 0.004;
 
 /// Error against cost of the settings of a stage, and of other programs that do the same.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Diagram {
+pub(crate) struct Diagram {
     /// Name of its files, without an extension.
-    pub file: String,
+    pub(crate) file: String,
     /// What is seen in it.
-    pub title: String,
+    pub(crate) title: String,
     /// What is processed, with its size.
-    pub input: String,
+    pub(crate) input: String,
     /// What the error is, with its unit.
-    pub error: String,
+    pub(crate) error: String,
     /// What the cost is, with its unit.
-    pub cost: String,
+    pub(crate) cost: String,
     /// What results are compared with: another program with its version, a closed form, or a
     /// converged independent method.
-    pub reference: String,
+    pub(crate) reference: String,
     /// The settings.
-    pub points: Vec<Point>,
+    pub(crate) points: Vec<Point>,
     /// The error that is small enough, and why.
-    pub limit: Option<(f64, String)>,
+    pub(crate) limit: Option<(f64, String)>,
     /// Why the default is what it is, beyond what the points say.
-    pub why: String,
+    pub(crate) why: String,
     /// Points of one curve do not follow from each other, so that no line joins them.
-    pub apart: bool,
+    pub(crate) apart: bool,
     /// Curves are of different inputs: a point is compared only with those of its own.
-    pub inputs: bool,
+    pub(crate) inputs: bool,
 }
 
 /// A setting.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Point {
+pub(crate) struct Point {
     /// The curve that it belongs to: a form of the computation, or another program.
-    pub curve: String,
+    pub(crate) curve: String,
     /// What is set.
-    pub setting: String,
+    pub(crate) setting: String,
     /// What it costs.
-    pub cost: f64,
+    pub(crate) cost: f64,
     /// Its error; 0 is exact.
-    pub error: f64,
+    pub(crate) error: f64,
     /// The qualities that use it.
-    pub qualities: Vec<Quality>,
+    pub(crate) qualities: Vec<Quality>,
 }
 
-/// The efficient front, the cheapest first: points of cost and error with no other that is at most
-/// as costly and at most as wrong, and better in one of the two. What is not finite is never among
-/// them.
-pub fn front(points: &[[f64; 2]]) -> Vec<usize> {
-    let mut kept: Vec<usize> = (0..points.len())
-        .filter(|&i| is_unbeaten(points[i], points))
-        .collect();
-    kept.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]));
-    kept
-}
-
+/// Whether a point of cost and error is on the efficient front: no other one is at most as costly
+/// and at most as wrong, and better in one of the two. What is not finite never is.
 fn is_unbeaten(point: [f64; 2], points: &[[f64; 2]]) -> bool {
     is_finite(point) && !points.iter().any(|other| beats(*other, point))
 }
@@ -88,7 +79,7 @@ pub(crate) fn invisible_error() -> Option<(f64, String)> {
 
 impl Point {
     /// A setting that no quality uses.
-    pub fn new(
+    pub(crate) fn new(
         curve: impl Into<String>,
         setting: impl Into<String>,
         cost: f64,
@@ -104,13 +95,13 @@ impl Point {
     }
 
     /// The same, used by those qualities of which `is_used` is true.
-    pub fn used_where(mut self, is_used: impl Fn(Quality) -> bool) -> Self {
+    pub(crate) fn used_where(mut self, is_used: impl Fn(Quality) -> bool) -> Self {
         self.qualities = Quality::ALL.into_iter().filter(|q| is_used(*q)).collect();
         self
     }
 
     /// What the default uses.
-    pub fn is_default(&self) -> bool {
+    pub(crate) fn is_default(&self) -> bool {
         self.qualities.contains(&Quality::default())
     }
 
@@ -167,13 +158,13 @@ fn cheapest<'a>(points: impl Iterator<Item = &'a Point>) -> Option<&'a Point> {
 
 impl Diagram {
     /// The setting of the default.
-    pub fn default_point(&self) -> Option<&Point> {
+    pub(crate) fn default_point(&self) -> Option<&Point> {
         self.points.iter().find(|p| p.is_default())
     }
 
     /// The cheapest setting that is at least as exact as the default, where it is another and
     /// cheaper by more than noise.
-    pub fn cheaper_than_default(&self) -> Option<&Point> {
+    pub(crate) fn cheaper_than_default(&self) -> Option<&Point> {
         let default = self.default_point()?;
         cheapest(self.rivals(default).filter(|p| p.clearly_beats(default)))
     }
@@ -191,14 +182,14 @@ impl Diagram {
     }
 
     /// The cheapest setting under the limit.
-    pub fn cheapest_under_limit(&self) -> Option<&Point> {
+    pub(crate) fn cheapest_under_limit(&self) -> Option<&Point> {
         let (limit, _) = self.limit.as_ref()?;
         cheapest(self.points.iter().filter(|p| p.error <= *limit))
     }
 
     /// In words: where the default is, why, whether it is on the efficient front, and how far from
     /// it.
-    pub fn verdict(&self) -> String {
+    pub(crate) fn verdict(&self) -> String {
         let Some(default) = self.default_point() else {
             return self.why.clone();
         };
@@ -242,7 +233,7 @@ impl Diagram {
     }
 
     /// What the diagram shows, against what, and its verdict.
-    pub fn caption(&self) -> String {
+    pub(crate) fn caption(&self) -> String {
         paragraph(&[
             &format!(
                 "{}. Input: {}. Reference: {}.",
@@ -268,7 +259,7 @@ impl Diagram {
     }
 
     /// The diagram as an SVG document.
-    pub fn svg(&self) -> String {
+    pub(crate) fn svg(&self) -> String {
         self.chart().alone(&Beside {
             labels: self.labels(),
             apart: self.apart,
@@ -332,7 +323,7 @@ impl Diagram {
     }
 
     /// The points as a table, with the front marked.
-    pub fn table(&self) -> Table {
+    pub(crate) fn table(&self) -> Table {
         let titles = [
             "form",
             "setting",
@@ -357,26 +348,35 @@ impl Diagram {
     }
 
     /// A line for each of some diagrams: the default, its error and cost, and what beats it.
-    pub fn summary(diagrams: &[Self]) -> Table {
-        let defaults = diagrams.iter().filter_map(DefaultOf::new);
-        table_from(SUMMARY_TITLES, defaults.map(|of| of.summary_line()))
+    pub(crate) fn summary(diagrams: &[Self]) -> Table {
+        let defaults = diagrams.iter().filter_map(Self::summary_line);
+        table_from(SUMMARY_TITLES, defaults)
+    }
+
+    fn summary_line(&self) -> Option<[String; 8]> {
+        let default = self.default_point()?;
+        let beaten_by = self.cheaper_than_default().map(|better| {
+            let share = better.share_of_cost(default);
+            format!("{}, {share} of the cost", better.name())
+        });
+        Some([
+            self.title.clone(),
+            self.reference.clone(),
+            default.name(),
+            self.error.clone(),
+            three(default.error),
+            self.cost.clone(),
+            three(default.cost),
+            beaten_by.unwrap_or("none: on the front".into()),
+        ])
     }
 }
 
 /// Sentences with a space between them; empty ones are left out.
 fn paragraph(sentences: &[&str]) -> String {
-    let kept: Vec<&str> = sentences
-        .iter()
-        .copied()
-        .filter(|sentence| !sentence.is_empty())
-        .collect();
+    let mut kept = sentences.to_vec();
+    kept.retain(|sentence| !sentence.is_empty());
     kept.join(" ")
-}
-
-/// A diagram and its default.
-struct DefaultOf<'a> {
-    diagram: &'a Diagram,
-    default: &'a Point,
 }
 
 const SUMMARY_TITLES: [&str; 8] = [
@@ -390,40 +390,14 @@ const SUMMARY_TITLES: [&str; 8] = [
     "cheaper and as exact",
 ];
 
-impl<'a> DefaultOf<'a> {
-    fn new(diagram: &'a Diagram) -> Option<Self> {
-        let default = diagram.default_point()?;
-        Some(Self { diagram, default })
-    }
-
-    fn summary_line(&self) -> [String; 8] {
-        let (diagram, default) = (self.diagram, self.default);
-        [
-            diagram.title.clone(),
-            diagram.reference.clone(),
-            default.name(),
-            diagram.error.clone(),
-            three(default.error),
-            diagram.cost.clone(),
-            three(default.cost),
-            self.beaten_by(),
-        ]
-    }
-
-    fn beaten_by(&self) -> String {
-        match self.diagram.cheaper_than_default() {
-            None => "none: on the front".to_owned(),
-            Some(better) => {
-                let share = better.share_of_cost(self.default);
-                format!("{}, {share} of the cost", better.name())
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn front(points: &[[f64; 2]]) -> Vec<usize> {
+        let all = 0..points.len();
+        all.filter(|&i| is_unbeaten(points[i], points)).collect()
+    }
 
     #[test]
     fn the_front_is_what_no_point_beats() {

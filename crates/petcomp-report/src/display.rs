@@ -2,7 +2,8 @@
 //!
 //! Reality is a rendering of the same bottle in the same room on a display that shows the
 //! background, so that nothing of our own model is in it. The captures are photos of the same
-//! scene with a sensor's noise, as JPEGs of 8 bits. Everything is compared seen straight from above.
+//! scene with a sensor's noise, as JPEGs of 8 bits. Everything is compared seen straight from
+//! above.
 
 mod method;
 mod place;
@@ -10,12 +11,10 @@ mod shots;
 mod strip;
 mod window;
 
-pub use method::DisplayMethod;
-
-use crate::columns::{Column, table_of};
+use crate::columns::{Column, number_or_empty, table_of};
 use crate::files::write_texts;
 use crate::statistics::mean_of;
-use method::SeenFilm;
+use method::{DisplayMethod, SeenFilm};
 use petcomp::geom::Point2;
 use petcomp::matte::LightPath;
 use petcomp::plot::Table;
@@ -34,25 +33,21 @@ const GOOD_FLOW_PX: f64 = 2.0;
 const LEAST_CONTRAST: f64 = 0.3;
 
 /// What a method made of a bottle.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DisplayRow {
-    /// Name of the bottle.
-    pub bottle: String,
-    /// The method.
-    pub method: DisplayMethod,
+struct DisplayRow {
+    bottle: String,
+    method: DisplayMethod,
     /// Mean absolute errors over the backgrounds, linear light; nothing without a cut-out.
-    pub errors: Option<[f64; BACKGROUNDS.len()]>,
+    errors: Option<[f64; BACKGROUNDS.len()]>,
     /// Errors of the displacement where it is known, pixels of the photo.
-    pub flow_errors: Vec<f64>,
+    flow_errors: Vec<f64>,
     /// Pixels inside.
-    pub inside: usize,
+    inside: usize,
     /// Why there is no cut-out.
-    pub refused: String,
+    refused: String,
 }
 
 /// Errors of a method over all bottles that it has photos of.
-#[derive(Clone, Copy, Debug)]
-pub struct DisplaySummary {
+struct DisplaySummary {
     method: DisplayMethod,
     bottles: usize,
     failed: usize,
@@ -69,21 +64,15 @@ pub struct DisplaySummary {
 }
 
 /// Measures every method on every bottle of a folder of places.
-///
-/// # Errors
-/// Files that cannot be read.
-pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<DisplayRow>> {
+fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<DisplayRow>> {
     let places = Place::all_in(folder)?;
-    let total = places
-        .iter()
-        .map(|place| place.bottles.len())
-        .sum::<usize>() as u64;
+    let total: usize = places.iter().map(|place| place.bottles.len()).sum();
     let mut rows = Vec::new();
     let mut done = 0;
     for place in &places {
         let stage = Stage::new(place)?;
         for bottle in &place.bottles {
-            progress(done, total);
+            progress(done, total as u64);
             done += 1;
             rows.extend(rows_of(&stage, place, bottle)?);
         }
@@ -219,14 +208,6 @@ fn absolute_difference(a: LinearRgb, b: LinearRgb) -> f64 {
     (0..3).map(|c| f64::from((a[c] - b[c]).abs())).sum::<f64>() / 3.0
 }
 
-/// Errors over all bottles, a line for each method.
-pub fn summaries(rows: &[DisplayRow]) -> Vec<DisplaySummary> {
-    DisplayMethod::ALL
-        .into_iter()
-        .map(|method| DisplaySummary::new(rows, method))
-        .collect()
-}
-
 impl DisplaySummary {
     fn new(rows: &[DisplayRow], method: DisplayMethod) -> Self {
         let own: Vec<&DisplayRow> = rows.iter().filter(|row| row.method == method).collect();
@@ -271,6 +252,7 @@ fn shown(value: f64, unit: &str) -> String {
     format!("{value:.2}{unit}")
 }
 
+/// The table method x error.
 const SUMMARY_COLUMNS: [Column<DisplaySummary>; 10] = [
     ("method", |s| s.method.name().into()),
     ("bottles", |s| s.bottles.to_string()),
@@ -284,45 +266,31 @@ const SUMMARY_COLUMNS: [Column<DisplaySummary>; 10] = [
     ("median", |s| shown(s.median_flow_px, " px")),
 ];
 
-/// The table method x error.
-pub fn table(summaries: &[DisplaySummary]) -> Table {
-    table_of(&SUMMARY_COLUMNS, summaries)
-}
-
 const DETAIL_COLUMNS: [Column<DisplayRow>; 8] = [
     ("bottle", |r| r.bottle.clone()),
     ("method", |r| r.method.name().into()),
-    ("checker", |r| error_cell(r, 0)),
-    ("text", |r| error_cell(r, 1)),
-    ("noise", |r| error_cell(r, 2)),
-    ("bottle_photo", |r| error_cell(r, 3)),
-    ("plain", |r| error_cell(r, 4)),
+    ("checker", |r| number_or_empty(r.errors.map(|e| e[0]), 6)),
+    ("text", |r| number_or_empty(r.errors.map(|e| e[1]), 6)),
+    ("noise", |r| number_or_empty(r.errors.map(|e| e[2]), 6)),
+    ("bottle_photo", |r| {
+        number_or_empty(r.errors.map(|e| e[3]), 6)
+    }),
+    ("plain", |r| number_or_empty(r.errors.map(|e| e[4]), 6)),
     ("refused", |r| r.refused.clone()),
 ];
-
-fn error_cell(row: &DisplayRow, k: usize) -> String {
-    row.errors
-        .map_or(String::new(), |errors| format!("{:.6}", errors[k]))
-}
 
 /// Measures and writes `display.csv` and `display.md` into a folder.
 ///
 /// # Errors
-/// Those of [`measure`]; files that cannot be written.
-pub fn write(
-    set: &Path,
-    folder: &Path,
-    progress: impl Fn(u64, u64),
-) -> Result<Vec<DisplaySummary>> {
+/// Files that cannot be read or written.
+pub fn write(set: &Path, folder: &Path, progress: impl Fn(u64, u64)) -> Result<Table> {
     let rows = measure(set, progress)?;
-    let summaries = summaries(&rows);
-    let (details, table) = (table_of(&DETAIL_COLUMNS, &rows), table(&summaries));
+    let summaries = DisplayMethod::ALL.map(|method| DisplaySummary::new(&rows, method));
+    let table = table_of(&SUMMARY_COLUMNS, &summaries);
+    let details = table_of(&DETAIL_COLUMNS, &rows).csv();
     let text = format!("# {TITLE}\n\n{}", table.markdown());
-    write_texts(
-        folder,
-        [("display.csv", &*details.csv()), ("display.md", &text)],
-    )?;
-    Ok(summaries)
+    write_texts(folder, [("display.csv", &details), ("display.md", &text)])?;
+    Ok(table)
 }
 
 const TITLE: &str = "Error of captures over new backgrounds";

@@ -4,6 +4,7 @@
 //! which the tests hold against OpenImageIO's.
 
 use super::clock::timed;
+use super::matte::uniform;
 use super::pile::pile;
 use super::{Diagram, Point};
 use petcomp::io::{self, Bits, Compression, WriteOptions};
@@ -11,8 +12,6 @@ use petcomp::plot::three;
 use petcomp::render::render;
 use petcomp::{Error, Image, LinearRgb, PremulRgba, Quality, Result};
 use petcomp::{Shot, composite};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -43,10 +42,7 @@ struct Stored {
 }
 
 /// Error against time, and error against bytes.
-///
-/// # Errors
-/// A folder for scratch files that cannot be created or written.
-pub fn diagrams() -> Result<Vec<Diagram>> {
+pub(crate) fn diagrams() -> Result<Vec<Diagram>> {
     let comparison = EncodingComparison::measure()?;
     Ok(vec![comparison.time_diagram(), comparison.size_diagram()])
 }
@@ -54,24 +50,19 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
 /// A picture in every encoding.
 struct EncodingComparison {
     picture: Image<LinearRgb>,
-    encodings: Vec<Encoding>,
-    stored: Vec<Stored>,
+    stored: Vec<(Encoding, Stored)>,
 }
 
 impl EncodingComparison {
     fn measure() -> Result<Self> {
         let picture = noisy_picture();
         let folder = tempfile::tempdir().map_err(|e| Error::value("scratch folder", e))?;
-        let encodings = encodings();
-        let stored: Result<_> = encodings
-            .iter()
-            .map(|encoding| encoding.store(&picture, folder.path()))
-            .collect();
-        Ok(Self {
-            picture,
-            stored: stored?,
-            encodings,
-        })
+        let mut stored = Vec::new();
+        for encoding in encodings() {
+            let found = encoding.store(&picture, folder.path())?;
+            stored.push((encoding, found));
+        }
+        Ok(Self { picture, stored })
     }
 
     fn pixels(&self) -> f64 {
@@ -99,7 +90,7 @@ impl EncodingComparison {
     }
 
     fn diagram(&self, cost: impl Fn(&Stored) -> f64) -> Diagram {
-        let measured = self.encodings.iter().zip(&self.stored);
+        let measured = self.stored.iter();
         let points = measured.map(|(encoding, s)| encoding.point(cost(s), s.error));
         let [w, h] = SIZE;
         let brightest = brightest(&self.picture);
@@ -128,20 +119,18 @@ impl EncodingComparison {
     }
 
     fn stored_as(&self, curve: &str, setting: &str) -> Option<&Stored> {
-        let i = self
-            .encodings
-            .iter()
-            .position(|encoding| encoding.is(curve, setting))?;
-        self.stored.get(i)
+        let mut stored = self.stored.iter();
+        let (_, found) = stored.find(|(encoding, _)| encoding.is(curve, setting))?;
+        Some(found)
     }
 }
 
 fn encodings() -> Vec<Encoding> {
     let mut all = vec![
-        png(PNG, "draft", Bits::Eight, Quality::Draft),
-        png(PNG, "normal", Bits::Eight, Quality::Normal),
-        png(PNG, "reference", Bits::Eight, Quality::Reference),
-        png("PNG, 16 bits", "normal", Bits::Sixteen, Quality::Normal),
+        png(PNG, Bits::Eight, Quality::Draft),
+        png(PNG, Bits::Eight, Quality::Normal),
+        png(PNG, Bits::Eight, Quality::Reference),
+        png("PNG, 16 bits", Bits::Sixteen, Quality::Normal),
         exr(HALF, "uncompressed", Bits::Half, Compression::None),
         exr(HALF, "PIZ", Bits::Half, Compression::Piz),
         exr(HALF, "ZIP", Bits::Half, Compression::Zip),
@@ -152,44 +141,46 @@ fn encodings() -> Vec<Encoding> {
 }
 
 fn exr(curve: &'static str, name: &str, bits: Bits, compression: Compression) -> Encoding {
-    Encoding {
-        curve,
-        setting: name.into(),
-        extension: "exr",
-        options: WriteOptions {
-            bits: Some(bits),
-            compression,
-            ..WriteOptions::default()
-        },
-    }
+    let options = WriteOptions {
+        bits: Some(bits),
+        compression,
+        ..WriteOptions::default()
+    };
+    Encoding::new(curve, name, "exr", options)
 }
 
-fn png(curve: &'static str, name: &str, bits: Bits, effort: Quality) -> Encoding {
-    Encoding {
-        curve,
-        setting: name.into(),
-        extension: "png",
-        options: WriteOptions {
-            bits: Some(bits),
-            png_effort: effort,
-            ..WriteOptions::default()
-        },
-    }
+fn png(curve: &'static str, bits: Bits, effort: Quality) -> Encoding {
+    let options = WriteOptions {
+        bits: Some(bits),
+        png_effort: effort,
+        ..WriteOptions::default()
+    };
+    Encoding::new(curve, effort.name(), "png", options)
 }
 
 fn jpeg(quality: u8) -> Encoding {
-    Encoding {
-        curve: "JPEG",
-        setting: quality.to_string(),
-        extension: "jpg",
-        options: WriteOptions {
-            jpeg_quality: quality,
-            ..WriteOptions::default()
-        },
-    }
+    let options = WriteOptions {
+        jpeg_quality: quality,
+        ..WriteOptions::default()
+    };
+    Encoding::new("JPEG", &quality.to_string(), "jpg", options)
 }
 
 impl Encoding {
+    fn new(
+        curve: &'static str,
+        setting: &str,
+        extension: &'static str,
+        options: WriteOptions,
+    ) -> Self {
+        Self {
+            curve,
+            setting: setting.into(),
+            extension,
+            options,
+        }
+    }
+
     fn store(&self, picture: &Image<LinearRgb>, folder: &Path) -> Result<Stored> {
         let path = folder.join("picture").with_extension(self.extension);
         let ((), seconds) = timed(TIMED_RUNS, || io::write_with(&path, picture, &self.options))?;
@@ -245,15 +236,11 @@ fn tiled_plate() -> Image<LinearRgb> {
 }
 
 fn add_grain(plate: &mut Image<LinearRgb>) {
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut draw = uniform(1);
     for p in plate.pixels_mut() {
-        let [r, g, b] = std::array::from_fn(|_| grain(&mut rng));
+        let [r, g, b] = std::array::from_fn(|_| GRAIN_WIDTH * (draw() - 0.5) as f32);
         *p = *p + LinearRgb::new(r, g, b);
     }
-}
-
-fn grain(rng: &mut ChaCha8Rng) -> f32 {
-    GRAIN_WIDTH * (f64::from(rng.next_u32()) / f64::from(u32::MAX) - 0.5) as f32
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The files that a report consists of.
 
-use petcomp::{Result, io};
-use std::path::Path;
+use petcomp::{Error, Result, io};
+use std::path::{Path, PathBuf};
 
 /// Writes texts into a folder, which is made if it is not there.
 ///
@@ -13,4 +13,16 @@ pub(crate) fn write_texts<const N: usize>(folder: &Path, files: [(&str, &str); N
         io::write_text(folder.join(name), text)?;
     }
     Ok(())
+}
+
+/// The files `*.json` of a folder, sorted.
+pub(crate) fn json_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let mut paths = Vec::new();
+    for entry in entries {
+        paths.push(entry.map_err(|e| Error::file(folder, e))?.path());
+    }
+    paths.retain(|path| path.extension().is_some_and(|e| e == "json"));
+    paths.sort();
+    Ok(paths)
 }

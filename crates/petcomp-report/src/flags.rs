@@ -3,63 +3,52 @@
 //!
 //! A person reviews the flagged photos only, so two shares matter: *silently wrong* photos spoil a
 //! dataset, *false alarms* cost a review each. The photos are rendered, with known outlines; each
-//! [`PhotoVariant`] makes them harder in one way that keeps the outline known.
+//! variant makes them harder in one way that keeps the outline known.
 
 mod variant;
 
-pub use variant::{Expected, PhotoVariant};
-
+use super::columns::{Column, number_or_empty, table_of};
 use super::files::write_texts;
-use super::matte::score::overlap;
+use super::matte::score::{box_error, overlap};
 use super::matte::truth::{Known, Truths};
 use super::matte::{GOOD_BOX_PX, GOOD_IOU};
-use petcomp::geom::Point2;
-
 use petcomp::matte::{CutOut, CutOutOptions, cut_out};
 use petcomp::plot::Table;
 use petcomp::{Coverage, Image, LinearRgb, Result};
 use rayon::prelude::*;
 use std::path::Path;
+use variant::{Expected, VARIANTS};
 
 /// A photo whose outline is known, and the expected result.
-#[derive(Clone, Debug)]
-pub struct Trial {
-    /// Scene-linear.
-    pub photo: Image<LinearRgb>,
-    /// Coverage of the object.
-    pub mask: Image<Coverage>,
+#[derive(Clone)]
+struct Trial {
+    photo: Image<LinearRgb>,
+    mask: Image<Coverage>,
     /// Left, top, right and bottom of the outline, pixels.
-    pub box_px: [f64; 4],
-    /// The expected result.
-    pub expected: Expected,
+    box_px: [f64; 4],
+    expected: Expected,
 }
 
 /// The result of a photo.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FlagRow {
-    /// Name of the photo.
-    pub photo: String,
-    /// How it was made harder.
-    pub variant: PhotoVariant,
-    /// Errors, judgement and messages.
-    pub judged: Judgement,
+struct FlagRow {
+    photo: String,
+    variant: &'static str,
+    judged: Judgement,
 }
 
 /// How good the cut-out of a photo is.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Judgement {
+struct Judgement {
     /// Overlap (intersection over union) of the tight outline, and largest error of a side of the
     /// hull's box in pixels; nothing where the photo was refused.
-    pub errors: Option<[f64; 2]>,
-    /// How it ended.
-    pub end: End,
+    errors: Option<[f64; 2]>,
+    end: End,
     /// Why the cut-out needs review, or why there is none.
-    pub reasons: Vec<String>,
+    reasons: Vec<String>,
 }
 
 /// How a photo ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
+enum End {
     /// As expected, and not flagged.
     Right,
     /// Right, but flagged for review: a false alarm.
@@ -74,7 +63,7 @@ pub enum End {
 
 impl End {
     /// All of them.
-    pub const ALL: [Self; 5] = [
+    const ALL: [Self; 5] = [
         Self::Right,
         Self::RightAndFlagged,
         Self::WrongAndFlagged,
@@ -83,7 +72,7 @@ impl End {
     ];
 
     /// What it is called in tables.
-    pub fn name(self) -> &'static str {
+    fn name(self) -> &'static str {
         match self {
             Self::Right => "right",
             Self::RightAndFlagged => "right, flagged",
@@ -96,10 +85,7 @@ impl End {
 
 /// Cuts out every photo of a folder with truth in every variant; `progress` is given the number of
 /// finished photos and of all photos.
-///
-/// # Errors
-/// A folder without truth, or files of it that cannot be read.
-pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<FlagRow>> {
+fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<FlagRow>> {
     let truths = Truths::in_folder(folder)?;
     let mut rows = Vec::new();
     for i in 0..truths.len() {
@@ -111,12 +97,12 @@ pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<FlagRow
 
 /// A row for each variant that can be made of a photo.
 fn measure_photo(known: &Known, seed: u64) -> Vec<FlagRow> {
-    PhotoVariant::ALL
+    VARIANTS
         .par_iter()
         .filter_map(|variant| {
             Some(FlagRow {
                 photo: known.name.clone(),
-                variant: *variant,
+                variant: variant.name,
                 judged: variant.trial(known, seed)?.run(),
             })
         })
@@ -125,7 +111,7 @@ fn measure_photo(known: &Known, seed: u64) -> Vec<FlagRow> {
 
 impl Trial {
     /// Cuts the photo out and judges the result.
-    pub fn run(&self) -> Judgement {
+    fn run(&self) -> Judgement {
         match cut_out(&self.photo, &CutOutOptions::default()) {
             Ok(cut) => self.judge(&cut),
             Err(error) => Judgement {
@@ -155,9 +141,11 @@ impl Trial {
     }
 
     fn errors(&self, cut: &CutOut) -> [f64; 2] {
-        let sides = bounding_sides(&cut.segmentation.hull);
-        let box_px = largest_difference(sides, self.box_px);
-        [overlap(&cut.segmentation.tight, &self.mask), box_px]
+        let found = &cut.segmentation;
+        [
+            overlap(&found.tight, &self.mask),
+            box_error(&found.hull, self.box_px),
+        ]
     }
 }
 
@@ -187,84 +175,46 @@ fn outline_reasons(cut: &CutOut) -> Vec<String> {
     of_outline.map(ToString::to_string).collect()
 }
 
-/// Left, top, right and bottom of a polygon.
-pub(crate) fn bounding_sides(polygon: &[Point2<f64>]) -> [f64; 4] {
-    [
-        least(polygon, |p| p.x),
-        least(polygon, |p| p.y),
-        -least(polygon, |p| -p.x),
-        -least(polygon, |p| -p.y),
-    ]
-}
-
-pub(crate) fn largest_difference(a: [f64; 4], b: [f64; 4]) -> f64 {
-    let off = a.iter().zip(b).map(|(a, b)| (a - b).abs());
-    off.fold(0.0, f64::max)
-}
-
-fn least(polygon: &[Point2<f64>], along: fn(&Point2<f64>) -> f64) -> f64 {
-    polygon.iter().map(along).fold(f64::INFINITY, f64::min)
-}
-
 /// How the photos of each variant ended, a line per variant.
-pub fn table(rows: &[FlagRow]) -> Table {
+fn table(rows: &[FlagRow]) -> Table {
     let ends = End::ALL.map(End::name);
     let mut table = Table::new(["photos", "made of"].into_iter().chain(ends));
-    for variant in PhotoVariant::ALL {
-        let name = variant.name().to_owned();
-        let counts = counts_of(rows, variant).map(|count| count.to_string());
-        table.push([name].into_iter().chain(counts));
+    for variant in &VARIANTS {
+        let counts = counts_of(rows, variant.name).map(|count| count.to_string());
+        table.push([variant.name.to_owned()].into_iter().chain(counts));
     }
     table
 }
 
 /// How many photos of a variant there are, and how many ended in each way.
-fn counts_of(rows: &[FlagRow], variant: PhotoVariant) -> impl Iterator<Item = usize> {
+fn counts_of(rows: &[FlagRow], variant: &str) -> impl Iterator<Item = usize> {
     let of_variant = rows.iter().filter(|row| row.variant == variant);
     let ends: Vec<End> = of_variant.map(|row| row.judged.end).collect();
-    let each = End::ALL.map(|end| count_end(&ends, end));
+    let each = End::ALL.map(|end| ends.iter().filter(|found| **found == end).count());
     [ends.len()].into_iter().chain(each)
 }
 
-fn count_end(ends: &[End], end: End) -> usize {
-    ends.iter().filter(|found| **found == end).count()
-}
-
 /// Every photo in every variant.
-pub fn details(rows: &[FlagRow]) -> Table {
-    let mut table = Table::new(["photo", "variant", "iou", "box_px", "end", "doubts"]);
-    rows.iter().for_each(|row| table.push(row.cells()));
-    table
-}
-
-impl FlagRow {
-    fn cells(&self) -> [String; 6] {
-        let judged = &self.judged;
-        let [iou, box_px] = [0, 1].map(|i| judged.errors.map(|errors| errors[i]));
-        [
-            self.photo.clone(),
-            self.variant.name().into(),
-            four_decimals(iou),
-            four_decimals(box_px),
-            judged.end.name().into(),
-            judged.reasons.join("; "),
-        ]
-    }
-}
-
-fn four_decimals(number: Option<f64>) -> String {
-    number.map_or_else(String::new, |v| format!("{v:.4}"))
-}
+const DETAIL_COLUMNS: [Column<FlagRow>; 6] = [
+    ("photo", |r| r.photo.clone()),
+    ("variant", |r| r.variant.into()),
+    ("iou", |r| number_or_empty(r.judged.errors.map(|e| e[0]), 4)),
+    ("box_px", |r| {
+        number_or_empty(r.judged.errors.map(|e| e[1]), 4)
+    }),
+    ("end", |r| r.judged.end.name().into()),
+    ("doubts", |r| r.judged.reasons.join("; ")),
+];
 
 /// Measures and writes `flags.csv` and `flags.md` into a folder.
 ///
 /// # Errors
-/// Those of [`measure`]; files that cannot be written.
+/// A folder without truth; files that cannot be read or written.
 pub fn write(truth: &Path, folder: &Path, progress: impl Fn(u64, u64)) -> Result<Table> {
     let rows = measure(truth, progress)?;
     let table = table(&rows);
     let markdown = format!("# Right, or flagged\n\n{}", table.markdown());
-    let data = details(&rows).csv();
+    let data = table_of(&DETAIL_COLUMNS, &rows).csv();
     write_texts(folder, [("flags.csv", &data), ("flags.md", &markdown)])?;
     Ok(table)
 }
@@ -308,35 +258,40 @@ mod tests {
         }
     }
 
-    fn end(variant: PhotoVariant) -> End {
-        variant.trial(&known(), 1).unwrap().run().end
+    fn trial(variant: &str) -> Trial {
+        let variant = VARIANTS.iter().find(|v| v.name == variant).unwrap();
+        variant.trial(&known(), 1).unwrap()
+    }
+
+    fn end(variant: &str) -> End {
+        trial(variant).run().end
     }
 
     #[test]
     fn a_plain_slab_ends_right_on_any_screen() {
         for variant in [
-            PhotoVariant::Plain,
-            PhotoVariant::Uneven,
-            PhotoVariant::VeryUneven,
-            PhotoVariant::OtherScreen,
-            PhotoVariant::GreyScreen,
+            "as taken",
+            "screen 15 % uneven",
+            "screen 60 % uneven",
+            "other screen colour",
+            "grey screen",
         ] {
-            assert_eq!(end(variant), End::Right, "{}", variant.name());
+            assert_eq!(end(variant), End::Right, "{variant}");
         }
     }
 
     #[test]
     fn what_must_be_flagged_is_flagged() {
         for variant in [
-            PhotoVariant::OverBorder,
-            PhotoVariant::Two,
-            PhotoVariant::Empty,
-            PhotoVariant::EmptyUneven,
+            "over the border",
+            "two objects",
+            "empty screen",
+            "empty, 60 % uneven",
         ] {
-            assert_eq!(end(variant), End::Right, "{}", variant.name());
+            assert_eq!(end(variant), End::Right, "{variant}");
         }
         assert!(matches!(
-            end(PhotoVariant::Blurred),
+            end("out of focus"),
             End::RightAndFlagged | End::WrongAndFlagged
         ));
     }
@@ -345,17 +300,15 @@ mod tests {
     fn nothing_ends_silently_wrong() {
         // Not yet met: the ringing of strong compression around a drawn slab is treated as its
         // edge, and not flagged.
-        for variant in PhotoVariant::ALL
-            .into_iter()
-            .filter(|variant| *variant != PhotoVariant::Jpeg)
-        {
-            assert_ne!(end(variant), End::SilentlyWrong, "{}", variant.name());
+        let others = VARIANTS.iter().filter(|v| v.name != "JPEG quality 60");
+        for name in others.map(|variant| variant.name) {
+            assert_ne!(end(name), End::SilentlyWrong, "{name}");
         }
     }
 
     #[test]
     fn a_wrong_outline_without_a_doubt_is_silently_wrong() {
-        let mut trial = PhotoVariant::Plain.trial(&known(), 1).unwrap();
+        let mut trial = trial("as taken");
         trial.box_px[2] += 5.0;
         assert_eq!(trial.run().end, End::SilentlyWrong);
         let unexpected = Trial {
@@ -377,17 +330,17 @@ mod tests {
             },
         };
         let rows = [
-            row(PhotoVariant::Plain, End::Right),
-            row(PhotoVariant::Plain, End::SilentlyWrong),
+            row("as taken", End::Right),
+            row("as taken", End::SilentlyWrong),
         ];
         let table = table(&rows);
         assert_eq!(
             (table.rows.len(), &table.rows[0][1..]),
             (
-                PhotoVariant::ALL.len(),
+                VARIANTS.len(),
                 &["2", "1", "0", "0", "0", "1"].map(String::from)[..]
             )
         );
-        assert_eq!(details(&rows).rows.len(), 2);
+        assert_eq!(table_of(&DETAIL_COLUMNS, &rows).rows.len(), 2);
     }
 }

@@ -24,10 +24,7 @@ const DISC_EDGE_PX: f32 = 8.0;
 const DISC_TILE_PX: usize = 40;
 
 /// Error and time of both ways to blur, at several sizes.
-///
-/// # Errors
-/// A thread that cannot be started.
-pub fn diagrams() -> Result<Vec<Diagram>> {
+pub(crate) fn diagrams() -> Result<Vec<Diagram>> {
     let photo = disc_photo();
     let job = Keying::new(&photo, Screen::Color(SCREEN));
     let exact = measure_blur(&job, Blur::Exact, "Blender's order")?;

@@ -28,10 +28,7 @@ const TOLERANCES_PX: [f64; 6] = [0.5, 0.75, 1.0, 1.5, 2.0, 4.0];
 const TIMED_RUNS: usize = 7;
 
 /// Error against time, and against the points that are written.
-///
-/// # Errors
-/// A thread that cannot be started.
-pub fn diagrams() -> Result<Vec<Diagram>> {
+pub(crate) fn diagrams() -> Result<Vec<Diagram>> {
     let mut found = LabelPoints::default();
     for size in SIZES_PX {
         found.add_picture(&EllipsePicture::new(size))?;

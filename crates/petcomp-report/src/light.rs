@@ -28,10 +28,7 @@ const MAX_PLAIN_SAMPLES: usize = 64;
 const TIMED_RUNS: usize = 5;
 
 /// The shadow of a card under an area light, and under an even sky.
-///
-/// # Errors
-/// A thread that cannot be started.
-pub fn diagrams() -> Result<Vec<Diagram>> {
+pub(crate) fn diagrams() -> Result<Vec<Diagram>> {
     let kinds = [LightKind::Area, LightKind::Sky];
     kinds.into_iter().map(shadow_diagram).collect()
 }

@@ -3,7 +3,8 @@
 use petcomp::plot::Table;
 use std::path::Path;
 
-const KIB_PER_GIB: f64 = 1024.0 * 1024.0;
+const BYTES_PER_KIB: f64 = 1024.0;
+pub(crate) const BYTES_PER_GIB: f64 = 1024.0 * 1024.0 * 1024.0;
 
 /// The machine and the versions of what runs on it; unknown values and an empty date are left out.
 pub(super) fn machine_table(date: &str) -> Table {
@@ -31,7 +32,9 @@ fn properties(date: &str) -> [(&'static str, Option<String>); 8] {
 }
 
 fn memory() -> Option<String> {
-    gib(&line_of("/proc/meminfo", "MemTotal")?)
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let gib = bytes_in(&text, "MemTotal")? / BYTES_PER_GIB;
+    Some(format!("{gib:.1} GiB"))
 }
 
 fn system_name() -> Option<String> {
@@ -47,8 +50,12 @@ fn kernel_release() -> Option<String> {
 /// The value of the first line of a file that begins with a name, and a `:` or `=`.
 fn line_of(path: impl AsRef<Path>, name: &str) -> Option<String> {
     let text = std::fs::read_to_string(path).ok()?;
-    let value = text.lines().find_map(|line| value_of(line, name))?;
-    Some(value.trim().to_owned())
+    value_in(&text, name).map(str::to_owned)
+}
+
+fn value_in<'a>(text: &'a str, name: &str) -> Option<&'a str> {
+    let mut values = text.lines().filter_map(|line| value_of(line, name));
+    values.next().map(str::trim)
 }
 
 fn value_of<'a>(line: &'a str, name: &str) -> Option<&'a str> {
@@ -56,9 +63,11 @@ fn value_of<'a>(line: &'a str, name: &str) -> Option<&'a str> {
     rest.strip_prefix([':', '='])
 }
 
-fn gib(kib: &str) -> Option<String> {
-    let kib: f64 = kib.split_whitespace().next()?.parse().ok()?;
-    Some(format!("{:.1} GiB", kib / KIB_PER_GIB))
+/// What a line `Name:   123 kB` of a file of Linux's `/proc` says, bytes.
+pub(crate) fn bytes_in(text: &str, name: &str) -> Option<f64> {
+    let mut words = value_in(text, name)?.split_whitespace();
+    let kib: f64 = words.next()?.parse().ok()?;
+    Some(kib * BYTES_PER_KIB)
 }
 
 #[cfg(test)]
@@ -69,23 +78,16 @@ mod tests {
     fn lines_are_found_by_their_names() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("info");
-        std::fs::write(
-            &path,
-            "MemTotalFoo: 1\nMemTotal:  2097152 kB\nPRETTY_NAME=\"A B\"\n",
-        )
-        .unwrap();
-        assert_eq!(
-            line_of(&path, "MemTotal").and_then(|t| gib(&t)),
-            Some("2.0 GiB".into())
-        );
+        let text = "MemTotalFoo: 1\nMemTotal:  2097152 kB\nVmHWM:\t  12 kB\nPRETTY_NAME=\"A B\"\n";
+        std::fs::write(&path, text).unwrap();
         assert_eq!(line_of(&path, "PRETTY_NAME"), Some("\"A B\"".into()));
         assert_eq!(
-            (
-                line_of(&path, "nothing"),
-                line_of("nowhere", "a"),
-                gib("much")
-            ),
-            (None, None, None)
+            (line_of(&path, "nothing"), line_of("nowhere", "a")),
+            (None, None)
+        );
+        assert_eq!(
+            ["MemTotal", "VmHWM", "VmRSS", "PRETTY_NAME"].map(|name| bytes_in(text, name)),
+            [Some(2.0 * BYTES_PER_GIB), Some(12288.0), None, None]
         );
     }
 

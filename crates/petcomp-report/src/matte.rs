@@ -16,38 +16,32 @@ mod show;
 mod summary;
 pub(super) mod truth;
 
-pub use diagram::diagrams;
-pub use method::MattingMethod;
-pub(super) use random::normal;
-pub use score::Score;
-pub use search::searches;
-pub use show::{chart, details, table};
-pub use summary::{MethodSummary, summaries};
+pub(super) use diagram::diagrams;
+pub(super) use method::{MattingMethod, largest_channel};
+pub(super) use random::{normal, uniform};
+pub(super) use search::searches;
 
 use super::clock::cpu_seconds;
 use super::files::write_texts;
-use method::MethodCutOut;
-use petcomp::Image;
-use petcomp::LinearRgb;
-use petcomp::Result;
-use petcomp::plot::Page;
+use petcomp::plot::{Page, Table};
+use petcomp::{Diagnostic, Image, LinearRgb, Result};
 use random::patched_background;
+use score::Score;
+use show::{chart, details, table};
 use std::path::Path;
+use summary::{MethodSummary, summaries};
 use truth::{Known, Truths};
 
 /// What a method made of a photo.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MatteRow {
-    /// Name of the photo.
-    pub photo: String,
-    /// The method.
-    pub method: MattingMethod,
+struct MatteRow {
+    photo: String,
+    method: MattingMethod,
     /// Its errors; nothing where it gave no cut-out.
-    pub score: Option<Score>,
+    score: Option<Score>,
     /// Why the cut-out needs review, or why there is none.
-    pub warnings: Vec<String>,
+    warnings: Vec<String>,
     /// CPU time from the photo in memory to the cut-out on one thread, milliseconds.
-    pub time_ms: f64,
+    time_ms: f64,
 }
 
 /// A box that a person would draw, pixels.
@@ -60,12 +54,15 @@ const MS_PER_SECOND: f64 = 1e3;
 /// New backgrounds per photo.
 const BACKGROUNDS_PER_PHOTO: u64 = 3;
 
+/// The messages of the diagnostics that need review.
+pub(super) fn review_messages(diagnostics: &[Diagnostic]) -> Vec<String> {
+    let needing_review = diagnostics.iter().filter(|d| d.needs_review());
+    needing_review.map(ToString::to_string).collect()
+}
+
 /// Measures every method on every photo of a folder with truth; `progress` gets the number of the
 /// photo and of all photos.
-///
-/// # Errors
-/// A folder without truth, or files of it that cannot be read.
-pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<MatteRow>> {
+fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<MatteRow>> {
     let truths = Truths::in_folder(folder)?;
     measure_known(truths.len(), |i| truths.read(i), progress)
 }
@@ -122,7 +119,10 @@ impl MattingInputs {
         let cut = method.run(&self.known.photo, &self.shots);
         let time_ms = MS_PER_SECOND * (cpu_seconds() - start);
         let (score, warnings) = match cut {
-            Ok(cut) => (Some(self.score(&cut)), cut.warnings()),
+            Ok(cut) => (
+                Some(Score::new(&cut, &self.known, &self.backgrounds)),
+                review_messages(&cut.found.diagnostics),
+            ),
             Err(error) => (None, vec![error.to_string()]),
         };
         MatteRow {
@@ -133,21 +133,13 @@ impl MattingInputs {
             time_ms,
         }
     }
-
-    fn score(&self, cut: &MethodCutOut) -> Score {
-        Score::new(cut, &self.known, &self.backgrounds)
-    }
 }
 
 /// Measures and writes `matte.csv`, `matte.md`, `matte.svg` and `matte.html` into a folder.
 ///
 /// # Errors
-/// Those of [`measure`]; files that cannot be written.
-pub fn write(
-    truth: &Path,
-    folder: &Path,
-    progress: impl Fn(u64, u64),
-) -> Result<Vec<MethodSummary>> {
+/// A folder without truth; files that cannot be read or written.
+pub fn write(truth: &Path, folder: &Path, progress: impl Fn(u64, u64)) -> Result<Table> {
     let rows = measure(truth, progress)?;
     let summaries = summaries(&rows);
     let (details, table) = (details(&rows), table(&summaries));
@@ -161,7 +153,7 @@ pub fn write(
         ("matte.html", &page.document()),
     ];
     write_texts(folder, files)?;
-    Ok(summaries)
+    Ok(table)
 }
 
 const TITLE: &str = "Error of the mattes";

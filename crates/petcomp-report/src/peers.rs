@@ -1,13 +1,12 @@
 //! Other programs that do the same, measured beside petcomp in one run:
 //! `tests/benches/peers/<stage>.py` writes what is read here, `make peers` runs them.
 
+use super::files::json_files;
 use super::{Diagram, Point};
-use petcomp::io;
-use petcomp::plot::Table;
-use petcomp::plot::three;
-use petcomp::{Error, Result};
+use petcomp::plot::{Table, three};
+use petcomp::{Result, io};
 use serde::Deserialize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Our own name among the programs.
 const OURS: &str = "petcomp";
@@ -15,80 +14,63 @@ const OURS: &str = "petcomp";
 const DEFAULT: &str = "default";
 
 /// One stage, by several programs.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct PeerComparison {
-    /// Which stage.
-    pub stage: String,
+#[derive(Debug, PartialEq, Deserialize)]
+pub(crate) struct PeerComparison {
+    stage: String,
     /// What is processed, with its size.
-    pub input: String,
+    input: String,
     /// What the error is, with its unit.
-    pub error: String,
+    error: String,
     /// What results are held against.
-    pub reference: String,
+    reference: String,
     /// Threads that each program may use.
     #[serde(default)]
-    pub threads: Option<u32>,
+    threads: Option<u32>,
     /// What the seconds are.
     #[serde(default)]
-    pub clock: String,
-    /// What was measured.
+    clock: String,
     #[serde(default)]
-    pub points: Vec<PeerPoint>,
+    points: Vec<PeerPoint>,
     /// Programs that could not be run here.
     #[serde(default)]
-    pub absent: Vec<Absent>,
+    absent: Vec<Absent>,
 }
 
 /// A program at a setting.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct PeerPoint {
-    /// Its name.
-    pub program: String,
-    /// Its version.
-    pub version: String,
+#[derive(Debug, PartialEq, Deserialize)]
+struct PeerPoint {
+    program: String,
+    version: String,
     /// What was set.
-    pub setting: String,
+    setting: String,
     /// How it was run.
     #[serde(default)]
-    pub command: String,
+    command: String,
     /// Its error; nothing where there is nothing to hold it against.
-    pub error: Option<f64>,
+    error: Option<f64>,
     /// Median of its run times, seconds.
-    pub seconds: f64,
+    seconds: f64,
     /// How many runs that is the median of.
     #[serde(default)]
-    pub runs: u32,
+    runs: u32,
     /// The setting of petcomp that does the same; empty = its default.
     #[serde(default)]
-    pub beside: String,
+    beside: String,
 }
 
 /// A program that could not be run, and why.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct Absent {
-    /// Its name.
-    pub program: String,
-    /// Why it could not be run.
-    pub why: String,
+#[derive(Debug, PartialEq, Deserialize)]
+struct Absent {
+    program: String,
+    why: String,
 }
 
 /// Reads every comparison (`*.json`) of a folder, by file name; none where there is no such folder.
-///
-/// # Errors
-/// A file that is no comparison.
-pub fn read_comparisons(folder: &Path) -> Result<Vec<PeerComparison>> {
+pub(crate) fn read_comparisons(folder: &Path) -> Result<Vec<PeerComparison>> {
     if !folder.exists() {
         return Ok(Vec::new());
     }
     json_files(folder)?.iter().map(io::read_json).collect()
-}
-
-fn json_files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    let mut paths: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
-    paths.retain(|path| path.extension().is_some_and(|e| e == "json"));
-    paths.sort();
-    Ok(paths)
 }
 
 impl PeerPoint {
@@ -106,7 +88,7 @@ impl PeerPoint {
 
 impl PeerComparison {
     /// Error against time, a curve for each program; what has no error is not in it.
-    pub fn diagram(&self) -> Diagram {
+    pub(crate) fn diagram(&self) -> Diagram {
         Diagram {
             file: format!("peers_{}", file_name(&self.stage)),
             title: format!("{}: petcomp and other programs", self.stage),
@@ -161,22 +143,14 @@ impl PeerComparison {
         ]
     }
 
-    fn command_cells(&self, m: &PeerPoint) -> [String; 4] {
-        [
-            self.stage.clone(),
-            m.name(),
-            m.setting.clone(),
-            m.command.clone(),
-        ]
-    }
-
     /// Programs that are not in it, in words; nothing where all are.
-    pub fn missing(&self) -> String {
+    pub(crate) fn missing(&self) -> String {
+        if self.absent.is_empty() {
+            return String::new();
+        }
         let absent = self.absent.iter();
-        let sentences: Vec<_> = absent
-            .map(|a| format!("Not here: {} ({}).", a.program, a.why))
-            .collect();
-        sentences.join(" ")
+        let sentences = absent.map(|a| format!(" Not here: {} ({}).", a.program, a.why));
+        format!("{}:{}", self.stage, sentences.collect::<String>())
     }
 }
 
@@ -193,7 +167,7 @@ fn number_or_empty(number: Option<f64>) -> String {
 }
 
 /// Every program beside petcomp's default: how many times its seconds and its error.
-pub fn ratios(comparisons: &[PeerComparison]) -> Table {
+pub(crate) fn ratios(comparisons: &[PeerComparison]) -> Table {
     let mut table = Table::new([
         "stage",
         "program",
@@ -205,18 +179,19 @@ pub fn ratios(comparisons: &[PeerComparison]) -> Table {
         "runs",
     ]);
     for comparison in comparisons {
-        let rows = comparison.points.iter().map(|m| comparison.ratio_cells(m));
-        rows.for_each(|row| table.push(row));
+        let points = comparison.points.iter();
+        points.for_each(|m| table.push(comparison.ratio_cells(m)));
     }
     table
 }
 
 /// The exact command of every point.
-pub fn commands(comparisons: &[PeerComparison]) -> Table {
+pub(crate) fn commands(comparisons: &[PeerComparison]) -> Table {
     let mut table = Table::new(["stage", "program", "setting", "command"]);
     for comparison in comparisons {
-        let points = comparison.points.iter();
-        points.for_each(|m| table.push(comparison.command_cells(m)));
+        for m in &comparison.points {
+            table.push([&comparison.stage, &m.name(), &m.setting, &m.command]);
+        }
     }
     table
 }
@@ -255,7 +230,7 @@ mod tests {
         let diagram = found[0].diagram();
         assert_eq!(diagram.points.len(), 3, "what has no error has no place");
         assert_eq!(diagram.cost, "seconds, median");
-        assert_eq!(found[0].missing(), "Not here: Gone (no package).");
+        assert_eq!(found[0].missing(), "matte: Not here: Gone (no package).");
         assert_eq!(commands(&found).rows[2][3], "slow");
     }
 

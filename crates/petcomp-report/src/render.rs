@@ -9,42 +9,65 @@ mod golden;
 mod search;
 mod show;
 
-pub use diagram::diagrams;
-pub use golden::{GoldenRow, golden};
-pub use show::{charts, golden_table, speed_up, table};
-
 use super::clock::timed;
 use super::files::write_texts;
+use clap::builder::RangedU64ValueParser;
 use cycles::{CyclesPictures, TimedPicture};
-use petcomp::Image;
-use petcomp::Quality;
+pub(crate) use diagram::diagrams;
+use golden::{GoldenRow, golden};
 use petcomp::diff::Likeness;
-use petcomp::plot::Chart;
+use petcomp::plot::{Chart, Table};
 use petcomp::render::{RenderOptions, render_reference};
 use petcomp::scene::Shot;
-use petcomp::{LinearRgb, PremulRgba};
-use petcomp::{Result, composite, io};
-use std::path::{Path, PathBuf};
+use petcomp::{Image, LinearRgb, PremulRgba, Quality, Result, composite, io};
+use show::{charts, golden_table, table};
+use std::path::PathBuf;
 
-/// Options of the report.
-#[derive(Clone, Debug, PartialEq)]
+#[expect(
+    missing_docs,
+    reason = "its documentation would be the program's: clap prints it"
+)]
+#[derive(clap::Args)]
 pub struct RenderReportOptions {
-    /// Scene file of the reference renderer that is timed.
-    pub scene: PathBuf,
-    /// Size that it is rendered at, pixels. Default: 320 x 240.
-    pub size: [u32; 2],
-    /// What `tests/benches/peers/render.py` wrote for that scene and size; a folder without
-    /// `times.json` is left out.
-    pub cycles: PathBuf,
-    /// Folder of golden scenes; one without scenes is left out.
-    pub golden: PathBuf,
-    /// Renderings per setting, of which the median is reported. Default: 5.
-    pub repeats: usize,
-    /// Errors against Cycles (RMSE) at which the quickest settings are searched for. Default: none.
-    pub quickest_at: Vec<f64>,
+    /// Scene file of the reference renderer: a golden one, or one that `scene export` wrote
+    #[arg(default_value = "golden/render/pile_of_20/scene.json")]
+    scene: PathBuf,
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
+    pub output: PathBuf,
+    /// Width and height of the pictures, 1 to 4096
+    #[arg(
+        long,
+        num_args = 2,
+        value_names = ["W", "H"],
+        default_values_t = [320, 240],
+        value_parser = clap::value_parser!(u32).range(1..=4096)
+    )]
+    size: Vec<u32>,
+    /// Cycles' pictures of the same scene and size, made by tests/benches/peers/render.py
+    #[arg(long, value_name = "FOLDER", default_value = "report/cycles")]
+    cycles: PathBuf,
+    /// Golden scenes to compare as well
+    #[arg(long, value_name = "FOLDER", default_value = "golden/render")]
+    golden: PathBuf,
+    /// Renderings per preset, of which the median is reported, 1 to 1000
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 5,
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=1000)
+    )]
+    repeats: usize,
+    /// Errors against Cycles at which to search for the quickest settings
+    #[arg(long, value_name = "RMSE", value_delimiter = ',')]
+    quickest_at: Vec<f64>,
 }
 
 impl RenderReportOptions {
+    fn size(&self) -> [u32; 2] {
+        [self.size[0], self.size[1]]
+    }
+
     fn import(&self, size: [u32; 2]) -> Result<Shot> {
         petcomp::scene::cycles::import(&self.scene, Some(size))
     }
@@ -87,24 +110,22 @@ const SHEET_SETTING: &str = "good";
 
 /// Points on the curve of error over run time, the quickest first: each [`Quality`], and two finer
 /// than the default.
-pub fn settings() -> [(&'static str, RenderOptions); 5] {
+pub(crate) fn settings() -> [(&'static str, RenderOptions); 5] {
     let [draft, normal, reference] = Quality::ALL.map(|quality| (quality.name(), quality.render()));
     [draft, normal, ("good", GOOD), ("high", HIGH), reference]
 }
 
 /// A picture and its error.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RenderRow {
+struct RenderRow {
     /// `petcomp` or the other program with its version.
-    pub program: String,
+    program: String,
     /// Setting, or samples per pixel.
-    pub setting: String,
-    /// CPU seconds.
-    pub cpu_seconds: f64,
+    setting: String,
+    cpu_seconds: f64,
     /// Against the other program's best picture; none without one, or for that picture itself.
-    pub cycles: Option<Likeness>,
+    cycles: Option<Likeness>,
     /// Against the quadrature of the definition, at a quarter of the sides.
-    pub quadrature: Option<Likeness>,
+    quadrature: Option<Likeness>,
 }
 
 impl RenderRow {
@@ -115,20 +136,18 @@ impl RenderRow {
 
 /// Measures and writes `render.csv`, `render.md` and `render.svg` into a folder, and of the golden
 /// scenes `render_golden.csv` and the sheet `render_golden.png`: each scene as reference, 16 times
-/// the difference, and ours.
+/// the difference, and ours. Returns the table, and how many golden pictures there are.
 ///
 /// # Errors
 /// A scene or a picture that cannot be read; files that cannot be written.
-pub fn write(
-    folder: impl AsRef<Path>,
-    options: &RenderReportOptions,
-) -> Result<(Vec<RenderRow>, Vec<GoldenRow>)> {
-    let folder = folder.as_ref();
+pub fn write(options: &RenderReportOptions) -> Result<(Table, usize)> {
+    let folder = &options.output;
     io::create_folder(folder)?;
     let rows = measure(options)?;
     let (golden, sheet) = golden(&options.golden, SHEET_SETTING)?;
+    let table = table(&rows);
     let files = [
-        ("render.csv", &*table(&rows).csv()),
+        ("render.csv", &*table.csv()),
         ("render.md", &show::markdown(&rows, &golden, options)),
         ("render.svg", &Chart::row(&charts(&rows))),
     ];
@@ -138,14 +157,11 @@ pub fn write(
         write_texts(folder, [("render_golden.csv", &data)])?;
         io::write(folder.join("render_golden.png"), &sheet)?;
     }
-    Ok((rows, golden))
+    Ok((table, golden.len()))
 }
 
 /// Every setting, and every picture of the other program that is there.
-///
-/// # Errors
-/// As [`write()`].
-pub fn measure(options: &RenderReportOptions) -> Result<Vec<RenderRow>> {
+fn measure(options: &RenderReportOptions) -> Result<Vec<RenderRow>> {
     let others = CyclesPictures::read(&options.cycles)?;
     let timed_scene = TimedScene::new(options, others.best()?)?;
     let mut rows = Vec::new();
@@ -175,10 +191,11 @@ struct TimedScene {
 
 impl TimedScene {
     fn new(options: &RenderReportOptions, best: Option<Image<LinearRgb>>) -> Result<Self> {
-        let small = options.import(options.size.map(|side| (side / QUADRATURE_SHRINK).max(1)))?;
+        let size = options.size();
+        let small = options.import(size.map(|side| (side / QUADRATURE_SHRINK).max(1)))?;
         let deep = render_reference(&small, &QUADRATURE);
         Ok(Self {
-            shot: options.import(options.size)?,
+            shot: options.import(size)?,
             quadrature: finished(&composite::frame(&deep, small.plate.as_deref())),
             small,
             best,
@@ -227,7 +244,9 @@ fn finished(frame: &Image<PremulRgba>) -> Image<LinearRgb> {
 
 #[cfg(test)]
 mod tests {
+    use super::show::speed_up;
     use super::*;
+    use std::path::Path;
 
     fn row(program: &str, cpu_seconds: f64, rmse: f64) -> RenderRow {
         let cycles = Some(Likeness {
@@ -264,18 +283,22 @@ mod tests {
         let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../golden/render");
         let options = RenderReportOptions {
             scene: golden.join("one_card_and_its_shadow/scene.json"),
-            size: [32, 24],
+            output: folder.path().into(),
+            size: vec![32, 24],
             cycles: folder.path().join("nowhere"),
             golden: folder.path().join("nowhere"),
             repeats: 1,
             quickest_at: vec![0.01],
         };
-        let (rows, golden) = write(folder.path(), &options).unwrap();
-        assert_eq!((rows.len(), golden.len()), (settings().len(), 0));
+        let (table, golden_pictures) = write(&options).unwrap();
+        assert_eq!((table.rows.len(), golden_pictures), (settings().len(), 0));
         // So small a picture may be done before the system's clock of CPU time moves.
+        let number = |row: &[String], i: usize| row[i].parse::<f64>().unwrap();
         assert!(
-            rows.iter()
-                .all(|row| row.cpu_seconds >= 0.0 && row.quadrature.unwrap().rmse < 0.1)
+            table
+                .rows
+                .iter()
+                .all(|row| number(row, 2) >= 0.0 && number(row, 7) < 0.1)
         );
         let text = io::read_text(folder.path().join("render.md")).unwrap();
         assert!(

@@ -19,17 +19,18 @@ mod recipe;
 mod run;
 mod show;
 
-pub use fit::{CostFit, CostModel};
-pub use forecast::{Forecast, forecast};
 pub use grid::ScaleCase;
-pub use recipe::{Estimate, RecipeRecord, RecipeRun, RunSample, run_recipe, write_recipe};
+pub use recipe::{RecipeRun, write_recipe};
 pub use run::run;
-pub use show::{charts, tables};
+pub(crate) use show::{charts, tables};
 
+use crate::files::write_texts;
+use fit::{CostFit, CostModel};
+use forecast::{Forecast, forecast};
 use petcomp::plot::Table;
 use petcomp::{Error, Result, io};
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Pictures that are forecast.
 const FORECAST_PICTURES: f64 = 1e6;
@@ -37,28 +38,12 @@ const SECONDS_PER_HOUR: f64 = 3600.0;
 const MS_PER_SECOND: f64 = 1e3;
 const MB_PER_BYTE: f64 = 1e-6;
 
-/// Options of the report.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ScaleOptions {
-    /// The program that measures a point: `PROGRAM scale --case JSON` prints it. Default: the
-    /// running one.
-    pub program: PathBuf,
-    /// About how many seconds of work make a point; at least one picture per thread is made.
-    /// Default: 1.
-    pub seconds: f64,
-    /// Most threads, from 1 in powers of two. Default: one per core.
-    pub threads: usize,
-}
+/// About how many seconds of work make a point.
+pub const DEFAULT_SECONDS: f64 = 1.0;
 
-impl Default for ScaleOptions {
-    fn default() -> Self {
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        Self {
-            program: std::env::current_exe().unwrap_or_default(),
-            seconds: 1.0,
-            threads,
-        }
-    }
+/// Cores of this machine.
+pub fn core_count() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// What a dataset of one kind of picture took.
@@ -85,12 +70,11 @@ impl ScalePoint {
 }
 
 /// Everything that was measured.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ScaleMeasurements {
+pub(crate) struct ScaleMeasurements {
     /// Points on one thread and on more.
-    pub points: Vec<ScalePoint>,
+    points: Vec<ScalePoint>,
     /// Cards that fall together, and seconds that it takes them.
-    pub falls: Vec<(usize, f64)>,
+    falls: Vec<(usize, f64)>,
 }
 
 impl ScaleMeasurements {
@@ -110,15 +94,15 @@ impl ScaleMeasurements {
     }
 }
 
-/// Measures every point of the grid, each in a process of its own; `progress` gets the number of
-/// the point and of all points.
-///
-/// # Errors
-/// A program that cannot be run or does not print its point; where the system does not report time
-/// and memory of a process (it must have Linux's `/proc`).
-pub fn measure(options: &ScaleOptions, progress: impl Fn(u64, u64)) -> Result<ScaleMeasurements> {
+/// Measures every point of the grid, for about this many seconds each but at least one picture per
+/// thread, on up to so many threads; `progress` gets the number of the point and of all points.
+pub(crate) fn measure(
+    seconds: f64,
+    threads: usize,
+    progress: impl Fn(u64, u64),
+) -> Result<ScaleMeasurements> {
     Ok(ScaleMeasurements {
-        points: measure_points(options, progress)?,
+        points: measure_points(seconds, threads, progress)?,
         falls: grid::FALL_SIZES
             .into_iter()
             .map(|cards| Ok((cards, run::fall_seconds(cards)?)))
@@ -126,54 +110,50 @@ pub fn measure(options: &ScaleOptions, progress: impl Fn(u64, u64)) -> Result<Sc
     })
 }
 
-fn measure_points(options: &ScaleOptions, progress: impl Fn(u64, u64)) -> Result<Vec<ScalePoint>> {
-    let cases = grid::cases(options.threads);
+/// Each in a process of its own, of the running program: `PROGRAM scale --case JSON` prints a
+/// point.
+fn measure_points(
+    seconds: f64,
+    threads: usize,
+    progress: impl Fn(u64, u64),
+) -> Result<Vec<ScalePoint>> {
+    let program = std::env::current_exe().unwrap_or_default();
+    let cases = grid::cases(threads);
     let mut points = Vec::new();
     for case in &cases {
         progress(points.len() as u64, cases.len() as u64);
-        let point = process::run_in_child(&options.program, case, options.seconds)?;
-        points.push(point);
+        points.push(process::run_in_child(&program, case, seconds)?);
     }
     Ok(points)
 }
 
-/// Measures and writes `scale.csv`, `scale.md` and charts (SVG) into a folder.
+/// Measures and writes `scale.csv`, `scale.md` and charts (SVG) into a folder; returns the tables
+/// with their titles.
 ///
 /// # Errors
-/// As [`measure`]; files that cannot be written.
+/// A program that cannot be run or does not print its point; where the system does not report time
+/// and memory of a process (it must have Linux's `/proc`); files that cannot be written.
 pub fn write(
-    folder: impl AsRef<Path>,
-    options: &ScaleOptions,
+    folder: &Path,
+    seconds: f64,
+    threads: usize,
     progress: impl Fn(u64, u64),
-) -> Result<ScaleMeasurements> {
-    let folder = folder.as_ref();
+) -> Result<Vec<(String, Table)>> {
     io::create_folder(folder)?;
-    let measured = measure(options, progress)?;
-    write_tables(folder, &tables(&measured)?)?;
-    write_charts(folder, &charts(&measured)?)?;
-    Ok(measured)
-}
-
-fn write_charts(folder: &Path, charts: &[(String, String)]) -> Result<()> {
-    for (i, (svg, _)) in charts.iter().enumerate() {
+    let measured = measure(seconds, threads, progress)?;
+    let tables = tables(&measured)?;
+    let texts = tables
+        .iter()
+        .map(|(title, table)| format!("## {title}\n\n{}\n", table.markdown()));
+    let text = format!("# Memory and scale\n\n{}", texts.collect::<String>());
+    write_texts(
+        folder,
+        [("scale.md", &text), ("scale.csv", &tables[0].1.csv())],
+    )?;
+    for (i, (svg, _)) in charts(&measured)?.iter().enumerate() {
         io::write_text(folder.join(format!("scale_{}.svg", i + 1)), svg)?;
     }
-    Ok(())
-}
-
-fn write_tables(folder: &Path, tables: &[(String, Table)]) -> Result<()> {
-    let text: String = tables
-        .iter()
-        .map(|(title, table)| format!("## {title}\n\n{}\n", table.markdown()))
-        .collect();
-    io::write_text(
-        folder.join("scale.md"),
-        &format!("# Memory and scale\n\n{text}"),
-    )?;
-    match tables.first() {
-        Some((_, points)) => io::write_text(folder.join("scale.csv"), &points.csv()),
-        None => Ok(()),
-    }
+    Ok(tables)
 }
 
 fn missing_error(what: &str) -> Error {

@@ -9,9 +9,9 @@ use std::path::Path;
 
 /// A part of a document under a heading of its own.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Section {
+pub(crate) struct Section {
     /// What it is about.
-    pub title: String,
+    pub(crate) title: String,
     parts: Vec<SectionPart>,
 }
 
@@ -32,7 +32,7 @@ enum SectionPart {
 
 impl Section {
     /// An empty one.
-    pub fn new(title: impl Into<String>) -> Self {
+    pub(crate) fn new(title: impl Into<String>) -> Self {
         Self {
             title: title.into(),
             parts: Vec::new(),
@@ -45,7 +45,7 @@ impl Section {
     }
 
     /// A paragraph; nothing for no text.
-    pub fn text(self, text: impl Into<String>) -> Self {
+    pub(crate) fn text(self, text: impl Into<String>) -> Self {
         let text = text.into();
         if text.is_empty() {
             return self;
@@ -54,7 +54,7 @@ impl Section {
     }
 
     /// A table, also written as `<file>.csv`; one without rows is left out.
-    pub fn table(self, file: impl Into<String>, table: Table) -> Self {
+    pub(crate) fn table(self, file: impl Into<String>, table: Table) -> Self {
         if table.rows.is_empty() {
             return self;
         }
@@ -63,7 +63,7 @@ impl Section {
     }
 
     /// A drawing with its caption and its data, written as `<file>.csv`.
-    pub fn figure(
+    pub(crate) fn figure(
         self,
         file: impl Into<String>,
         svg: String,
@@ -79,7 +79,7 @@ impl Section {
     }
 
     /// A work-precision diagram.
-    pub fn diagram(self, diagram: &Diagram) -> Self {
+    pub(crate) fn diagram(self, diagram: &Diagram) -> Self {
         self.figure(
             diagram.file.clone(),
             diagram.svg(),
@@ -89,7 +89,7 @@ impl Section {
     }
 
     /// Several of them.
-    pub fn diagrams(self, diagrams: &[Diagram]) -> Self {
+    pub(crate) fn diagrams(self, diagrams: &[Diagram]) -> Self {
         diagrams.iter().fold(self, Self::diagram)
     }
 
@@ -109,16 +109,16 @@ impl Section {
 
 /// A document of sections.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Document {
+pub(crate) struct Document {
     /// What it is about.
-    pub title: String,
+    pub(crate) title: String,
     /// Its parts, in order.
-    pub sections: Vec<Section>,
+    pub(crate) sections: Vec<Section>,
 }
 
 impl Document {
     /// The whole of it as one HTML page that needs no other file.
-    pub fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let mut page = Page::new(&self.title);
         page.html(&self.contents_html());
         for (number, section) in self.sections.iter().enumerate() {
@@ -138,7 +138,7 @@ impl Document {
     }
 
     /// Its text and tables as Markdown; plots as their captions.
-    pub fn markdown(&self) -> String {
+    pub(crate) fn markdown(&self) -> String {
         let sections: String = self.sections.iter().map(Section::markdown).collect();
         format!("# {}\n{sections}", self.title)
     }
@@ -148,7 +148,7 @@ impl Document {
     ///
     /// # Errors
     /// Files that cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<()> {
+    pub(crate) fn write(&self, folder: &Path) -> Result<()> {
         io::create_folder(folder)?;
         let parts = self.sections.iter().flat_map(|section| &section.parts);
         for (file, table) in parts.filter_map(SectionPart::data_file) {

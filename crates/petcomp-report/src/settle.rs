@@ -17,18 +17,18 @@ mod diagram;
 mod peer;
 mod show;
 
-pub use diagram::measured_diagrams;
+pub(crate) use diagram::measured_diagrams;
 pub use peer::{PeerCase, peer_cases};
-pub use show::{charts, table};
 
 use super::clock::cpu_seconds;
 use super::files::write_texts;
 use super::statistics::{median_and_worst, quantile};
 use closed_form::{count_wrong_slopes, stack_error_m};
+use petcomp::Result;
 use petcomp::plot::Chart;
 use petcomp::scene::{Scene, SettleOptions};
 use petcomp::settle::{SettleVerdict, Settled, heap, settle};
-use petcomp::{Error, Result};
+use show::{charts, table};
 use std::path::Path;
 
 /// Time steps, as the number of them in a second.
@@ -38,41 +38,26 @@ const HEAP_CARDS: usize = 20;
 const MS_PER_SECOND: f64 = 1e3;
 const MM_PER_M: f64 = 1e3;
 
-/// Options of the report.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SettleReportOptions {
-    /// Heaps for each setting. Default: 20.
-    pub heaps: u64,
-}
-
-impl Default for SettleReportOptions {
-    fn default() -> Self {
-        Self { heaps: 20 }
-    }
-}
-
 /// What a setting of the solver gives.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SettleRow {
+struct SettleRow {
     /// Time steps in a second.
-    pub rate: u32,
+    rate: u32,
     /// Solver iterations in a step.
-    pub iterations: u32,
+    iterations: u32,
     /// Heaps settled, and how many of them came to rest at the first attempt.
-    pub heaps: usize,
-    /// See [`heaps`](Self::heaps).
-    pub rested: usize,
+    heaps: usize,
+    rested: usize,
     /// Overlap at the end: median and worst, millimetres.
-    pub overlap_mm: [f64; 2],
+    overlap_mm: [f64; 2],
     /// Energy that appeared between two steps, percent of the drop's: median and worst.
-    pub energy_percent: [f64; 2],
+    energy_percent: [f64; 2],
     /// How far the topmost of a stack of ten plates is from ten thicknesses, millimetres. Bodies
     /// keep two margins of 0.2 mm between them, so a stack without any overlap has 4.
-    pub stack_mm: f64,
+    stack_mm: f64,
     /// Slopes on which a plate slides and should not, or the other way round.
-    pub wrong_slopes: usize,
+    wrong_slopes: usize,
     /// Median CPU time of a heap, milliseconds.
-    pub cpu_ms: f64,
+    cpu_ms: f64,
 }
 
 impl SettleRow {
@@ -86,17 +71,11 @@ impl SettleRow {
     }
 }
 
-/// Measures every setting; `progress` gets the number of the setting and of all settings. One
-/// thread, so that run times mean something.
-///
-/// # Errors
-/// None that a caller can cause: the scenes are made here.
-pub fn measure(
-    options: &SettleReportOptions,
-    progress: impl Fn(u64, u64),
-) -> Result<Vec<SettleRow>> {
+/// Measures every setting with so many heaps; `progress` gets the number of the setting and of all
+/// settings. One thread, so that run times mean something.
+fn measure(heaps: u64, progress: impl Fn(u64, u64)) -> Result<Vec<SettleRow>> {
     let settings = settings();
-    let heaps = (0..options.heaps).map(|k| heap(k, HEAP_CARDS));
+    let heaps = (0..heaps).map(|k| heap(k, HEAP_CARDS));
     let heaps = heaps.collect::<Result<Vec<_>>>()?;
     let mut rows = Vec::new();
     for setting in &settings {
@@ -156,19 +135,13 @@ fn count_rested(ends: &[Settled]) -> usize {
         .count()
 }
 
-/// Writes the sweep (`settle.csv`, `.md`, `.svg`) into a folder.
+/// Writes the sweep (`settle.csv`, `.md`, `.svg`), with so many heaps for each setting, at least
+/// one, into a folder. Returns the number of lines of `settle.csv`.
 ///
 /// # Errors
-/// [`Error::Value`] for no heaps; files that cannot be written.
-pub fn write(
-    folder: &Path,
-    options: &SettleReportOptions,
-    progress: impl Fn(u64, u64),
-) -> Result<Vec<SettleRow>> {
-    if options.heaps == 0 {
-        return Err(Error::value("heaps", "0, expected at least 1"));
-    }
-    let rows = measure(options, progress)?;
+/// Files that cannot be written.
+pub fn write(folder: &Path, heaps: u64, progress: impl Fn(u64, u64)) -> Result<usize> {
+    let rows = measure(heaps, progress)?;
     let table = table(&rows);
     let files = [
         ("settle.csv", &*table.csv()),
@@ -176,7 +149,7 @@ pub fn write(
         ("settle.svg", &Chart::row(&charts(&rows))),
     ];
     write_texts(folder, files)?;
-    Ok(rows)
+    Ok(rows.len())
 }
 
 #[cfg(test)]

@@ -9,9 +9,10 @@
 mod location;
 mod message;
 
-pub use location::{Location, check, folder_of};
+pub use location::{check, folder_of};
 
 use futures_util::TryStreamExt;
+use location::Location;
 use message::explained;
 use object_store::path::Path as ObjectPath;
 use object_store::{Error as StoreError, ObjectStore, ObjectStoreExt, PutMode, PutPayload};

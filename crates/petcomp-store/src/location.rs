@@ -1,5 +1,6 @@
 //! Where in which store.
 
+use crate::message::explained;
 use object_store::aws::{AmazonS3Builder, AmazonS3ConfigKey, Checksum, S3ConditionalPut};
 use object_store::azure::{AzureConfigKey, MicrosoftAzureBuilder};
 use object_store::gcp::{GoogleCloudStorageBuilder, GoogleConfigKey};
@@ -14,9 +15,9 @@ use url::Url;
 const REQUEST_TIMEOUT: &str = "15 minutes";
 
 /// A bucket, and a prefix in it.
-pub struct Location {
+pub(crate) struct Location {
     /// As it was given, without a slash at its end.
-    pub url: String,
+    pub(crate) url: String,
     scheme: Scheme,
     bucket: String,
     prefix: ObjectPath,
@@ -35,9 +36,8 @@ impl Location {
     /// # Errors
     /// [`Error::Value`] for anything else, for a URL with a user, a query or a fragment (it is not
     /// shown: there may be credentials in it), and for a prefix that no object may have.
-    pub fn parse(text: &str) -> Result<Self> {
-        let url =
-            Url::parse(text).map_err(|e| Error::value("output", format!("\"{text}\": {e}")))?;
+    pub(crate) fn parse(text: &str) -> Result<Self> {
+        let url = Url::parse(text).map_err(|e| unusable(text, &e))?;
         refuse_credentials(&url)?;
         let bucket = url.host_str().unwrap_or_default();
         check_bucket(bucket)
@@ -47,7 +47,7 @@ impl Location {
             url: text.trim_end_matches('/').to_owned(),
             scheme: scheme_of(&url)?,
             bucket: bucket.to_owned(),
-            prefix: prefix.map_err(|e| Error::value("output", format!("\"{text}\": {e}")))?,
+            prefix: prefix.map_err(|e| unusable(text, &e))?,
         })
     }
 
@@ -70,12 +70,7 @@ impl Location {
             Scheme::GoogleCloud => self.google_cloud(),
             Scheme::Azure => self.azure(),
         };
-        store.map_err(|e| {
-            Error::value(
-                "output",
-                format!("\"{}\": {}", self.url, crate::explained(&e)),
-            )
-        })
+        store.map_err(|e| unusable(&self.url, &explained(&e)))
     }
 
     fn s3(&self) -> object_store::Result<Box<dyn ObjectStore>> {
@@ -108,10 +103,14 @@ impl Location {
     }
 }
 
+fn unusable(url: &str, why: &dyn std::fmt::Display) -> Error {
+    Error::value("output", format!("\"{url}\": {why}"))
+}
+
 /// Fails where a URL is that of no object store.
 ///
 /// # Errors
-/// As [`Location::parse`].
+/// As [`open`](crate::open), but for settings in the environment.
 pub fn check(url: &str) -> Result<()> {
     Location::parse(url).map(|_| ())
 }

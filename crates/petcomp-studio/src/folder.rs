@@ -82,8 +82,10 @@ impl Folder {
         }
         check_name(name)?;
         let path = io::below(&self.root, name).map_err(not_found)?;
-        self.check_stays(&path, name)?;
-        Ok(path)
+        match self.holds(&path) && path.is_dir() {
+            true => Ok(path),
+            false => Err(missing(name, "folder")),
+        }
     }
 
     /// Where a file may be written: in a folder that is there. A link in its place is replaced, not
@@ -122,15 +124,6 @@ impl Folder {
         match straightened(path).strip_prefix(straightened(self.here())) {
             Ok(inside) => self.name_of(&self.root.join(inside)),
             Err(_) => self.name_of(path),
-        }
-    }
-
-    /// A path is a folder below this one, whatever links lead there.
-    fn check_stays(&self, path: &Path, name: &str) -> Answer<()> {
-        let (root, target) = (self.here().canonicalize(), path.canonicalize());
-        match (root, target) {
-            (Ok(root), Ok(target)) if target.starts_with(&root) && target.is_dir() => Ok(()),
-            _ => Err(missing(name, "folder")),
         }
     }
 

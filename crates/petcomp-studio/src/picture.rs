@@ -288,11 +288,8 @@ mod tests {
     fn a_photo_in_a_camera_s_adobe_rgb_is_sent_in_srgb() {
         let folder = tempfile::tempdir().unwrap();
         let (photo, answered) = (folder.path().join("a.jpg"), folder.path().join("b.jpg"));
-        io::write(
-            &photo,
-            &Image::filled(40, 20, LinearRgb::new(0.2, 0.4, 0.2)),
-        )
-        .unwrap();
+        let green = Image::filled(40, 20, LinearRgb::new(0.2, 0.4, 0.2));
+        io::write(&photo, &green).unwrap();
         let light = |path: &Path| io::read::<LinearRgb>(path).unwrap()[(8, 8)];
         let own_codes = light(&photo);
         let exif = b"\xff\xe1\0\x52Exif\0\0MM\0*\0\0\0\x08\

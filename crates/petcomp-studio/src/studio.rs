@@ -1,14 +1,21 @@
 //! What all requests share: the folder, and what each room keeps between them.
 
 use crate::corners::Corners;
-use crate::dataset::Dataset;
+use crate::dataset::Catalogs;
 use crate::folder::Folder;
 use crate::mattes::Mattes;
 use crate::recipe::Recipe;
+use std::sync::atomic::{AtomicU64, Ordering};
 use tokio::sync::Semaphore;
 
 /// Photos that are decoded at a time.
 const MAX_DECODING: usize = 2;
+
+/// A number that nothing else of this process has.
+pub(crate) fn next_number() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
 
 /// The folder that is worked on, and the state of each room.
 pub(crate) struct Studio {
@@ -18,7 +25,7 @@ pub(crate) struct Studio {
     pub(crate) corners: Corners,
     pub(crate) mattes: Mattes,
     pub(crate) recipe: Recipe,
-    pub(crate) dataset: Dataset,
+    pub(crate) dataset: Catalogs,
 }
 
 impl Studio {
@@ -29,7 +36,7 @@ impl Studio {
             corners: Corners::default(),
             mattes: Mattes::default(),
             recipe: Recipe::default(),
-            dataset: Dataset::default(),
+            dataset: Catalogs::default(),
         }
     }
 }

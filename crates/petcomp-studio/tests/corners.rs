@@ -9,6 +9,7 @@ use petcomp::{Image, LinearRgb, io};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::time::Instant;
+use tempfile::TempDir;
 
 /// How far from where the floor ends the sides of the sample tray change most, pixels, as a person
 /// sees it too: its walls rise from the floor with a rounding.
@@ -16,7 +17,7 @@ const MAX_OFF_PX: f64 = 0.7;
 const PHOTO_SIZE: [f64; 2] = [1280.0, 960.0];
 
 /// A folder with the sample photos, and with the labels of some.
-fn photos(labelled: &[&str]) -> tempfile::TempDir {
+fn photos(labelled: &[&str]) -> TempDir {
     let dir = tempfile::tempdir().unwrap();
     copy_files(&samples("backgrounds"), dir.path(), |name| {
         let stem = name.split('.').next().unwrap();
@@ -47,6 +48,15 @@ fn open_photo(browser: &mut Browser, studio: &Studio, photo: &str) {
     browser.wait(&format!(
         "document.querySelector('#title').innerText === '{photo}'"
     ));
+}
+
+/// A browser that shows a sample photo, in a folder with the labels of some.
+fn opened(labelled: &[&str], photo: &str) -> Option<(Browser, TempDir, Studio)> {
+    let mut browser = Browser::open(1360, 860)?;
+    let dir = photos(labelled);
+    let studio = Studio::over(dir.path());
+    open_photo(&mut browser, &studio, photo);
+    Some((browser, dir, studio))
 }
 
 fn click_corners(browser: &mut Browser, corners: &[[f64; 2]]) {
@@ -154,12 +164,9 @@ fn the_next_photo_needs_no_size_and_arrows_move_by_a_tenth_of_a_pixel() {
 
 #[test]
 fn markers_are_found_by_themselves() {
-    let Some(mut browser) = Browser::open(1360, 860) else {
+    let Some((mut browser, dir, _studio)) = opened(&["bg0004"], "bg0004.jpg") else {
         return;
     };
-    let dir = photos(&["bg0004"]);
-    let studio = Studio::over(dir.path());
-    open_photo(&mut browser, &studio, "bg0004.jpg");
     browser.press("m", 0);
     browser.fill("#width", "0.57");
     browser.wait("document.querySelector('footer').innerText.startsWith('4 markers')");
@@ -219,12 +226,9 @@ fn what_is_not_saved_stays_with_its_photo_beside_a_label_that_cannot_be_read() {
 
 #[test]
 fn a_stale_save_is_asked_about() {
-    let Some(mut browser) = Browser::open(1360, 860) else {
+    let Some((mut browser, dir, _studio)) = opened(&["bg0000"], "bg0000.jpg") else {
         return;
     };
-    let dir = photos(&["bg0000"]);
-    let studio = Studio::over(dir.path());
-    open_photo(&mut browser, &studio, "bg0000.jpg");
     browser.wait("document.querySelectorAll('#facts dt').length > 5");
     let path = dir.path().join("bg0000.label.json");
     let text = io::read_text(&path).unwrap();
@@ -242,12 +246,9 @@ fn a_stale_save_is_asked_about() {
 
 #[test]
 fn keys_of_corners_rest_while_one_types() {
-    let Some(mut browser) = Browser::open(1360, 860) else {
+    let Some((mut browser, dir, _studio)) = opened(&["bg0000"], "bg0000.jpg") else {
         return;
     };
-    let dir = photos(&["bg0000"]);
-    let studio = Studio::over(dir.path());
-    open_photo(&mut browser, &studio, "bg0000.jpg");
     browser.wait("document.querySelectorAll('#facts dt').length > 5");
     browser.press("1", 0);
     browser.press("ArrowRight", SHIFT);
@@ -503,12 +504,9 @@ fn what_the_label_says_of_heights_stays_when_they_are_typed_anew() {
 
 #[test]
 fn a_mistyped_length_is_named_and_left_behind_with_its_photo() {
-    let Some(mut browser) = Browser::open(1360, 860) else {
+    let Some((mut browser, _dir, _studio)) = opened(&["bg0000", "bg0003"], "bg0000.jpg") else {
         return;
     };
-    let dir = photos(&["bg0000", "bg0003"]);
-    let studio = Studio::over(dir.path());
-    open_photo(&mut browser, &studio, "bg0000.jpg");
     browser.fill("#width", "0,5,6");
     browser.press("s", CTRL);
     browser.wait(
@@ -524,12 +522,9 @@ fn a_mistyped_length_is_named_and_left_behind_with_its_photo() {
 
 #[test]
 fn what_is_typed_during_a_save_is_not_saved_and_a_save_at_a_time_is_asked_for() {
-    let Some(mut browser) = Browser::open(1360, 860) else {
+    let Some((mut browser, dir, _studio)) = opened(&["bg0000"], "bg0000.jpg") else {
         return;
     };
-    let dir = photos(&["bg0000"]);
-    let studio = Studio::over(dir.path());
-    open_photo(&mut browser, &studio, "bg0000.jpg");
     hold_answers(&mut browser, "corners/save");
     browser.eval("document.querySelector('#more').open = true");
     browser.fill("#surface", "trayB");
@@ -553,12 +548,9 @@ fn what_is_typed_during_a_save_is_not_saved_and_a_save_at_a_time_is_asked_for() 
 
 #[test]
 fn corners_that_moved_while_edges_were_looked_for_stay() {
-    let Some(mut browser) = Browser::open(1360, 860) else {
+    let Some((mut browser, dir, _studio)) = opened(&["bg0000"], "bg0000.jpg") else {
         return;
     };
-    let dir = photos(&["bg0000"]);
-    let studio = Studio::over(dir.path());
-    open_photo(&mut browser, &studio, "bg0000.jpg");
     hold_answers(&mut browser, "corners/snap");
     browser.press("s", 0);
     browser.wait("!!window.goOn");
@@ -575,12 +567,9 @@ fn corners_that_moved_while_edges_were_looked_for_stay() {
 
 #[test]
 fn a_photo_that_contradicts_the_others_is_shown_with_its_warning() {
-    let Some(mut browser) = Browser::open(1360, 860) else {
+    let Some((mut browser, _dir, _studio)) = opened(&["bg0000", "bg0003"], "bg0000.jpg") else {
         return;
     };
-    let dir = photos(&["bg0000", "bg0003"]);
-    let studio = Studio::over(dir.path());
-    open_photo(&mut browser, &studio, "bg0000.jpg");
     browser.eval(
         "(() => { const real = window.fetch; window.fetch = (path, options) => \
          String(path).includes('corners/joint') ? Promise.resolve(Response.json([{ photo: 'bg0000.jpg', together: 2, \

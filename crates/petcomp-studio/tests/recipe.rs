@@ -166,14 +166,15 @@ fn of_three_lights_the_first_is_removed_twice() {
 
 const EDITED: &str = "document.querySelectorAll('.setting.edited').length";
 
-/// A studio over a recipe alone, and its page.
-fn recipe_alone(browser: &mut Browser) -> (tempfile::TempDir, Studio) {
+/// A browser that shows the page of a recipe alone, its folder and its studio.
+fn recipe_alone() -> Option<(Browser, tempfile::TempDir, Studio)> {
+    let mut browser = Browser::open(1440, 900)?;
     let dir = tempfile::tempdir().unwrap();
     io::write_text(dir.path().join("recipe.toml"), tray::RECIPE).unwrap();
     let studio = Studio::over(dir.path());
     browser.go(&studio.page("recipe?file=recipe.toml"));
     browser.wait_for(".setting");
-    (dir, studio)
+    Some((browser, dir, studio))
 }
 
 /// The first number of a setting.
@@ -223,10 +224,9 @@ fn a_late_draft_of_one_recipe_is_not_shown_as_that_of_another() {
 
 #[test]
 fn settings_show_what_two_undos_at_once_leave() {
-    let Some(mut browser) = Browser::open(1440, 900) else {
+    let Some((mut browser, _dir, _studio)) = recipe_alone() else {
         return;
     };
-    let (_dir, _studio) = recipe_alone(&mut browser);
     let gain = format!("{}.value", number("scene.gain_ev"));
     let before = browser.eval(&gain);
     for (path, count) in [("scene.gain_ev", 1), ("scene.scale", 2)] {
@@ -240,10 +240,9 @@ fn settings_show_what_two_undos_at_once_leave() {
 
 #[test]
 fn an_edit_while_a_save_runs_stays_and_is_not_saved() {
-    let Some(mut browser) = Browser::open(1440, 900) else {
+    let Some((mut browser, dir, _studio)) = recipe_alone() else {
         return;
     };
-    let (dir, _studio) = recipe_alone(&mut browser);
     set_number(&mut browser, "scene.scale", "0.25");
     browser.wait(&format!("{EDITED} === 1"));
     // The save has been made, and its end waits.
@@ -312,10 +311,9 @@ fn a_new_recipe_takes_no_name_of_another_file() {
 
 #[test]
 fn edits_are_saved_over_what_another_program_has_written() {
-    let Some(mut browser) = Browser::open(1440, 900) else {
+    let Some((mut browser, dir, _studio)) = recipe_alone() else {
         return;
     };
-    let (dir, _studio) = recipe_alone(&mut browser);
     set_number(&mut browser, "scene.scale", "0.25");
     browser.wait(&format!("{EDITED} === 1"));
     let path = dir.path().join("recipe.toml");

@@ -21,12 +21,8 @@ pub(super) fn annotations(text: &str) -> Result<Option<Vec<Annotation>>> {
     let images = root.children().filter(|node| node.has_tag_name("image"));
     let annotations = images
         .enumerate()
-        .map(|(i, node)| numbered_annotation(i, node));
+        .map(|(i, node)| annotation(node).map_err(|e| e.within(&format!("image[{i}]"))));
     with_shapes(annotations).map(Some)
-}
-
-fn numbered_annotation(i: usize, image: Node<'_, '_>) -> Result<Annotation> {
-    annotation(image).map_err(|e| e.within(&format!("image[{i}]")))
 }
 
 /// CVAT's pixels are ours: 0 is the edge of the picture.
@@ -81,16 +77,11 @@ fn points(node: Node<'_, '_>) -> Result<Vec<[f64; 2]>> {
 
 /// `x,y` as numbers.
 fn point(text: &str) -> Result<[f64; 2]> {
-    parsed_point(text).ok_or_else(|| Error::value("points", format!("\"{text}\", expected x,y")))
-}
-
-fn parsed_point(text: &str) -> Option<[f64; 2]> {
-    let (x, y) = text.split_once(',')?;
-    Some([coordinate(x)?, coordinate(y)?])
-}
-
-fn coordinate(text: &str) -> Option<f64> {
-    text.trim().parse().ok()
+    let parts = text.split_once(',');
+    match parts.map(|(x, y)| [x, y].map(|part| part.trim().parse::<f64>())) {
+        Some([Ok(x), Ok(y)]) => Ok([x, y]),
+        _ => Err(Error::value("points", format!("\"{text}\", expected x,y"))),
+    }
 }
 
 fn number(node: Node<'_, '_>, name: &str) -> Result<f64> {

@@ -75,19 +75,15 @@ fn annotation(task: &Value) -> Result<Annotation> {
     };
     for (i, result) in results.iter().enumerate().filter(|(_, r)| has_size(r)) {
         let result = read_result(result).map_err(|e| Error::value(format!("result[{i}]"), e))?;
-        annotation.add(&result);
+        annotation.size = Some([result.original_width, result.original_height]);
+        if let Some(shape) = result.shape() {
+            annotation.add_region(shape);
+        }
     }
     Ok(annotation)
 }
 
 impl Annotation {
-    fn add(&mut self, result: &AnnotationResult) {
-        self.size = Some([result.original_width, result.original_height]);
-        if let Some(shape) = result.shape() {
-            self.add_region(shape);
-        }
-    }
-
     /// A region has a result for each control that says something of it, all with its geometry:
     /// they are one shape, with the first name that any of them gives.
     fn add_region(&mut self, shape: AnnotatedShape) {
@@ -239,14 +235,10 @@ fn with_original_name(name: String) -> impl Iterator<Item = String> {
 
 /// The name of the picture at an address.
 fn picture_name(address: &str) -> Option<String> {
-    let name = decoded(last_part(address)?);
-    is_picture(&name).then_some(name)
-}
-
-/// What follows the last slash, of the path in the query where there is one.
-fn last_part(address: &str) -> Option<&str> {
+    // In the query, where there is one.
     let path = address.rsplit_once("?d=").map_or(address, |(_, path)| path);
-    path.rsplit(['/', '\\']).next()
+    let name = decoded(path.rsplit(['/', '\\']).next()?);
+    is_picture(&name).then_some(name)
 }
 
 fn is_picture(name: &str) -> bool {
@@ -258,11 +250,8 @@ fn is_picture(name: &str) -> bool {
 fn without_upload_prefix(name: &str) -> Option<&str> {
     let (digits, rest) = name.split_at_checked(UPLOAD_PREFIX_LENGTH - 1)?;
     let bare = rest.strip_prefix('-')?;
-    is_hexadecimal(digits).then_some(bare)
-}
-
-fn is_hexadecimal(text: &str) -> bool {
-    text.bytes().all(|byte| byte.is_ascii_hexdigit())
+    let is_hexadecimal = digits.bytes().all(|byte| byte.is_ascii_hexdigit());
+    is_hexadecimal.then_some(bare)
 }
 
 /// A text with its `%20` and the like undone.

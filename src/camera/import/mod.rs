@@ -47,14 +47,10 @@ pub(crate) enum ShapeKind {
 /// # Errors
 /// [`Error::Value`] for a file of one of the programs that does not hold what theirs do.
 pub(crate) fn annotations(text: &str) -> Result<Option<Vec<Annotation>>> {
-    if is_xml(text) {
+    if text.trim_start().starts_with('<') {
         return cvat::annotations(text);
     }
     io::parse_json(text).map_or(Ok(None), json_annotations)
-}
-
-fn is_xml(text: &str) -> bool {
-    text.trim_start().starts_with('<')
 }
 
 fn json_annotations(value: Value) -> Result<Option<Vec<Annotation>>> {
@@ -83,11 +79,14 @@ pub(crate) fn place_for_more(label: &Label) -> &'static str {
 impl Annotation {
     /// The label for the annotation; the sides of its rectangle are unknown.
     pub(crate) fn label(&self) -> Result<Label> {
-        let (name, corners_px) = self.rectangle()?;
+        let (mut name, corners_px) = self.rectangle()?;
+        if name.is_empty() {
+            name = UNNAMED.into();
+        }
         let mut label = Label::new(self.size.unwrap_or_default(), corners_px, [1.0; 2]);
         label.image.file = self.files.first().cloned().unwrap_or_default();
         label.surface = LabelSurface {
-            id: name_or_unnamed(name),
+            id: name,
             corners_px: Some(corners_px),
             source: Some(self.source.into()),
             ..LabelSurface::default()
@@ -97,7 +96,10 @@ impl Annotation {
 
     /// Name and corners of the only shape that can be the surface.
     fn rectangle(&self) -> Result<NamedCorners> {
-        self.check_finite()?;
+        let mut numbers = self.shapes.iter().flat_map(|s| s.points.as_flattened());
+        if !numbers.all(|v| v.is_finite()) {
+            return Err(Error::value("shapes", "a point is not finite"));
+        }
         let mut quads = self.four_cornered(ShapeKind::Polygon);
         let mut boxes = self.four_cornered(ShapeKind::Rectangle);
         let points = self.named_points();
@@ -106,13 +108,6 @@ impl Annotation {
             [0, 1, _] => Ok(boxes.remove(0)),
             [0, 0, 4] => Ok(corners_from_points([0, 1, 2, 3].map(|i| points[i]))),
             counts => Err(self.unclear(counts)),
-        }
-    }
-
-    fn check_finite(&self) -> Result<()> {
-        match self.shapes.iter().all(AnnotatedShape::is_finite) {
-            true => Ok(()),
-            false => Err(Error::value("shapes", "a point is not finite")),
         }
     }
 
@@ -147,22 +142,10 @@ impl Annotation {
 /// What a surface without a name is called.
 const UNNAMED: &str = "surface";
 
-fn name_or_unnamed(name: String) -> String {
-    if name.is_empty() {
-        UNNAMED.into()
-    } else {
-        name
-    }
-}
-
 /// Name of a surface and its corners, pixels.
 type NamedCorners = (String, [[f64; 2]; 4]);
 
 impl AnnotatedShape {
-    fn is_finite(&self) -> bool {
-        self.points.as_flattened().iter().all(|v| v.is_finite())
-    }
-
     /// Its corners, where it has four.
     fn corners(&self) -> Option<NamedCorners> {
         let corners = without_repeated_end(&self.points).try_into().ok()?;
@@ -191,16 +174,10 @@ fn corners_from_points(points: [(&String, [f64; 2]); 4]) -> NamedCorners {
     if let Some(corners) = corners_by_name(&points) {
         return (UNNAMED.into(), corners);
     }
-    (common_name(&points), points.map(|(_, point)| point))
-}
-
-/// The name that all points have.
-fn common_name(points: &[(&String, [f64; 2]); 4]) -> String {
     let first = points[0].0;
-    match points.iter().all(|(name, _)| *name == first) {
-        true => first.clone(),
-        false => UNNAMED.into(),
-    }
+    let is_shared = points.iter().all(|(name, _)| *name == first);
+    let name: &str = if is_shared { first } else { UNNAMED };
+    (name.to_owned(), points.map(|(_, point)| point))
 }
 
 /// The points in the order of their names, where each corner is named once.

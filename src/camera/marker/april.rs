@@ -55,7 +55,6 @@ fn detected(light: &Image<f32>, tone: fn(f32) -> f32) -> Vec<Detection> {
     }
 }
 
-/// With one thread and without decimation.
 fn exact_detector() -> Option<Detector> {
     let mut detector = Detector::builder()
         .add_family_bits(Family::tag_36h11(), MAX_WRONG_BITS)
@@ -90,7 +89,12 @@ fn brightest(light: &Image<f32>) -> f32 {
 /// prints it upside down.
 fn marker(light: &Image<f32>, tag: &Detection, artwork: Artwork) -> Option<Marker> {
     let seen = tag.corners();
-    let rough = corner_order(artwork).map(|i| Point2::from(seen[i]));
+    // In our order, from the top left, clockwise.
+    let order = match artwork {
+        Artwork::Apriltag => [3, 2, 1, 0],
+        Artwork::Opencv => [1, 0, 3, 2],
+    };
+    let rough = order.map(|i: usize| Point2::from(seen[i]));
     let corners = fine_corners(light, &rough).unwrap_or(RefinedCorners {
         px: rough,
         sigma_px: LIBRARY_SIGMA_PX,
@@ -121,43 +125,23 @@ fn are_near(fine: &[Point2<f64>; 4], rough: &[Point2<f64>; 4]) -> bool {
     (0..4).all(|i| (fine[i] - rough[i]).norm() < MAX_MOVED_PX)
 }
 
-/// The detector's numbers of the corners in our order, from the top left, clockwise.
-fn corner_order(artwork: Artwork) -> [usize; 4] {
-    match artwork {
-        Artwork::Apriltag => [3, 2, 1, 0],
-        Artwork::Opencv => [1, 0, 3, 2],
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::camera::simulate::Scenario;
-    use crate::camera::{self, Label, MarkerMap, SolveOptions, project_picture, with_markers};
+    use crate::camera::{self, Camera, Label, MarkerMap, SolveOptions};
+    use crate::camera::{project_picture, with_markers};
+    use crate::capture::is_white_in_tag;
     use crate::diagnostic::Code;
     use crate::filter::{Pyramid, gaussian_blur};
     use crate::geom::Point3;
     use crate::pixel::PremulRgba;
 
-    /// The first tags of the family, and where each of their bits lies, from the highest: row and
-    /// column in a square of eight by eight cells (tag36h11.c of the AprilTag library).
-    const CODES: [u64; 4] = [0xd_7e00_984b, 0xd_da66_4ca7, 0xd_c4a1_c821, 0xe_17b4_70e9];
-    const ROW_AND_COLUMN: [u8; 36] = [
-        11, 12, 13, 14, 15, 22, 23, 24, 33, 16, 26, 36, 46, 56, 25, 35, 45, 34, 66, 65, 64, 63, 62,
-        55, 54, 53, 44, 61, 51, 41, 31, 21, 52, 42, 32, 43,
-    ];
     const BOARD: [f64; 2] = [0.6, 0.4];
     const TAG: f64 = 0.08;
     const CENTERS: [[f64; 2]; 4] = [[-0.23, 0.13], [0.23, 0.13], [0.23, -0.13], [-0.23, -0.13]];
     /// Resolution of the printed board, pixels per metre.
     const PRINT: f64 = 2000.0;
-
-    fn is_white(id: usize, row: usize, column: usize) -> bool {
-        let bit = ROW_AND_COLUMN
-            .iter()
-            .position(|&at| usize::from(at) == 10 * row + column);
-        bit.is_some_and(|bit| CODES[id] >> (35 - bit) & 1 == 1)
-    }
 
     /// White paper with tags on it, the first so many, in the official artwork or OpenCV's.
     fn board(tags: usize, artwork: Artwork) -> Image<PremulRgba> {
@@ -178,25 +162,14 @@ mod tests {
                     [u, v]
                 };
                 let inside = (0.0..1.0).contains(&u) && (0.0..1.0).contains(&v);
-                inside && !is_white(id, (8.0 * v) as usize, (8.0 * u) as usize)
+                inside && !is_white_in_tag(id as u32, (8.0 * v) as usize, (8.0 * u) as usize)
             });
-            let grey = if ink { 0.03 } else { 0.8 };
-            PremulRgba {
-                r: grey,
-                g: grey,
-                b: grey,
-                a: 1.0,
-            }
+            LinearRgb::grey(if ink { 0.03 } else { 0.8 }).opaque()
         })
     }
 
     /// A photo of the board on a grey table, and its camera.
-    fn photo(
-        tags: usize,
-        artwork: Artwork,
-        tilt: f64,
-        k: u64,
-    ) -> (Image<LinearRgb>, crate::Camera) {
+    fn photo(tags: usize, artwork: Artwork, tilt: f64, k: u64) -> (Image<LinearRgb>, Camera) {
         let scenario = Scenario {
             image: [1280, 960],
             focal_px: 1000.0,
@@ -205,18 +178,11 @@ mod tests {
         };
         let camera = scenario.tilted(tilt).view(8, k).camera;
         let seen = project_picture(&Pyramid::new(board(tags, artwork)), &camera, 0.0, BOARD);
-        let over_table = |p: PremulRgba| 0.25 * (1.0 - p.a);
-        (
-            seen.map(|p| LinearRgb {
-                r: p.r + over_table(p),
-                g: p.g + over_table(p),
-                b: p.b + over_table(p),
-            }),
-            camera,
-        )
+        let over_table = |p: PremulRgba| p.color() + LinearRgb::grey(0.25 * (1.0 - p.a));
+        (seen.map(over_table), camera)
     }
 
-    fn label(artwork: Artwork, camera: &crate::Camera) -> Label {
+    fn label(artwork: Artwork, camera: &Camera) -> Label {
         let mut label = Label::new(camera.image, [[0.0; 2]; 4], BOARD);
         label.surface.corners_px = None;
         label.camera.focal_px = Some(camera.focal_px.x);
@@ -233,11 +199,7 @@ mod tests {
     }
 
     /// Distances of the corners of all four tags from the truth, pixels.
-    fn corner_errors(
-        photo: &Image<LinearRgb>,
-        artwork: Artwork,
-        camera: &crate::Camera,
-    ) -> Vec<f64> {
+    fn corner_errors(photo: &Image<LinearRgb>, artwork: Artwork, camera: &Camera) -> Vec<f64> {
         let mut found = find(photo, artwork);
         found.sort_by_key(|m| m.id);
         assert_eq!(found.iter().map(|m| m.id).collect::<Vec<_>>(), [0, 1, 2, 3]);
@@ -263,14 +225,9 @@ mod tests {
     }
 
     /// A slightly blurred photo of the official tags in other light, as far as the sensor takes it.
-    fn photo_in_light(tilt: f64, light: f32) -> (Image<LinearRgb>, crate::Camera) {
+    fn photo_in_light(tilt: f64, light: f32) -> (Image<LinearRgb>, Camera) {
         let (photo, camera) = photo(4, Artwork::Apriltag, tilt, 3);
-        let brighter = |v: f32| (light * v).clamp(0.0, 1.0);
-        let lit = gaussian_blur(&photo, 0.6).map(|p| LinearRgb {
-            r: brighter(p.r),
-            g: brighter(p.g),
-            b: brighter(p.b),
-        });
+        let lit = gaussian_blur(&photo, 0.6).map(|p| p.map(|v| (light * v).clamp(0.0, 1.0)));
         (lit, camera)
     }
 
@@ -327,9 +284,8 @@ mod tests {
             let label = with_markers(label(stated, &camera), &photo).unwrap();
             let solution = camera::solve(&label, &SolveOptions::default()).unwrap();
             for corner in [[-0.3, 0.2], [0.3, 0.2], [0.3, -0.2], [-0.3, -0.2]] {
-                let at = |c: &crate::Camera| {
-                    c.project(Point3::new(corner[0], corner[1], 0.0)).unwrap().0
-                };
+                let place = Point3::new(corner[0], corner[1], 0.0);
+                let at = |c: &Camera| c.project(place).unwrap().0;
                 let error = (at(&solution.camera) - at(&camera)).norm();
                 assert!(error < 0.3, "{printed:?}: {error}");
             }

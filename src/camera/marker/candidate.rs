@@ -37,13 +37,9 @@ pub(super) fn quads(photo: &Image<LinearRgb>) -> Vec<[Point2<f64>; 4]> {
 /// The pixels that are darker than their surroundings.
 fn dark_pixels(photo: &Image<LinearRgb>) -> Mask {
     let tone = photo.map(|p| linear_to_srgb(p.luminance()));
-    let ground = box_blur(&tone, window_radius(photo.size()));
+    let radius = WINDOW_SIDES * photo.width().max(photo.height()) as f64;
+    let ground = box_blur(&tone, radius.ceil().max(5.0) as usize);
     tone.zip_map(&ground, |t, g| t < g - DARK_DIFFERENCE)
-}
-
-fn window_radius((width, height): (usize, usize)) -> usize {
-    let radius = WINDOW_SIDES * width.max(height) as f64;
-    radius.ceil().max(5.0) as usize
 }
 
 /// The outer corners of every connected dark region that is large enough.
@@ -69,7 +65,9 @@ fn take_region(dark: &mut Mask, start: usize) -> (usize, RowEnds) {
     let mut stack = vec![start];
     while let Some(at) = stack.pop() {
         pixels += 1;
-        extend_row(&mut ends, at % width, at / width);
+        let (x, y) = (at % width, at / width);
+        let (first, last) = ends.entry(y).or_insert((x, x));
+        (*first, *last) = ((*first).min(x), (*last).max(x));
         for neighbour in neighbours(at, [width, height]) {
             if std::mem::take(&mut dark.pixels_mut()[neighbour]) {
                 stack.push(neighbour);
@@ -77,11 +75,6 @@ fn take_region(dark: &mut Mask, start: usize) -> (usize, RowEnds) {
         }
     }
     (pixels, ends)
-}
-
-fn extend_row(ends: &mut RowEnds, x: usize, y: usize) {
-    let (first, last) = ends.entry(y).or_insert((x, x));
-    (*first, *last) = ((*first).min(x), (*last).max(x));
 }
 
 /// The pixels beside, above and below one that are in the picture.
@@ -99,14 +92,12 @@ fn neighbours(at: usize, [width, height]: [usize; 2]) -> impl Iterator<Item = us
 
 /// The corners of the first and last pixel of each row.
 fn outer_corners(ends: &RowEnds) -> Vec<Point2<f64>> {
-    let corners = ends.iter().flat_map(|(&y, &ends)| row_corners(y, ends));
+    let corners = ends.iter().flat_map(|(&y, &(first, last))| {
+        let (top, bottom) = (y as f64, y as f64 + 1.0);
+        let (left, right) = (first as f64, last as f64 + 1.0);
+        [[left, top], [right, top], [left, bottom], [right, bottom]].map(Point2::from)
+    });
     corners.collect()
-}
-
-fn row_corners(y: usize, (first, last): (usize, usize)) -> [Point2<f64>; 4] {
-    let (top, bottom) = (y as f64, y as f64 + 1.0);
-    let (left, right) = (first as f64, last as f64 + 1.0);
-    [[left, top], [right, top], [left, bottom], [right, bottom]].map(Point2::from)
 }
 
 /// The four corners of a region that is nearly a quadrangle.
@@ -119,11 +110,9 @@ fn quad(outline: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
     let corners = [a, b, c, d];
     let area = (c - a).perp(&(d - b)) / 2.0;
     let fills_hull = area >= MIN_HULL_SHARE * hull_area(outline);
-    (has_long_sides(&corners) && fills_hull).then_some(corners)
-}
-
-fn has_long_sides(corners: &[Point2<f64>; 4]) -> bool {
-    (0..4).all(|i| (corners[(i + 1) % 4] - corners[i]).norm() >= MIN_SIDE_PX)
+    let mut sides = (0..4).map(|i| corners[(i + 1) % 4] - corners[i]);
+    let are_long = sides.all(|side| side.norm() >= MIN_SIDE_PX);
+    (are_long && fills_hull).then_some(corners)
 }
 
 fn farthest(points: &[Point2<f64>], from: Point2<f64>) -> Option<Point2<f64>> {
@@ -145,7 +134,6 @@ fn extremes_beside(
     Some([left, right])
 }
 
-/// Area of the convex hull.
 fn hull_area(points: &[Point2<f64>]) -> f64 {
     let points = points.iter().map(|p| Point::new(p.x, p.y));
     points.collect::<MultiPoint>().convex_hull().unsigned_area()

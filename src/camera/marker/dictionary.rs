@@ -129,17 +129,12 @@ fn sample_position<const CELLS: usize>(cell: [usize; 2], sample: [usize; 2]) -> 
 
 /// Number of a marker, and by how many quarters its pattern was turned.
 fn lookup(code: u16) -> Option<(u32, usize)> {
-    std::iter::successors(Some(code), |&code| Some(turned(code)))
-        .take(4)
-        .enumerate()
-        .find_map(|(turns, code)| Some((known_id(code)?, turns)))
-}
-
-fn known_id(code: u16) -> Option<u32> {
-    let id = DICT_4X4_50
-        .iter()
-        .position(|&known| (known ^ code).count_ones() <= MAX_WRONG_BITS)?;
-    Some(id as u32)
+    let codes = std::iter::successors(Some(code), |&code| Some(turned(code)));
+    codes.take(4).enumerate().find_map(|(turns, code)| {
+        let mut known = DICT_4X4_50.iter();
+        let id = known.position(|&known| (known ^ code).count_ones() <= MAX_WRONG_BITS)?;
+        Some((id as u32, turns))
+    })
 }
 
 /// The pattern turned by a quarter anticlockwise: as read from the next corner clockwise.

@@ -285,12 +285,8 @@ impl<const CELLS: usize> InnerEdge<CELLS> {
             - self.position(photo_from_square, along - 0.5);
         let reach = search.clamped_reach(INNER_REACH_CELLS * step.norm());
         let moved = crossing(search, foot, step.normalize() * self.rising, reach)?;
-        Some([self.shift_per_growth(), moved * self.rising])
-    }
-
-    /// By how much a growth of white by a pixel would move the edge.
-    fn shift_per_growth(&self) -> f64 {
-        2.0 * self.along as f64 / CELLS as f64 - self.rising - 1.0
+        let per_growth = 2.0 * along / CELLS as f64 - self.rising - 1.0;
+        Some([per_growth, moved * self.rising])
     }
 }
 
@@ -298,18 +294,12 @@ fn inner_edges<const CELLS: usize>(white: &[[bool; CELLS]; CELLS]) -> Vec<InnerE
     let mut edges = Vec::new();
     for upright in [false, true] {
         for across in 1..CELLS - 1 {
-            edges.extend(edges_of_line(white, upright, across));
+            let line =
+                (1..CELLS).filter_map(|along| InnerEdge::between(white, upright, across, along));
+            edges.extend(line);
         }
     }
     edges
-}
-
-fn edges_of_line<const CELLS: usize>(
-    white: &[[bool; CELLS]; CELLS],
-    upright: bool,
-    across: usize,
-) -> impl Iterator<Item = InnerEdge<CELLS>> {
-    (1..CELLS).filter_map(move |along| InnerEdge::between(white, upright, across, along))
 }
 
 /// A side of a dark quadrangle as it is looked for.
@@ -391,18 +381,12 @@ fn probe_part(i: usize) -> f64 {
     CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / SIDE_PROBES as f64
 }
 
-/// Drops the points that are far from the line through all of them.
-fn drop_outliers(points: &mut Vec<Point2<f64>>) -> Option<()> {
-    let line = Line::through(points)?;
-    points.retain(|p| line.distance(*p).abs() < MAX_OFF_LINE_PX);
-    Some(())
-}
-
 /// The line through the probes of a side, without those that are off it; none where half of them
 /// are.
 fn line_through_most(mut points: Vec<Point2<f64>>) -> Option<Line> {
     for _ in 0..2 {
-        drop_outliers(&mut points)?;
+        let line = Line::through(&points)?;
+        points.retain(|p| line.distance(*p).abs() < MAX_OFF_LINE_PX);
     }
     if points.len() < SIDE_PROBES / 2 {
         None

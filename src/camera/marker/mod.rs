@@ -21,10 +21,11 @@ mod edge;
 use super::chi::CHI2_99;
 use super::label::{Label, LabelPoint, MarkerMap};
 use super::options::SolveOptions;
+use super::rectangle::corner_points;
 use super::solution::Fit;
 use super::solve::solve;
 use crate::error::{Error, Result};
-use crate::geom::{Point2, Vector2};
+use crate::geom::{Point2, Vector3};
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 use edge::{EdgeSearch, MOST_REACH_PX};
@@ -62,13 +63,11 @@ pub fn find_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
         .iter()
         .filter_map(|rough| marker_at(&light, rough))
         .collect();
-    found.sort_by(by_number_and_place);
+    found.sort_by(|a, b| {
+        let [left, right] = [a, b].map(|marker| marker.corners_px[0].x);
+        a.id.cmp(&b.id).then(left.total_cmp(&right))
+    });
     found
-}
-
-fn by_number_and_place(a: &Marker, b: &Marker) -> std::cmp::Ordering {
-    let [left, right] = [a, b].map(|marker| marker.corners_px[0].x);
-    a.id.cmp(&b.id).then(left.total_cmp(&right))
 }
 
 /// The marker between four rough corners.
@@ -98,11 +97,7 @@ pub fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
             return tags;
         }
     }
-    dictionary_markers(photo)
-}
-
-/// The dictionary's markers, none of them stated better than in general.
-fn dictionary_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
+    // The dictionary's, none of them stated better than in general.
     let mut found = find_markers(photo);
     for marker in &mut found {
         marker.sigma_px = marker.sigma_px.max(MIN_STATED_SIGMA_PX);
@@ -124,17 +119,13 @@ pub fn with_markers(mut label: Label, photo: &Image<LinearRgb>) -> Result<Label>
     label.points.retain(|point| !point.is_marker_corner());
     let layout = MarkerLayout::find(&label, photo)?;
     let turns = layout.fitting_turns();
-    warn_of_turns(turns);
-    Ok(layout.label_turned(turns))
-}
-
-fn warn_of_turns(turns: usize) {
     if turns > 0 {
         let degrees = 90 * turns;
         log::warn!(
             "markers: they fit the map only if turned by {degrees} degrees (markers.artwork, or the map's axes)"
         );
     }
+    Ok(layout.label_turned(turns))
 }
 
 fn marker_map(label: &Label) -> Result<&MarkerMap> {
@@ -191,9 +182,7 @@ impl<'a> MarkerLayout<'a> {
             min_sigma_px,
         })
     }
-}
 
-impl MarkerLayout<'_> {
     /// The label with the corners of the markers as points, each marker turned by `turns` right
     /// angles.
     fn label_turned(&self, turns: usize) -> Label {
@@ -209,18 +198,14 @@ impl MarkerLayout<'_> {
         let marker = *marker;
         let center = self.map.map.get(&marker.id);
         center.into_iter().flat_map(move |&center| {
+            let corners = corner_points([self.map.size_m; 2]);
             [0, 1, 2, 3].map(|i| LabelPoint {
-                xyz_m: square_corner(center, self.map.size_m / 2.0, i),
-                px: self.labelled_px(marker.corners_px[(i + turns) % 4]),
+                xyz_m: (corners[i] + Vector3::from(center)).into(),
+                px: self.label.labelled_px(marker.corners_px[(i + turns) % 4]),
                 sigma_px: Some(marker.sigma_px.max(self.min_sigma_px)),
                 note: Some(format!("marker {}", marker.id)),
             })
         })
-    }
-
-    /// A position as the label writes it.
-    fn labelled_px(&self, px: Point2<f64>) -> [f64; 2] {
-        (px - Vector2::repeat(self.label.pixel_origin.offset_px())).into()
     }
 
     /// By how many right angles the markers have to be turned for a camera to fit clearly better
@@ -249,14 +234,6 @@ fn chi2_or_infinite(fit: Option<Fit>) -> f64 {
     fit.map_or(f64::INFINITY, |fit| fit.chi2)
 }
 
-/// A corner of a square on the surface, from the top left, clockwise.
-fn square_corner([x, y, z]: [f64; 3], half: f64, corner: usize) -> [f64; 3] {
-    let [right, up] = CORNER_DIRECTIONS[corner];
-    [x + right * half, y + up * half, z]
-}
-
-const CORNER_DIRECTIONS: [[f64; 2]; 4] = [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
-
 #[cfg(test)]
 pub(crate) use tests::printed;
 
@@ -264,22 +241,25 @@ pub(crate) use tests::printed;
 mod tests {
     use super::*;
     use crate::camera::simulate::Scenario;
-    use crate::filter::Pyramid;
+    use crate::camera::{Camera, project_picture};
+    use crate::filter::{Pyramid, gaussian_blur};
+    use crate::pixel::Coverage;
 
     /// Marker `id` as printed, with a margin of one cell, `cell` pixels to the cell.
     pub(crate) fn printed(id: u32, cell: usize) -> Image<LinearRgb> {
-        let grey = |x: usize, y: usize| {
-            if dictionary::is_white(id, x / cell, y / cell) {
-                0.8
-            } else {
-                0.04
-            }
-        };
-        Image::from_fn(8 * cell, 8 * cell, |x, y| LinearRgb {
-            r: grey(x, y),
-            g: grey(x, y),
-            b: grey(x, y),
+        Image::from_fn(8 * cell, 8 * cell, |x, y| {
+            let is_white = dictionary::is_white(id, x / cell, y / cell);
+            LinearRgb::grey(if is_white { 0.8 } else { 0.04 })
         })
+    }
+
+    /// What a camera sees of a printed marker, with its margin 0.4 m large, on a grey table.
+    fn on_table(camera: &Camera, id: u32, cell: usize) -> Image<LinearRgb> {
+        let (sheet, size) = (printed(id, cell), [0.4, 0.4]);
+        let paper = Pyramid::new(sheet.map(|_| Coverage(1.0)));
+        let paper = project_picture(&paper, camera, 0.0, size);
+        let seen = project_picture(&Pyramid::new(sheet), camera, 0.0, size);
+        seen.zip_map(&paper, |p, a| p + LinearRgb::grey(0.3 * (1.0 - a.0)))
     }
 
     #[test]
@@ -292,24 +272,13 @@ mod tests {
                 ..Scenario::default()
             };
             let camera = scenario.tilted(tilt).view(5, u64::from(id)).camera;
-            let sheet = Pyramid::new(printed(id, 24));
-            let photo = super::super::project_picture(&sheet, &camera, 0.0, [0.4, 0.4]);
-            // Paper on a grey table.
-            let alpha = Pyramid::new(Image::filled(192, 192, crate::Coverage(1.0)));
-            let alpha = super::super::project_picture(&alpha, &camera, 0.0, [0.4, 0.4]);
-            let photo = photo.zip_map(&alpha, |p, a| p.add_scaled_grey(0.3 * (1.0 - a.0)));
-            let found = find_markers(&photo);
+            let found = find_markers(&on_table(&camera, id, 24));
             assert_eq!(
                 found.iter().map(|m| m.id).collect::<Vec<_>>(),
                 [id],
                 "{tilt}"
             );
-            for (i, [x, y]) in [[-0.15, 0.15], [0.15, 0.15], [0.15, -0.15], [-0.15, -0.15]]
-                .into_iter()
-                .enumerate()
-            {
-                let (truth, _) = camera.project([x, y, 0.0].into()).unwrap();
-                let error = (found[0].corners_px[i] - truth).norm();
+            for (i, error) in errors_px(&found[0], &camera).into_iter().enumerate() {
                 assert!(error < 0.15, "{id} at {tilt}, corner {i}: {error}");
             }
         }
@@ -324,10 +293,10 @@ mod tests {
             let on_sheet = (left..left + 552).contains(&x) && (top..top + 552).contains(&y);
             match on_sheet {
                 true => sheet[(x - left, y - top)],
-                false => LinearRgb::BLACK.add_scaled_grey(0.3),
+                false => LinearRgb::grey(0.3),
             }
         });
-        let found = find_markers(&crate::filter::gaussian_blur(&sharp, 6.0));
+        let found = find_markers(&gaussian_blur(&sharp, 6.0));
         assert_eq!(found.iter().map(|m| m.id).collect::<Vec<_>>(), [3]);
         let [x, y] = [left, top].map(|from| from as f64 + 69.0);
         let truth = [[0.0, 0.0], [414.0, 0.0], [414.0, 414.0], [0.0, 414.0]];
@@ -338,7 +307,7 @@ mod tests {
     }
 
     /// A photo of one marker on a grey table, and its camera.
-    fn photo(id: u32, tilt: f64, fill: f64, k: u64) -> (Image<LinearRgb>, crate::Camera) {
+    fn photo(id: u32, tilt: f64, fill: f64, k: u64) -> (Image<LinearRgb>, Camera) {
         let scenario = Scenario {
             image: [320, 240],
             focal_px: 300.0,
@@ -347,12 +316,7 @@ mod tests {
             ..Scenario::default()
         };
         let camera = scenario.tilted(tilt).view(11, k).camera;
-        let sheet = Pyramid::new(printed(id, 16));
-        let seen = super::super::project_picture(&sheet, &camera, 0.0, [0.4, 0.4]);
-        let alpha = Pyramid::new(Image::filled(128, 128, crate::Coverage(1.0)));
-        let alpha = super::super::project_picture(&alpha, &camera, 0.0, [0.4, 0.4]);
-        let seen = seen.zip_map(&alpha, |p, a| p.add_scaled_grey(0.3 * (1.0 - a.0)));
-        (seen, camera)
+        (on_table(&camera, id, 16), camera)
     }
 
     /// Normal noise, as the sum of twelve uniform numbers.
@@ -367,19 +331,20 @@ mod tests {
                 .map(|i| uniform(12 * (y * width + x) + i))
                 .sum::<f32>()
                 - 6.0;
-            photo[(x, y)].add_scaled_grey(sigma * noise)
+            photo[(x, y)] + LinearRgb::grey(sigma * noise)
         })
     }
 
-    /// Distances of a found marker's corners from the truth, in those that its standard deviation
-    /// makes expect.
-    fn ratios(found: &Marker, camera: &crate::Camera) -> [f64; 4] {
-        let places = [[-0.15, 0.15], [0.15, 0.15], [0.15, -0.15], [-0.15, -0.15]];
+    /// Distances of a found marker's corners from the truth.
+    fn errors_px(found: &Marker, camera: &Camera) -> [f64; 4] {
+        let truth = corner_points([0.3; 2]).map(|corner| camera.project(corner).unwrap().0);
+        [0, 1, 2, 3].map(|i| (found.corners_px[i] - truth[i]).norm())
+    }
+
+    /// The same in those that its standard deviation makes expect.
+    fn ratios(found: &Marker, camera: &Camera) -> [f64; 4] {
         let expected = found.sigma_px * (std::f64::consts::PI / 2.0).sqrt();
-        [0, 1, 2, 3].map(|i| {
-            let [x, y] = places[i];
-            (found.corners_px[i] - camera.project([x, y, 0.0].into()).unwrap().0).norm() / expected
-        })
+        errors_px(found, camera).map(|error| error / expected)
     }
 
     #[test]
@@ -390,7 +355,7 @@ mod tests {
                 let (sharp, camera) = photo(k as u32 * 6, tilt, fill, k);
                 for (blur, all) in [0.0, 0.7, 1.2].into_iter().zip(&mut all) {
                     let photo = if blur > 0.0 {
-                        crate::filter::gaussian_blur(&sharp, blur)
+                        gaussian_blur(&sharp, blur)
                     } else {
                         sharp.clone()
                     };
@@ -413,20 +378,6 @@ mod tests {
                     "{tilt} degrees, {blur}: {mean} of {}",
                     all.len()
                 );
-            }
-        }
-    }
-
-    trait Grey {
-        fn add_scaled_grey(self, grey: f32) -> Self;
-    }
-
-    impl Grey for LinearRgb {
-        fn add_scaled_grey(self, grey: f32) -> Self {
-            Self {
-                r: self.r + grey,
-                g: self.g + grey,
-                b: self.b + grey,
             }
         }
     }
@@ -454,7 +405,7 @@ mod tests {
         assert!(find_markers(&Image::new(0, 0)).is_empty());
         let noise = Image::from_fn(200, 200, |x, y| {
             let v = ((x * 7919 + y * 104_729) % 97) as f32 / 97.0;
-            LinearRgb { r: v, g: v, b: v }
+            LinearRgb::grey(v)
         });
         assert!(find_markers(&noise).is_empty());
     }

@@ -2,7 +2,7 @@ use super::*;
 use crate::composite::frame;
 use crate::geom::{Point3, Pose, Quad, Vector3};
 use crate::pixel::PremulRgba;
-use crate::scene::{AreaLight, LightShape};
+use crate::scene::AreaLight;
 use std::sync::Arc;
 
 /// Thirty millimetres at f/2, in focus half a metre away.
@@ -77,7 +77,7 @@ fn a_point_spreads_over_its_circle() {
         let dot = picture(|x, y| vec![sample(1, depth, 1.0, 1.0); usize::from((x, y) == (32, 24))]);
         let soft = softened(&dot, LENS);
         let (mut sum, mut spread) = (0.0, 0.0);
-        for [x, y] in places(&soft) {
+        for (x, y) in pixels_of(&soft) {
             let light = f64::from(soft.flat(x, y).color.g);
             sum += light;
             spread += light * (x as f64 - 32.0).powi(2);
@@ -101,7 +101,7 @@ fn what_is_in_focus_keeps_its_bits() {
         [above, below][..(x + y) % 3].to_vec()
     });
     let soft = softened(&deep, LENS);
-    for [x, y] in places(&deep) {
+    for (x, y) in pixels_of(&deep) {
         assert_eq!(soft.at(x, y), deep.at(x, y), "{x} {y}");
     }
 }
@@ -200,14 +200,7 @@ fn shadows_beyond_the_border_spread_into_the_picture() {
         aperture_m: 0.06,
         focus_m: 0.4,
     };
-    let lamp = AreaLight {
-        shape: LightShape::Rectangle,
-        position: [0.0, 0.0, 1.0],
-        target: [0.0; 3],
-        size: [0.01; 2],
-        power: 10.0,
-        color: LinearRgb::WHITE,
-    };
+    let lamp = AreaLight::new([0.0, 0.0, 1.0], [0.01; 2], 10.0);
     let plain = shot(Some(lens)).with_light(lamp);
     let small = plain
         // Its shadow ends at the left border, between two nodes.

@@ -1,6 +1,6 @@
 //! How many labels each class has, and how large its boxes are.
 
-use super::{Checked, CheckedBox};
+use super::Checked;
 use crate::dataset::Part;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::plot::Table;
@@ -67,15 +67,11 @@ impl Checked {
     }
 
     fn class_notes(&self, class: usize) -> impl Iterator<Item = Diagnostic> {
-        self.parts_without_label(class)
-            .chain(self.rare_class(class))
-    }
-
-    fn parts_without_label(&self, class: usize) -> impl Iterator<Item = Diagnostic> {
         let parts = Part::ALL.into_iter();
         parts
             .filter(move |&part| self.empty_part != Some(part) && self.count(class, part) == 0)
             .map(move |part| self.no_label_in(part, class))
+            .chain(self.rare_class(class))
     }
 
     fn no_label_in(&self, part: Part, class: usize) -> Diagnostic {
@@ -87,34 +83,23 @@ impl Checked {
     fn rare_class(&self, class: usize) -> Option<Diagnostic> {
         let (rows, all) = (*self.rows.get(class)?, self.boxes.len());
         let is_rare = rows > 0 && (rows as f64) < RARE_LABEL_SHARE * all as f64;
-        is_rare.then(|| rare_class_note(&self.classes[class], rows, all))
+        is_rare.then(|| {
+            let name = &self.classes[class];
+            let message = format!("class \"{name}\" has only {rows} of {all} labels");
+            Diagnostic::note(Code::RareClass, message)
+        })
     }
 
     fn tiny_boxes(&self) -> Option<Diagnostic> {
-        let count = self.boxes.iter().filter(|b| b.is_tiny()).count();
-        (count > 0).then(|| tiny_boxes_note(count))
-    }
-}
-
-impl CheckedBox {
-    fn is_tiny(&self) -> bool {
-        self.sides
-            .is_some_and(|sides| sides.iter().any(|side| *side < TINY_SIDE_SHARE))
+        let sides = self.boxes.iter().filter_map(|b| b.sides);
+        let tiny = sides.filter(|sides| sides.iter().any(|side| *side < TINY_SIDE_SHARE));
+        let (count, percent) = (tiny.count(), 100.0 * TINY_SIDE_SHARE);
+        let message = format!("{count} boxes are below {percent:.0} % of the image's side");
+        (count > 0).then(|| Diagnostic::note(Code::TinyBoxes, message))
     }
 }
 
 /// Of numbers in order.
 fn min_median_max(sorted: &[f64]) -> Option<[f64; 3]> {
     Some([*sorted.first()?, sorted[sorted.len() / 2], *sorted.last()?])
-}
-
-fn tiny_boxes_note(count: usize) -> Diagnostic {
-    let percent = 100.0 * TINY_SIDE_SHARE;
-    let message = format!("{count} boxes are below {percent:.0} % of the image's side");
-    Diagnostic::note(Code::TinyBoxes, message)
-}
-
-fn rare_class_note(name: &str, rows: usize, all: usize) -> Diagnostic {
-    let message = format!("class \"{name}\" has only {rows} of {all} labels");
-    Diagnostic::note(Code::RareClass, message)
 }

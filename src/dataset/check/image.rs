@@ -7,7 +7,6 @@ use crate::dataset::yolo::MIN_SIDE_PX;
 use crate::dataset::{Part, YoloSet};
 use crate::diagnostic::Code;
 use crate::eval::GroundTruth;
-use crate::image::Image;
 use crate::io;
 use crate::pixel::PremulRgba;
 use std::path::{Path, PathBuf};
@@ -63,19 +62,18 @@ impl CheckedImage {
 
     fn read_pixels(&mut self, folder: &Path) {
         let finding = match io::read::<PremulRgba>(folder.join(&self.path)) {
-            Ok(picture) if shorter_side(&picture) >= MIN_SIDE_PX as usize => {
-                self.thumbnail = Some(Thumbnail::new(&picture.map(|p| p.color())));
-                return;
+            Ok(picture) => {
+                let (w, h) = picture.size();
+                if w.min(h) >= MIN_SIDE_PX as usize {
+                    self.thumbnail = Some(Thumbnail::new(&picture.map(|p| p.color())));
+                    return;
+                }
+                let message = format!("{w} x {h} pixels, expected at least {MIN_SIDE_PX} a side");
+                Finding::in_file(&self.path, Code::SmallImage, message)
             }
-            Ok(picture) => self.too_small(picture.size()),
             Err(e) => Finding::unreadable(folder, &self.path, &e),
         };
         self.findings.push(finding);
-    }
-
-    fn too_small(&self, (w, h): (usize, usize)) -> Finding {
-        let message = format!("{w} x {h} pixels, expected at least {MIN_SIDE_PX} a side");
-        Finding::in_file(&self.path, Code::SmallImage, message)
     }
 
     fn read_labels(&mut self, folder: &Path, class_count: Option<usize>) {
@@ -92,10 +90,6 @@ impl CheckedImage {
         self.rows = rows;
         self.findings.extend(findings);
     }
-}
-
-fn shorter_side(picture: &Image<PremulRgba>) -> usize {
-    picture.width().min(picture.height())
 }
 
 fn size_and_checksum(file: &Path) -> Option<(u64, u32)> {

@@ -33,14 +33,12 @@ pub(super) fn read_rows(
 
 /// The columns of each row that is not empty, with its line.
 fn split_rows(text: &str) -> Vec<(usize, Vec<&str>)> {
-    (1..)
-        .zip(text.lines().map(columns_of))
+    let rows = text.lines();
+    let rows = rows.map(|row| row.split_whitespace().collect::<Vec<_>>());
+    let numbered = (1..).zip(rows);
+    numbered
         .filter(|(_, columns)| !columns.is_empty())
         .collect()
-}
-
-fn columns_of(row: &str) -> Vec<&str> {
-    row.split_whitespace().collect()
 }
 
 /// What the rows of a file must look like.
@@ -83,21 +81,13 @@ impl RowFormat {
     }
 
     fn check_columns(&self, count: usize) -> Result<(), String> {
-        if self.allows_columns(count) {
-            return Ok(());
-        }
         let expected = match self.outlines {
+            false if count == 5 => return Ok(()),
             false => "5",
+            true if count >= 7 && count % 2 == 1 => return Ok(()),
             true => "a class and at least 3 pairs as in the file's other rows",
         };
         Err(format!("{count} columns, expected {expected}"))
-    }
-
-    fn allows_columns(&self, count: usize) -> bool {
-        match self.outlines {
-            false => count == 5,
-            true => count >= 7 && count % 2 == 1,
-        }
     }
 
     fn check_class(&self, text: &str) -> Result<(), String> {

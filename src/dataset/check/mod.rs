@@ -144,7 +144,7 @@ impl Checked {
     fn new(findings: Vec<Finding>, images: &[CheckedImage], yaml: &DataYaml) -> Self {
         let boxes: Vec<CheckedBox> = images.iter().flat_map(boxes_of).collect();
         // Only for classes that have a name: `nc` may claim any number of others.
-        let mut rows = vec![0; yaml.names().len()];
+        let mut rows = vec![0; yaml.names.len()];
         for class in boxes.iter().map(|b| b.class) {
             if let Some(count) = rows.get_mut(class) {
                 *count += 1;
@@ -155,7 +155,7 @@ impl Checked {
             images: images.len(),
             rows,
             boxes,
-            classes: yaml.names().to_vec(),
+            classes: yaml.names.clone(),
             ..Self::default()
         }
     }
@@ -330,24 +330,18 @@ impl Checker<'_> {
 
     /// The lines that are as they were written; the others are findings.
     fn good_lines(&mut self, lines: NumberedLines) -> Vec<(usize, JournalLine)> {
-        let lines = lines.into_iter();
-        lines
-            .filter_map(|(i, line)| Some((i, self.good_line(i, line)?)))
-            .collect()
-    }
-
-    fn good_line(
-        &mut self,
-        i: usize,
-        line: std::result::Result<JournalLine, String>,
-    ) -> Option<JournalLine> {
-        line.inspect_err(|e| self.add_damaged_line(i, e)).ok()
-    }
-
-    fn add_damaged_line(&mut self, i: usize, error: &str) {
-        let message = format!("not a line of a journal: {error}");
-        let finding = Finding::in_line(JOURNAL, i, Code::BadJournalLine, message);
-        self.findings.push(finding);
+        let mut good = Vec::new();
+        for (i, line) in lines {
+            match line {
+                Ok(line) => good.push((i, line)),
+                Err(error) => {
+                    let message = format!("not a line of a journal: {error}");
+                    let finding = Finding::in_line(JOURNAL, i, Code::BadJournalLine, message);
+                    self.findings.push(finding);
+                }
+            }
+        }
+        good
     }
 
     fn find_changed_files(&mut self, lines: &[(usize, JournalLine)]) {

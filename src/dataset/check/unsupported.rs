@@ -63,14 +63,11 @@ fn find_in(dataset: &Path, path: PathBuf, options: &SettleOptions) -> Option<Fin
 
 /// How the dataset's objects fell; the defaults where that is not known.
 fn settle_options(dataset: &Path) -> SettleOptions {
-    settle_table(dataset)
+    let identity = folder::identity(dataset).ok().flatten();
+    let settle = identity.and_then(|identity| identity.pointer("/recipe/scene/settle").cloned());
+    settle
         .and_then(|settle| serde_json::from_value(settle).ok())
         .unwrap_or_default()
-}
-
-fn settle_table(dataset: &Path) -> Option<serde_json::Value> {
-    let identity = folder::identity(dataset).ok()??;
-    identity.pointer("/recipe/scene/settle").cloned()
 }
 
 /// The objects of a sidecar file that nothing holds up.
@@ -81,14 +78,10 @@ fn unsupported_in(path: &Path, options: &SettleOptions) -> Result<Vec<String>> {
 }
 
 fn describe(id: usize, object: &Object) -> String {
-    let height = height_of(&object.placement);
-    format!("object {id} (\"{}\"), {height:.2} m up", object.asset)
-}
-
-fn height_of(placement: &Placement) -> f64 {
-    match placement {
+    let height = match &object.placement {
         Placement::At(pose) => pose.translation.z,
         Placement::Drop { height, .. } => *height,
         Placement::Gone => 0.0,
-    }
+    };
+    format!("object {id} (\"{}\"), {height:.2} m up", object.asset)
 }

@@ -13,11 +13,8 @@ impl Fitting<'_> {
         let scene = &self.config.scene;
         let before = (knob.get)(scene);
         let Some(difference) = difference else {
-            return unfitted(
-                knob.key,
-                range_text(before),
-                "nothing could be measured".into(),
-            );
+            let why = "nothing could be measured".into();
+            return unfitted(knob.key, range_text(before), why);
         };
         let mut key = unfitted(knob.key, range_text(before), describe(knob, difference));
         if let Some(fitted) = knob.fitted(scene, difference) {
@@ -100,13 +97,8 @@ impl Fitting<'_> {
         let number = Path::new(picture)
             .file_stem()
             .and_then(|stem| stem.to_str()?.parse().ok());
-        let recipe = &self.config.scene;
-        let explained = |k: u64| {
-            self.pipeline
-                .explain_with(recipe, self.options.seed, k)
-                .ok()
-        };
-        let scene = number.and_then(explained);
+        let (recipe, seed) = (&self.config.scene, self.options.seed);
+        let scene = number.and_then(|k| self.pipeline.explain_with(recipe, seed, k).ok());
         scene.map_or_else(String::new, |(scene, _)| scene.plate)
     }
 }

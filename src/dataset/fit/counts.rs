@@ -156,12 +156,17 @@ fn between(nodes: &[(usize, Moments)], objects: usize) -> Moments {
 
 /// How many pictures have each number of labels.
 pub(super) fn label_histogram(counts: &[usize]) -> Vec<f64> {
+    redrawn_histogram(counts, &vec![1; counts.len()])
+}
+
+/// The same when pictures are drawn so often.
+pub(super) fn redrawn_histogram(counts: &[usize], times: &[u32]) -> Vec<f64> {
     let most = counts.iter().copied().max().unwrap_or(0);
-    let mut times = vec![0.0; most + 1];
-    for labels in counts {
-        times[*labels] += 1.0;
+    let mut histogram = vec![0.0; most + 1];
+    for (labels, times) in counts.iter().zip(times) {
+        histogram[*labels] += f64::from(*times);
     }
-    times
+    histogram
 }
 
 /// The weights of numbers of objects that explain how many pictures have each number of labels.

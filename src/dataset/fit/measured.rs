@@ -1,10 +1,10 @@
 //! Labelled pictures and what their pixels are like around the labels.
 
 use super::statistics::Weighted;
+use crate::dataset::contact_sheet::shrunk;
 use crate::dataset::page::beside::PixelStatistics;
 use crate::dataset::page::labelled_pictures::{LabelledPicture, LabelledSet, ShareBox};
 use crate::error::Result;
-use crate::filter::resize;
 use crate::image::Image;
 use crate::io;
 use crate::light::{plate_blur, plate_noise};
@@ -115,9 +115,8 @@ impl PixelMeasures {
     fn read(picture: &LabelledPicture, width: usize) -> Option<Self> {
         let read = io::read::<LinearRgb>(&picture.path);
         let read = read.inspect_err(|error| log::warn!("{error}")).ok()?;
-        let shrunk = shrunk_to(read, width);
         let boxes = picture.boxes.as_deref().unwrap_or_default();
-        Self::around(&shrunk, boxes)
+        Self::around(&shrunk(&read, width), boxes)
     }
 
     /// Of a picture and its surroundings of boxes.
@@ -160,14 +159,6 @@ impl PixelMeasures {
 /// Luminance of mid grey, and the slope of sRGB's curve there, codes of 8 bits for a unit of light.
 const MID_GREY: f64 = 0.18;
 const CODES_PER_LIGHT: f64 = 255.0 * 1.055 / 2.4 * 2.719;
-
-fn shrunk_to(picture: Image<LinearRgb>, width: usize) -> Image<LinearRgb> {
-    let (w, h) = picture.size();
-    if w <= width {
-        return picture;
-    }
-    resize(&picture, width, (h * width).div_ceil(w).max(1))
-}
 
 /// The picture without its labels: what is in a box is no number.
 fn surroundings(picture: &Image<LinearRgb>, boxes: &[ShareBox]) -> Image<LinearRgb> {

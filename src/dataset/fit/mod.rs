@@ -257,10 +257,8 @@ fn check_labels(folder: &Path, real: &MeasuredSet) -> Result<()> {
     if real.set.boxes().next().is_some() {
         return Ok(());
     }
-    Err(Error::file(
-        folder,
-        "no label, expected images with YOLO labels",
-    ))
+    let what = "no label, expected images with YOLO labels";
+    Err(Error::file(folder, what))
 }
 
 /// A range as TOML.

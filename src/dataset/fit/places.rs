@@ -1,7 +1,7 @@
 //! Where objects of a recipe come to lie, how many there are and how large they look: fitted to labels
 //! by falls.
 
-use super::counts::{self, LabelOdds, label_histogram};
+use super::counts::{self, LabelOdds, label_histogram, redrawn_histogram};
 use super::falls::{Fall, FallPlan, log_size};
 use super::knobs::{Difference, SCALE, three_digits};
 use super::measured::MeasuredSet;
@@ -82,7 +82,9 @@ impl Fitting<'_> {
             }
         }
         match falls.is_empty() {
-            true => Err(no_rest()),
+            true => Err(Error::Unsettled {
+                what: "no objects came to rest in any fall".into(),
+            }),
             false => Ok(falls),
         }
     }
@@ -198,7 +200,10 @@ impl Fitting<'_> {
         };
         (lever.set)(&mut self.config.scene, range);
         match range.min == range.max {
-            true => Ok(candidates.swap_remove(fitted.best).of_recipe()),
+            true => Ok(Candidate {
+                value: None,
+                ..candidates.swap_remove(fitted.best)
+            }),
             // The falls of its best value are not those of the range.
             false => self.candidate(None, times),
         }
@@ -267,7 +272,7 @@ fn redrawn_counts(counts: &[usize], own: &Candidate, seed: u64) -> Vec<RedrawnCo
     let pictures = rounds(counts.len(), seed).zip(0..);
     let redrawn = pictures.map(|(times, round)| {
         let odds = LabelOdds::redrawn(&own.falls, most, (!seed, round));
-        let times = histogram_of(counts, &times);
+        let times = redrawn_histogram(counts, &times);
         RedrawnCounts {
             weights: counts::object_weights(&odds, &times),
             odds,
@@ -351,11 +356,8 @@ fn describe_objects(
     redrawn: &[RedrawnCounts],
     gain: &Bootstrapped,
 ) -> String {
-    let mean = |r: &RedrawnCounts| counts::mean_of(&r.weights);
-    let interval = interval(
-        counts::mean_of(&own.weights),
-        redrawn.iter().map(mean).collect(),
-    );
+    let means = redrawn.iter().map(|r| counts::mean_of(&r.weights));
+    let interval = interval(counts::mean_of(&own.weights), means.collect());
     let [low, middle, high] = counts::deciles(&own.weights);
     let likelier = gain.interval();
     format!(
@@ -379,15 +381,6 @@ fn unexplained(labels: f64) -> String {
     )
 }
 
-/// How many pictures have each number of labels, when pictures are drawn so often.
-fn histogram_of(counts: &[usize], times: &[u32]) -> Vec<f64> {
-    let mut histogram = vec![0.0; counts.iter().copied().max().unwrap_or(0) + 1];
-    for (labels, times) in counts.iter().zip(times) {
-        histogram[*labels] += f64::from(*times);
-    }
-    histogram
-}
-
 fn label_moments(falls: &[Fall]) -> Option<[f64; 2]> {
     let labels: Vec<Weighted> = falls
         .iter()
@@ -395,11 +388,6 @@ fn label_moments(falls: &[Fall]) -> Option<[f64; 2]> {
         .collect();
     let moments = Moments::new(&labels)?;
     Some([moments.mean, moments.variance.sqrt()])
-}
-
-fn no_rest() -> Error {
-    let what = "no objects came to rest in any fall".into();
-    Error::Unsettled { what }
 }
 
 fn describe_lever(lever: &Lever, candidates: &[Candidate], fitted: &FittedLever) -> String {
@@ -429,14 +417,11 @@ fn count_text(count: &Count) -> String {
     match count {
         Count::Uniform(range) => range_text(*range),
         Count::Weighted { values, weights } => {
-            format!("{{ values = {values:?}, weights = {} }}", listed(weights))
+            let weights: Vec<String> = weights.iter().map(f64::to_string).collect();
+            let weights = weights.join(", ");
+            format!("{{ values = {values:?}, weights = [{weights}] }}")
         }
     }
-}
-
-fn listed(numbers: &[f64]) -> String {
-    let texts: Vec<String> = numbers.iter().map(f64::to_string).collect();
-    format!("[{}]", texts.join(", "))
 }
 
 #[cfg(feature = "settle")]

@@ -2,7 +2,7 @@
 
 use super::knobs::{KNOBS, Knob, three_digits};
 use super::measured::PixelMeasures;
-use super::statistics::{Moments, equally_weighted};
+use super::statistics::{Moments, Weighted};
 use super::{FittedKey, range_text, unfitted};
 use crate::dataset::{DatasetConfig, Pipeline};
 use crate::error;
@@ -33,10 +33,8 @@ pub(super) struct MeasuredPlate {
 pub(super) fn measured_plates(pipeline: &Pipeline) -> error::Result<Vec<MeasuredPlate>> {
     let mut measured = Vec::new();
     for place in pipeline.places() {
-        let wall = place
-            .background
-            .wall
-            .map(|wall| format!("{} m", wall.height));
+        let wall = place.background.wall;
+        let wall = wall.map(|wall| format!("{} m", wall.height));
         let pixels = PixelMeasures::around(&place.plate()?.image, &[]);
         measured.extend(pixels.map(|pixels| MeasuredPlate {
             name: place.background.name.clone(),
@@ -63,13 +61,8 @@ pub(super) fn table(plates: &[MeasuredPlate]) -> Table {
             plate.pixels.exposure_ev,
             plate.pixels.red_over_blue.exp(),
         ];
-        let numbers = numbers.map(|number| format!("{number:.2}"));
-        table.push(
-            [plate.name.clone()]
-                .into_iter()
-                .chain(numbers)
-                .chain([plate.wall.clone()]),
-        );
+        let [noise, blur, light, color] = numbers.map(|number| format!("{number:.2}"));
+        table.push([&plate.name, &noise, &blur, &light, &color, &plate.wall]);
     }
     table
 }
@@ -149,8 +142,8 @@ fn varied(knob: &Knob, before: Range, plates: &[MeasuredPlate]) -> Result<Range,
         ));
     }
     let values = plates.iter().map(|plate| (knob.of_picture)(&plate.pixels));
-    let values: Vec<f64> = values.collect();
-    let moments = Moments::new(&equally_weighted(&values)).ok_or("nothing could be measured")?;
+    let values: Vec<Weighted> = values.map(|value| (value, 1.0)).collect();
+    let moments = Moments::new(&values).ok_or("nothing could be measured")?;
     let (middle, sigma) = ((knob.to_measure)(before.min), moments.variance.sqrt());
     let [min, max] = [middle - sigma, middle + sigma].map(|end| (knob.to_value)(end));
     Ok(Range::new(three_digits(min), three_digits(max)))

@@ -5,8 +5,8 @@ use super::counts::{LabelOdds, object_weights, redrawn_falls};
 use super::falls::{Fall, log_size};
 use super::statistics::{Grouped, Moments, Weighted, earth_mover, rounds};
 use crate::dataset::fit::range_text;
+use crate::dataset::page::beside::in_pixels;
 use crate::eval::iou;
-use crate::geom::BBox;
 use crate::scene::{Collider, Range, Recipe};
 use std::collections::BTreeMap;
 
@@ -29,10 +29,8 @@ const SPREAD: Lever = Lever {
     values: &[0.0, 0.25, 0.5, 0.75, 1.0],
     set: |recipe, range| recipe.start.spread = Some(range),
     before: |recipe| {
-        recipe
-            .start
-            .spread
-            .map_or_else(|| "none".into(), range_text)
+        let spread = recipe.start.spread;
+        spread.map_or_else(|| "none".into(), range_text)
     },
     text: range_text,
 };
@@ -112,16 +110,8 @@ fn of_each(
 }
 
 fn share_iou(a: &[f64; 4], b: &[f64; 4]) -> f64 {
-    iou(&box_of(a), &box_of(b))
-}
-
-fn box_of(&[x, y, w, h]: &[f64; 4]) -> BBox {
-    BBox {
-        x0: x - w / 2.0,
-        y0: y - h / 2.0,
-        x1: x + w / 2.0,
-        y1: y + h / 2.0,
-    }
+    // In a picture of one pixel, shares are pixels.
+    iou(&in_pixels(*a, [1.0; 2]), &in_pixels(*b, [1.0; 2]))
 }
 
 /// A value of a lever, its falls, and the numbers of objects that explain the real labels with it.
@@ -131,7 +121,7 @@ pub(super) struct Candidate {
     pub(super) falls: Vec<Fall>,
     pub(super) odds: LabelOdds,
     pub(super) weights: Vec<f64>,
-    places: [Grouped; MEASURES],
+    pub(super) places: [Grouped; MEASURES],
 }
 
 impl Candidate {
@@ -147,14 +137,6 @@ impl Candidate {
             odds,
             weights,
             places,
-        }
-    }
-
-    /// The same, once the recipe has its value.
-    pub(super) fn of_recipe(self) -> Self {
-        Self {
-            value: None,
-            ..self
         }
     }
 
@@ -315,6 +297,10 @@ mod tests {
         Candidate::new(value, falls.collect(), &[0.0, 0.0, 0.0, 0.0, 20.0])
     }
 
+    fn chosen(candidates: &[Candidate], real: &[Vec<[f64; 4]>], seed: u64) -> FittedLever {
+        choose(candidates, &places_of(real.iter().map(Vec::as_slice)), seed)
+    }
+
     #[test]
     fn the_spread_that_leaves_labels_there_is_chosen() {
         let mut candidates = vec![candidate(None, 0.6)];
@@ -324,10 +310,7 @@ mod tests {
                 .iter()
                 .map(|s| candidate(Some(*s), 0.2 + 0.8 * s)),
         );
-        let fitted = |reach: f64| {
-            let real = pictures(reach, 2);
-            choose(&candidates, &places_of(real.iter().map(Vec::as_slice)), 3)
-        };
+        let fitted = |reach: f64| chosen(&candidates, &pictures(reach, 2), 3);
         let wide = fitted(1.0).range.unwrap();
         assert!(wide.min >= 0.75 && wide.max == 1.0, "{wide:?}");
         let heap = fitted(0.2).range.unwrap();
@@ -343,9 +326,8 @@ mod tests {
             let others = [0.7, 0.9].map(|reach| candidate_of(Some(reach), falls(reach)));
             let mut candidates = vec![candidate_of(None, falls(0.8))];
             candidates.extend(others);
-            let real = pictures(0.8, !seed);
-            let places = places_of(real.iter().map(Vec::as_slice));
-            choose(&candidates, &places, *seed).range.is_some()
+            let fitted = chosen(&candidates, &pictures(0.8, !seed), *seed);
+            fitted.range.is_some()
         };
         let changed = (0..100).filter(changed).count();
         assert!(changed <= 10, "{changed} of 100");
@@ -353,16 +335,9 @@ mod tests {
 
     #[test]
     fn labels_that_are_alone_are_far_from_such_that_are_not() {
-        let heap = |_| Fall {
-            objects: 4,
-            boxes: vec![[0.5, 0.5, 0.1, 0.1]],
-            plate: String::new(),
-        };
-        let times = [0.0, 0.0, 0.0, 0.0, 20.0];
-        let alone = Candidate::new(None, (0..9).map(heap).collect(), &times);
+        let alone = candidate_of(None, vec![vec![[0.5, 0.5, 0.1, 0.1]]; 9]);
         let candidates = [alone, candidate(Some(0.5), 0.6)];
-        let real = pictures(1.0, 2);
-        let fitted = choose(&candidates, &places_of(real.iter().map(Vec::as_slice)), 3);
+        let fitted = chosen(&candidates, &pictures(1.0, 2), 3);
         assert_eq!((fitted.best, fitted.agreement), (1, 1.0));
     }
 

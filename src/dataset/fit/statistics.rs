@@ -98,11 +98,6 @@ impl Grouped {
     }
 }
 
-/// Values that all weigh the same.
-pub(super) fn equally_weighted(values: &[f64]) -> Vec<Weighted> {
-    values.iter().map(|value| (*value, 1.0)).collect()
-}
-
 /// How often each of `count` pictures is drawn in every round of a bootstrap.
 pub(super) fn rounds(count: usize, seed: u64) -> impl Iterator<Item = Vec<u32>> {
     (0..ROUNDS).map(move |round| drawn(count, seed, round))

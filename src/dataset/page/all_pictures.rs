@@ -6,7 +6,6 @@ use crate::geom::BBox;
 use crate::io;
 use crate::plot::Page;
 use std::collections::BTreeMap;
-
 use std::path::{Path, PathBuf};
 
 /// So many pictures stand behind one heading, and so many are listed: a page stays below a few MB.
@@ -26,26 +25,20 @@ pub(super) fn add_all(page: &mut Page, folder: &Path, summary: &Summary, page_fo
     }
     let more = summary.glances.len() - count;
     if more > 0 {
-        page.html(&link_to_others(more, &root));
+        let address = address(&root.join("images"));
+        page.html(&format!(
+            "<p>{more} more are in <a href=\"{address}\">images</a>.</p>\n"
+        ));
     }
-}
-
-fn link_to_others(count: usize, root: &Path) -> String {
-    let address = address(&root.join("images"));
-    format!("<p>{count} more are in <a href=\"{address}\">images</a>.</p>\n")
 }
 
 fn absolute_path(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
 }
 
-/// The first and the last index.
-fn index_range(samples: &[SampleSummary]) -> [u64; 2] {
-    [samples.first(), samples.last()].map(|sample| sample.map_or(0, |sample| sample.index))
-}
-
 fn listed_together(samples: &[SampleSummary], root: &Path) -> String {
-    let [first, last] = index_range(samples);
+    let ends = [samples.first(), samples.last()];
+    let [first, last] = ends.map(|sample| sample.map_or(0, |sample| sample.index));
     let items: String = samples.iter().map(|sample| listed(sample, root)).collect();
     format!(
         "<details><summary>{first:06} to {last:06}</summary><div class=\"all\">\n{items}</div></details>\n"
@@ -105,13 +98,9 @@ fn address(path: &Path) -> String {
 }
 
 fn percent_encoded(byte: u8) -> String {
-    if is_plain_in_address(byte) {
+    if byte.is_ascii_alphanumeric() || b"/.-_".contains(&byte) {
         char::from(byte).to_string()
     } else {
         format!("%{byte:02X}")
     }
-}
-
-fn is_plain_in_address(byte: u8) -> bool {
-    byte.is_ascii_alphanumeric() || b"/.-_".contains(&byte)
 }

@@ -4,7 +4,7 @@ use super::distributions::extremes;
 use super::labelled_pictures::{LabelledPicture, LabelledSet};
 use super::outlier::short;
 use crate::color::encode_srgb8;
-use crate::filter::resize;
+use crate::dataset::contact_sheet::shrunk;
 use crate::geom::BBox;
 use crate::image::Image;
 use crate::io;
@@ -14,7 +14,6 @@ use crate::plot::{Page, Table, escaped, heat::heat_map};
 use crate::quantile::quantile;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
-
 use std::path::Path;
 
 /// So many pictures of each set are read to compare their pixels, and so wide.
@@ -125,7 +124,10 @@ fn percentages(set: &LabelledSet, i: usize) -> Vec<f64> {
 type PixelMeasure = (&'static str, fn(&PixelStatistics) -> f64);
 
 fn measure_pixels(set: &LabelledSet) -> [Measure; 4] {
-    let statistics = pixel_statistics(set);
+    let pictures = set.spread(MAX_MEASURED_PICTURES).into_par_iter();
+    let statistics: Vec<PixelStatistics> = pictures
+        .filter_map(|picture| PixelStatistics::read(&picture.path))
+        .collect();
     let measures: [PixelMeasure; 4] = [
         ("brightness of a picture, mean code", |s| s.brightness),
         ("contrast of a picture, standard deviation of codes", |s| {
@@ -137,13 +139,6 @@ fn measure_pixels(set: &LabelledSet) -> [Measure; 4] {
         }),
     ];
     measures.map(|(title, value)| (title, statistics.iter().map(value).collect()))
-}
-
-fn pixel_statistics(set: &LabelledSet) -> Vec<PixelStatistics> {
-    set.spread(MAX_MEASURED_PICTURES)
-        .into_par_iter()
-        .filter_map(|picture| PixelStatistics::read(&picture.path))
-        .collect()
 }
 
 /// What the pixels of a picture are like as a whole, in codes of 8 bits.
@@ -164,11 +159,7 @@ impl PixelStatistics {
     }
 
     pub(in crate::dataset) fn of_whole(picture: &Image<LinearRgb>) -> Self {
-        Self::new(&shrunk(picture))
-    }
-
-    fn new(picture: &Image<LinearRgb>) -> Self {
-        let codes = picture.map(codes_of);
+        let codes = shrunk(picture, MEASURED_WIDTH_PX).map(codes_of);
         let luma = codes.map(|[r, g, b]| 0.299 * r + 0.587 * g + 0.114 * b);
         let spread = codes.map(channel_spread);
         let brightness = mean(luma.pixels().iter().copied());
@@ -190,12 +181,6 @@ fn detail(luma: &Image<f32>) -> f64 {
     )
 }
 
-fn shrunk(picture: &Image<LinearRgb>) -> Image<LinearRgb> {
-    let (w, h) = picture.size();
-    let width = w.min(MEASURED_WIDTH_PX);
-    resize(picture, width, (h * width).div_ceil(w).max(1))
-}
-
 fn mean(values: impl Iterator<Item = f32>) -> f64 {
     let (sum, count) = values.fold((0.0, 0_u64), |(sum, count), v| {
         (sum + f64::from(v), count + 1)
@@ -204,8 +189,6 @@ fn mean(values: impl Iterator<Item = f32>) -> f64 {
 }
 
 fn figure(set: &LabelledSet, picture: &LabelledPicture) -> Option<Figure> {
-    // Boxes are shares of the picture, which is a square of 100 then; the frame gives it its shape
-    // back.
     let header = io::read_header(&picture.path).ok()?;
     let size = [header.width as f64, header.height as f64];
     let figure = Figure::whole(&picture.path, size);
@@ -223,7 +206,8 @@ fn mark(figure: &Figure, set: &LabelledSet, class: u32, b: &BBox) -> String {
     marked_box(b, &name, letter, top, &color, "stroke-width=\"2\"")
 }
 
-fn in_pixels([x, y, w, h]: [f64; 4], size: [f64; 2]) -> BBox {
+/// A box by its centre and sides, shares of a picture.
+pub(in crate::dataset) fn in_pixels([x, y, w, h]: [f64; 4], size: [f64; 2]) -> BBox {
     let [x0, x1] = [x - w / 2.0, x + w / 2.0].map(|x| x * size[0]);
     let [y0, y1] = [y - h / 2.0, y + h / 2.0].map(|y| y * size[1]);
     BBox { x0, y0, x1, y1 }
@@ -256,17 +240,12 @@ fn percent(share: Option<&f64>) -> String {
     }
 }
 
-fn boxes_by_class(set: &LabelledSet) -> BTreeMap<String, f64> {
+/// Share of each class among the labels, percent.
+fn shares_by_class(set: &LabelledSet) -> BTreeMap<String, f64> {
     let mut counts: BTreeMap<String, f64> = BTreeMap::new();
     for (class, _) in set.boxes() {
         *counts.entry(set.name(*class)).or_default() += 1.0;
     }
-    counts
-}
-
-/// Share of each class among the labels, percent.
-fn shares_by_class(set: &LabelledSet) -> BTreeMap<String, f64> {
-    let counts = boxes_by_class(set);
     let all = counts.values().sum::<f64>().max(1.0);
     counts
         .into_iter()
@@ -328,6 +307,7 @@ impl ComparedMeasure {
             theirs,
         }
     }
+
     fn row(&self) -> [String; 4] {
         [
             self.title.to_owned(),
@@ -336,12 +316,13 @@ impl ComparedMeasure {
             format!("{:.2}", self.distance),
         ]
     }
+
     /// Shares of each in bins of the same width: ours as bars, the others as steps.
     pub(in crate::dataset) fn svg(&self) -> String {
         let [w, h] = FRAME;
         let (width, height) = (ROOM_LEFT + w + ROOM_RIGHT, ROOM_ABOVE + h + ROOM_BELOW);
         let (line, title) = (ROOM_ABOVE + h, escaped(self.title));
-        let range = self.range();
+        let range = extremes(self.ours.iter().chain(&self.theirs));
         let (histograms, words) = (self.histograms(range), self.words(range));
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" \
@@ -365,11 +346,6 @@ impl ComparedMeasure {
         text_at([ROOM_LEFT, ROOM_ABOVE - 10.0], "start", self.title)
             + &text_at([ROOM_LEFT, below], "start", &short(low))
             + &text_at([ROOM_LEFT + w, below], "end", &short(high))
-    }
-
-    /// Least and greatest value of both, apart from each other.
-    fn range(&self) -> [f64; 2] {
-        extremes(self.ours.iter().chain(&self.theirs))
     }
 }
 

@@ -133,23 +133,15 @@ fn choice_histogram(what: &str, counts: &BTreeMap<String, u64>) -> Histogram {
 }
 
 pub(super) fn extremes<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2] {
-    let [low, high] = values
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    let ends = values
         .into_iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], widened);
-    with_room([low, high])
-}
-
-/// A range of one value is widened, so that it has bins.
-fn with_room([low, high]: [f64; 2]) -> [f64; 2] {
-    if low < high {
-        [low, high]
-    } else {
-        [low - 0.5, low + 0.5]
+        .fold(none, |[low, high], value| [value.min(low), value.max(high)]);
+    // A range of one value is widened, so that it has bins.
+    match ends {
+        [low, high] if low < high => [low, high],
+        [low, _] => [low - 0.5, low + 0.5],
     }
-}
-
-fn widened([low, high]: [f64; 2], value: &f64) -> [f64; 2] {
-    [value.min(low), value.max(high)]
 }
 
 /// Adds what can be seen, and how large it is.

@@ -2,7 +2,7 @@
 
 use crate::dataset::{SampleSummary, Summary, YoloSet};
 use crate::error::{Error, Result};
-use crate::eval::{self, GroundTruth, is_image};
+use crate::eval::{self, is_image};
 use crate::geom::BBox;
 use crate::io;
 use rayon::prelude::*;
@@ -29,12 +29,6 @@ pub(in crate::dataset) struct LabelledPicture {
     pub(in crate::dataset) path: PathBuf,
     /// None for a picture without a label file.
     pub(in crate::dataset) boxes: Option<Vec<ShareBox>>,
-}
-
-impl LabelledPicture {
-    pub(in crate::dataset) fn file_name(&self) -> Cow<'_, str> {
-        self.path.file_name().unwrap_or_default().to_string_lossy()
-    }
 }
 
 impl LabelledSet {
@@ -100,6 +94,10 @@ impl LabelledSet {
 }
 
 impl LabelledPicture {
+    pub(in crate::dataset) fn file_name(&self) -> Cow<'_, str> {
+        self.path.file_name().unwrap_or_default().to_string_lossy()
+    }
+
     pub(in crate::dataset) fn read(path: PathBuf) -> Result<Self> {
         let label = label_beside(&path);
         let boxes = label.map(|label| read_boxes(&label)).transpose()?;
@@ -127,13 +125,9 @@ fn read_boxes(label: &Path) -> Result<Vec<ShareBox>> {
     // In a picture of one pixel, pixels are shares.
     let image = eval::yolo_sheet(&io::read_text(label)?, "", [1, 1])
         .map_err(|what| Error::file(label, what))?;
-    Ok(image.truth.iter().map(share_box).collect())
-}
-
-fn share_box(truth: &GroundTruth) -> ShareBox {
-    let center = truth.bbox.center();
-    let shares = [center.x, center.y, truth.bbox.width(), truth.bbox.height()];
-    (truth.class, shares)
+    let boxes = image.truth.iter();
+    let boxes = boxes.map(|truth| (truth.class, shares_of(&truth.bbox, [1.0; 2])));
+    Ok(boxes.collect())
 }
 
 /// Classes and images of a YOLO dataset, or all images below a folder.
@@ -262,19 +256,10 @@ mod tests {
             [Some(vec![(1, [0.5, 0.25, 0.5, 0.5])]), None, Some(vec![])]
         );
         std::fs::write(root.path().join("labels/a.txt"), "x\n").unwrap();
-        assert!(
-            LabelledSet::read(root.path())
-                .err()
-                .unwrap()
-                .to_string()
-                .contains("a.txt: line 1")
-        );
-        assert!(
-            LabelledSet::read(&root.path().join("labels"))
-                .err()
-                .unwrap()
-                .to_string()
-                .contains("no images")
-        );
+        for (folder, expected) in [("", "a.txt: line 1"), ("labels", "no images")] {
+            let refused = LabelledSet::read(&root.path().join(folder)).err();
+            let told = refused.unwrap().to_string();
+            assert!(told.contains(expected), "{told}");
+        }
     }
 }

@@ -89,14 +89,10 @@ fn title(folder: &Path) -> String {
     format!("Dataset {name}")
 }
 
-fn escaped_document(document: &serde_json::Value) -> String {
-    let text = serde_json::to_string_pretty(document).unwrap_or_default();
-    text.lines().map(|line| escaped(line) + "\n").collect()
-}
-
 /// Adds what the dataset was made from.
 fn add_identity(page: &mut Page, summary: &Summary) {
-    let recipe = escaped_document(&summary.identity);
+    let text = serde_json::to_string_pretty(&summary.identity).unwrap_or_default();
+    let recipe: String = text.lines().map(|line| escaped(line) + "\n").collect();
     page.heading("Made from").html(&format!(
         "<details><summary>dataset.json</summary><pre>{recipe}</pre></details>\n"
     ));
@@ -105,7 +101,7 @@ fn add_identity(page: &mut Page, summary: &Summary) {
 fn facts(summary: &Summary) -> Table {
     let [train, val] = summary.images;
     let images = train + val;
-    let [objects, labels] = object_counts(summary);
+    let [objects, labels] = sum_by_part(summary.balance.iter().flatten().copied());
     let images = format!("{images} ({train} for training, {val} for validation)");
     let objects = format!("{objects}, {labels} of them with a label");
     let version = format!("petcomp {}", identity_text(summary, "petcomp"));
@@ -124,11 +120,6 @@ fn identity_text(summary: &Summary, name: &str) -> String {
     value.trim_matches('"').to_owned()
 }
 
-/// Objects of all classes, and how many of them have a label.
-fn object_counts(summary: &Summary) -> [u64; 2] {
-    sum_by_part(summary.balance.iter().flatten().copied())
-}
-
 fn balance(summary: &Summary) -> Table {
     let mut table = Table::new([
         "class",
@@ -137,14 +128,9 @@ fn balance(summary: &Summary) -> Table {
         "objects, val",
         "labels, val",
     ]);
-    for (name, [[a, b], [c, d]]) in summary.classes.iter().zip(&summary.balance) {
-        table.push([
-            name.clone(),
-            a.to_string(),
-            b.to_string(),
-            c.to_string(),
-            d.to_string(),
-        ]);
+    for (name, counts) in summary.classes.iter().zip(&summary.balance) {
+        let counts = counts.iter().flatten().map(u64::to_string);
+        table.push([name.clone()].into_iter().chain(counts));
     }
     table
 }
@@ -155,10 +141,6 @@ fn add_background_notes(page: &mut Page, summary: &Summary) {
     let Some(notes) = notes.filter(|notes| !notes.is_empty()) else {
         return;
     };
-    page.heading("Backgrounds").table(&background_notes(notes));
-}
-
-fn background_notes(notes: &serde_json::Map<String, serde_json::Value>) -> Table {
     let mut table = Table::new(["background", "what to look at"]);
     for (name, texts) in notes {
         let texts = texts.as_array().into_iter().flatten();
@@ -166,7 +148,7 @@ fn background_notes(notes: &serde_json::Map<String, serde_json::Value>) -> Table
             table.push([name, text]);
         }
     }
-    table
+    page.heading("Backgrounds").table(&table);
 }
 
 fn add_rejected(page: &mut Page, summary: &Summary) {
@@ -175,19 +157,15 @@ fn add_rejected(page: &mut Page, summary: &Summary) {
         page.text("None.");
         return;
     }
-    page.text(&format!(
-        "{} scenes did not come to rest and were resampled.",
-        summary.rejected.len()
-    ))
-    .table(&rejected_scenes(summary));
-}
-
-fn rejected_scenes(summary: &Summary) -> Table {
     let mut table = Table::new(["image", "why"]);
     for (k, why) in &summary.rejected {
         table.push([format!("{k:06}"), why.clone()]);
     }
-    table
+    page.text(&format!(
+        "{} scenes did not come to rest and were resampled.",
+        summary.rejected.len()
+    ))
+    .table(&table);
 }
 
 fn times(summary: &Summary) -> Table {

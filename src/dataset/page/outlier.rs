@@ -13,13 +13,13 @@ pub(crate) struct Feature<'a> {
 
 /// A row that is unlike the others.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Outlier {
+pub struct Outlier {
     /// Which row.
-    pub(crate) row: usize,
+    pub row: usize,
     /// How far it is from the median, in robust standard deviations.
-    pub(crate) deviations: f64,
+    pub deviations: f64,
     /// By what: `objects 17, as a rule 8`.
-    pub(crate) why: String,
+    pub why: String,
 }
 
 /// From so many deviations on a value is unlike the others ([Iglewicz and Hoaglin 1993]).
@@ -102,59 +102,35 @@ pub(crate) fn short(value: f64) -> String {
 mod tests {
     use super::*;
 
+    fn feature(name: &str, values: Vec<f64>) -> Feature<'_> {
+        Feature { name, values }
+    }
+
     #[test]
     fn what_is_far_off_is_named_with_what_is_usual() {
         let values = vec![8.0, 7.0, 9.0, 8.0, 8.0, 40.0, 7.0, f64::NAN];
-        let features = [
-            Feature {
-                name: "objects",
-                values,
-            },
-            Feature {
-                name: "same",
-                values: vec![1.0; 8],
-            },
-        ];
+        let features = [feature("objects", values), feature("same", vec![1.0; 8])];
         let found = outliers(&features);
         assert_eq!(found.len(), 1);
         assert_eq!(
             (found[0].row, found[0].why.as_str()),
             (5, "objects 40, as a rule 8")
         );
-        assert!(
-            outliers(&[]).is_empty()
-                && outliers(&[Feature {
-                    name: "",
-                    values: vec![]
-                }])
-                .is_empty()
-        );
+        assert_eq!(outliers(&[]), []);
+        assert_eq!(outliers(&[feature("", vec![])]), []);
     }
 
     #[test]
     fn what_reads_the_same_is_not_unlike() {
         let mut values = vec![100.0; 99];
         values.push(99.999);
-        assert_eq!(
-            outliers(&[Feature {
-                name: "seen, %",
-                values
-            }]),
-            []
-        );
+        assert_eq!(outliers(&[feature("seen, %", values)]), []);
     }
 
     #[test]
     fn one_that_differs_from_all_the_same_is_found() {
         let mut values = vec![0.0; 99];
         values.push(3.0);
-        assert_eq!(
-            outliers(&[Feature {
-                name: "retries",
-                values
-            }])[0]
-                .row,
-            99
-        );
+        assert_eq!(outliers(&[feature("retries", values)])[0].row, 99);
     }
 }

@@ -1,9 +1,8 @@
 //! Pictures of a dataset with their labels over them.
 
 use super::color_of;
-use super::outlier::{Feature, Outlier, outliers};
-use crate::dataset::SampleRecord;
-use crate::dataset::{SampleSummary, ShownSample, Summary, UnlabelledReason};
+use super::outlier::{Feature, outliers};
+use crate::dataset::{SampleRecord, SampleSummary, ShownSample, Summary, UnlabelledReason};
 use crate::error::Result;
 use crate::eval::class_name;
 use crate::geom::{BBox, Point2};
@@ -12,6 +11,7 @@ use crate::label::{Distractor, ObjectLabel, trace};
 use crate::plot::{Page, escaped};
 use rayon::prelude::*;
 use std::fmt::Write;
+use std::path::Path;
 
 /// Boxes and masks are shown and hidden without a script: a ticked box decides what its neighbours
 /// look like. Words over the objects are for enlarged pictures; the list of all pictures loads what
@@ -38,7 +38,7 @@ const UNLABELLED: &str = "#c8c8c8";
 pub(super) fn add_samples(
     page: &mut Page,
     summary: &Summary,
-    folder: &std::path::Path,
+    folder: &Path,
     count: usize,
 ) -> Result<()> {
     add_controls(page, summary);
@@ -46,7 +46,10 @@ pub(super) fn add_samples(
     page.text(&describe_selection(&selected, summary.glances.len()));
     let figures: Vec<Figure> = selected
         .par_iter()
-        .map(|sample| sample_figure(summary, folder, sample))
+        .map(|sample| {
+            let shown = summary.shown(folder, sample.row)?;
+            figure(&shown, &summary.classes, sample.why.as_deref())
+        })
         .collect::<Result<_>>()?;
     page.html("<div class=\"samples\">\n")
         .html(&gallery("picture", &figures))
@@ -63,45 +66,27 @@ fn add_controls(page: &mut Page, summary: &Summary) {
     }
 }
 
-fn sample_figure(
-    summary: &Summary,
-    folder: &std::path::Path,
-    sample: &SelectedSample,
-) -> Result<Figure> {
-    let shown = summary.shown(folder, sample.row)?;
-    figure(&shown, &summary.classes, sample.why.as_deref())
-}
-
 fn switch_html((id, text, on): (&str, &str, bool)) -> String {
     let checked = if on { " checked" } else { "" };
     format!("<input type=\"checkbox\" id=\"{id}\"{checked}><label for=\"{id}\">{text}</label>\n")
 }
 
 fn describe_selection(selected: &[SelectedSample], all: usize) -> String {
-    let (count, outliers) = (selected.len(), count_outliers(selected));
+    let outliers = selected.iter().filter(|sample| sample.why.is_some());
+    let (count, outliers) = (selected.len(), outliers.count());
     format!(
         "{count} of {all} pictures: first {outliers} that are unlike the others, with what sets them apart, then others evenly \
          spread. Click one to enlarge it; Escape and the arrow keys work too."
     )
 }
 
-fn count_outliers(selected: &[SelectedSample]) -> usize {
-    let outliers = selected.iter().filter(|sample| sample.why.is_some());
-    outliers.count()
-}
-
 /// Colours of the classes and kinds of lines.
 fn legend(summary: &Summary) -> String {
-    let classes = class_keys(&summary.classes);
+    let classes = (0..).zip(&summary.classes);
+    let classes = classes.map(|(class, name)| legend_key(&color_of(class), name));
+    let classes: String = classes.collect();
     let unlabelled = legend_key(UNLABELLED, "outline of an object without a label");
     format!("<p>{classes}{unlabelled}</p>\n")
-}
-
-fn class_keys(classes: &[String]) -> String {
-    let classes = (0..).zip(classes);
-    classes
-        .map(|(class, name)| legend_key(&color_of(class), name))
-        .collect()
 }
 
 fn legend_key(fill: &str, text: &str) -> String {
@@ -122,7 +107,11 @@ struct SelectedSample {
 /// Pictures to show: those unlike the others, at most half, then others evenly spread.
 fn select_samples(samples: &[SampleSummary], count: usize) -> Vec<SelectedSample> {
     let outliers = outliers(&features(samples)).into_iter().take(count / 2);
-    let mut selected: Vec<_> = outliers.map(SelectedSample::from).collect();
+    let selected = outliers.map(|outlier| SelectedSample {
+        row: outlier.row,
+        why: Some(outlier.why),
+    });
+    let mut selected: Vec<_> = selected.collect();
     let mut rest: Vec<usize> = (0..samples.len()).collect();
     rest.retain(|&row| selected.iter().all(|sample| sample.row != row));
     let count = (count - selected.len()).min(rest.len());
@@ -131,15 +120,6 @@ fn select_samples(samples: &[SampleSummary], count: usize) -> Vec<SelectedSample
         why: None,
     }));
     selected
-}
-
-impl From<Outlier> for SelectedSample {
-    fn from(outlier: Outlier) -> Self {
-        Self {
-            row: outlier.row,
-            why: Some(outlier.why),
-        }
-    }
 }
 
 /// The title of a measure and how the summary of a sample gives it.
@@ -203,16 +183,12 @@ fn drawing_of(record: &SampleRecord, classes: &[String], letter: f64) -> String 
 
 fn figure_caption(record: &SampleRecord, why: Option<&str>) -> String {
     let (index, part, objects) = (record.index, record.part.name(), &record.labels.objects);
-    let (labelled, all) = (count_labelled(record), objects.len());
+    let labelled = objects
+        .iter()
+        .filter(|object| UnlabelledReason::of(object, record).is_none());
+    let (labelled, all) = (labelled.count(), objects.len());
     let why = why.map_or(String::new(), |why| format!("; {why}"));
     format!("{index:06} {part}: {labelled} of {all} objects labelled{why}")
-}
-
-fn count_labelled(record: &SampleRecord) -> usize {
-    let objects = record.labels.objects.iter();
-    objects
-        .filter(|object| UnlabelledReason::of(object, record).is_none())
-        .count()
 }
 
 fn box_of(object: &ObjectLabel, classes: &[String], letter: f64) -> String {
@@ -276,22 +252,13 @@ fn outline_of_distractor(distractor: &Distractor) -> String {
 }
 
 fn why_unlabelled(object: &ObjectLabel, reason: UnlabelledReason) -> String {
-    let above = ids_above(object);
+    let above = object.covered_by.iter().map(|id| id.0.to_string());
+    let above: Vec<String> = above.collect();
     // Objects can hide pixels of each other where their outlines only touch.
     if reason != UnlabelledReason::Covered || above.is_empty() {
         return reason.description().to_owned();
     }
     format!("under {}", above.join(", "))
-}
-
-fn ids_above(object: &ObjectLabel) -> Vec<String> {
-    let above = object.covered_by.iter();
-    above.map(|id| id.0.to_string()).collect()
-}
-
-fn svg_points(ring: &[Point2<f64>]) -> String {
-    let points = ring.iter().map(|p| format!("{:.1},{:.1}", p.x, p.y));
-    points.collect::<Vec<_>>().join(" ")
 }
 
 fn titled_rings(rings: &[Vec<Point2<f64>>], title: &str) -> String {
@@ -300,7 +267,8 @@ fn titled_rings(rings: &[Vec<Point2<f64>>], title: &str) -> String {
 }
 
 fn titled_polygon(ring: &[Point2<f64>], title: &str) -> String {
-    let points = svg_points(ring);
+    let points = ring.iter().map(|p| format!("{:.1},{:.1}", p.x, p.y));
+    let points = points.collect::<Vec<_>>().join(" ");
     format!(
         "<polygon points=\"{points}\" fill=\"none\" pointer-events=\"all\" stroke=\"{UNLABELLED}\" stroke-width=\"1.5\">\
          <title>{title}</title></polygon>"

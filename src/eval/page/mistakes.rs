@@ -70,7 +70,7 @@ pub(crate) fn add_to(
 
 fn add_galleries(page: &mut Page, run: &Run, mistakes: &[Mistake], options: &EvalReportOptions) {
     let (misses, detections): (Vec<&Mistake>, Vec<&Mistake>) =
-        mistakes.iter().partition(|m| m.kind == MistakeKind::Missed);
+        mistakes.iter().partition(|m| m.is_miss());
     let title = "False alarms and wrong classes, the surest first";
     add_figures(page, ["alarm", title], run, &detections, options);
     let title = "Boxes that were missed, the largest first";
@@ -127,7 +127,7 @@ fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<F
         .inspect_err(|error| log::warn!("{error}"))
         .ok()?;
     figure.drawing = shown.drawing(&view, &FigureCanvas::new(&figure, options));
-    figure.caption = shown.caption(options);
+    figure.caption = format!("{}: {}", shown.sheet.image, shown.describe(options));
     Some(figure)
 }
 
@@ -177,14 +177,10 @@ impl<'a> ShownMistake<'a> {
         }
     }
 
-    fn is_miss(&self) -> bool {
-        self.mistake.kind == MistakeKind::Missed
-    }
-
     /// The box that is wrong.
     fn wrong(&self) -> BBox {
         let [truth, found] = self.boxes();
-        if self.is_miss() { truth } else { found }.unwrap_or_default()
+        if self.mistake.is_miss() { truth } else { found }.unwrap_or_default()
     }
 
     /// Of the truth and of the detection.
@@ -223,7 +219,7 @@ impl<'a> ShownMistake<'a> {
     }
 
     fn truth_mark(&self, truth: &GroundTruth, canvas: &FigureCanvas<'_>) -> String {
-        let color = if self.is_miss() { WRONG } else { TRUTH };
+        let color = if self.mistake.is_miss() { WRONG } else { TRUTH };
         let words = format!("true: {}", canvas.class_name(truth.class));
         canvas.marked(&truth.bbox, &words, color, THICK)
     }
@@ -238,7 +234,7 @@ impl<'a> ShownMistake<'a> {
     }
 
     fn found_style(&self) -> (&'static str, &'static str) {
-        if self.is_miss() {
+        if self.mistake.is_miss() {
             (FOUND, DASHED)
         } else {
             (WRONG, THICK_DASHED)
@@ -294,10 +290,6 @@ impl<'a> ShownMistake<'a> {
         seen.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
         seen.truncate(MAX_OTHER_BOXES);
         seen
-    }
-
-    fn caption(&self, options: &EvalReportOptions) -> String {
-        format!("{}: {}", self.sheet.image, self.describe(options))
     }
 
     fn describe(&self, options: &EvalReportOptions) -> String {
@@ -376,16 +368,12 @@ fn is_same<T>(own: Option<&T>, other: &T) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::eval::tests::bbox;
 
     /// Twenty thousand detections of a crowd made each of 48 pictures two megabytes.
     #[test]
     fn a_picture_shows_no_more_than_the_surest_detections_around_a_mistake() {
-        let at = |i: usize| BBox {
-            x0: i as f64,
-            y0: 0.0,
-            x1: i as f64 + 2.0,
-            y1: 2.0,
-        };
+        let at = |i: usize| bbox(i as f64, 0.0, 2.0, 2.0);
         let found = |i: usize| Detection::new(0, at(i), 0.3 + (i % 7) as f64 / 10.0);
         let truth = (0..300).map(|i| GroundTruth::new(0, at(i))).collect();
         let sheet = EvalImage {
@@ -404,12 +392,7 @@ mod tests {
             iou: 0.0,
         };
         let shown = ShownMistake::new(&run, &mistake);
-        let view = BBox {
-            x0: 100.0,
-            y0: 0.0,
-            x1: 1_400.0,
-            y1: 2.0,
-        };
+        let view = bbox(100.0, 0.0, 1_300.0, 2.0);
         let (boxes, detections) = (
             shown.other_boxes(&view),
             shown.other_detections(&view, 0.25),

@@ -156,7 +156,8 @@ fn write_parts(
     all: &[Metrics],
     options: &EvalReportOptions,
 ) -> Result<Page> {
-    let confusion = first_confusion(runs, options);
+    let first = runs.first().map_or(&[][..], |run| &run.sheets[..]);
+    let confusion = Confusion::new(first, &options.confusion);
     let shown = shown_classes(all, &confusion);
     let mut page = Page::new("Detections against the truth");
     let [scores, factors] = [scores_table(all), factors_table(runs, options)];
@@ -167,15 +168,6 @@ fn write_parts(
         add_run(folder, &mut page, run, &confusion, &shown, options)?;
     }
     Ok(page)
-}
-
-fn first_confusion(runs: &[Run], options: &EvalReportOptions) -> Confusion {
-    let first = runs.first().map(|run| confusion_of(run, options));
-    first.unwrap_or_default()
-}
-
-fn confusion_of(run: &Run, options: &EvalReportOptions) -> Confusion {
-    Confusion::new(&run.sheets, &options.confusion)
 }
 
 fn add_classes(
@@ -314,17 +306,12 @@ fn add_mistakes(
 
 /// All classes in order, or of many those with the most mistakes, those first.
 fn shown_classes(all: &[Metrics], confusion: &Confusion) -> Vec<u32> {
-    let known = known_classes(all, confusion);
+    let known: BTreeSet<u32> = scored_classes(all).chain(confusion.classes()).collect();
     if known.len() <= MAX_SHOWN_CLASSES {
         return known.into_iter().collect();
     }
     let worst = confusion.worst().into_iter();
     worst.take(MAX_SHOWN_CLASSES).collect()
-}
-
-/// Those of the truth and those that were found.
-fn known_classes(all: &[Metrics], confusion: &Confusion) -> BTreeSet<u32> {
-    scored_classes(all).chain(confusion.classes()).collect()
 }
 
 /// The classes in the truth of the runs, one after the other.
@@ -377,17 +364,13 @@ pub fn scores_table(all: &[Metrics]) -> Table {
         table.push(metrics.scores_row("coco", &metrics.coco.scores, String::new()));
     }
     if all.len() > 1 {
-        table.push(spread_row(&spread_of(all)));
+        let maps: Vec<f64> = all.iter().map(|m| m.yolov5.map()).collect();
+        table.push(spread_row(&Spread::from_values(&maps)));
     }
     table
 }
 
 /// Of the mAP by YOLOv5's definition.
-fn spread_of(all: &[Metrics]) -> Spread {
-    let maps: Vec<f64> = all.iter().map(|m| m.yolov5.map()).collect();
-    Spread::from_values(&maps)
-}
-
 fn spread_row(spread: &Spread) -> [String; 7] {
     // The normal distribution knows no ends, a mAP does.
     let interval = spread
@@ -602,16 +585,11 @@ const _: () = assert!(THRESHOLDS > 5, "mAP@0.75 is the sixth threshold");
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::eval::tests::bbox;
     use crate::eval::{Detection, GroundTruth};
-    use crate::geom::BBox;
 
     fn run(name: &str, confidence: f64) -> Run {
-        let bbox = BBox {
-            x0: 0.0,
-            y0: 0.0,
-            x1: 50.0,
-            y1: 40.0,
-        };
+        let bbox = bbox(0.0, 0.0, 50.0, 40.0);
         let truth = GroundTruth::new(0, bbox);
         let sheet = |image: &str, found: &[f64]| EvalImage {
             found: found
@@ -680,13 +658,17 @@ mod tests {
         assert_eq!(there(&["1-best.json", "3-notes.json", "factors.csv"]), 3);
     }
 
+    fn with_rounds(rounds: usize) -> EvalReportOptions {
+        EvalReportOptions {
+            rounds,
+            ..Default::default()
+        }
+    }
+
     #[test]
     fn an_interval_says_over_what_and_there_is_none_of_a_few_rounds() {
         let cells = |runs: &[Run], rounds| {
-            let options = EvalReportOptions {
-                rounds,
-                ..Default::default()
-            };
+            let options = with_rounds(rounds);
             let all: Vec<Metrics> = runs.iter().map(|run| Metrics::of(run, &options)).collect();
             let rows = scores_table(&all).rows.into_iter();
             rows.map(|row| row[6].clone()).collect::<Vec<String>>()
@@ -704,13 +686,7 @@ mod tests {
 
     #[test]
     fn metrics_have_no_interval_where_nothing_tells_of_other_images() {
-        let measured = |run: &Run, rounds| {
-            let options = EvalReportOptions {
-                rounds,
-                ..Default::default()
-            };
-            Metrics::of(run, &options)
-        };
+        let measured = |run: &Run, rounds| Metrics::of(run, &with_rounds(rounds));
         let two = run("p", 0.9);
         assert!(measured(&two, 40).map.range.is_some());
         let [mut one, mut lone, mut bare] = [(); 3].map(|()| two.clone());

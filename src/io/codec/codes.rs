@@ -204,37 +204,17 @@ impl ToFile for Srgba8 {
     }
 }
 
-/// Integer codes of a picture, channels interleaved.
-pub(crate) struct CodedImage<'a> {
-    pub(crate) width: usize,
-    pub(crate) height: usize,
-    pub(crate) names: &'a [&'a str],
-    pub(crate) codes: Codes,
-}
-
-/// Codes of 8 or 16 bits.
+/// Codes of 8 or 16 bits, channels interleaved.
 pub(crate) enum Codes {
     U8(Vec<u8>),
     U16(Vec<u16>),
 }
 
 impl Codes {
-    fn new<P: ToFile>(image: &Image<P>, bits: Bits) -> Self {
+    pub(crate) fn new<P: ToFile>(image: &Image<P>, bits: Bits) -> Self {
         match bits {
             Bits::Sixteen => Self::U16(interleaved(image, P::codes::<u16>)),
             _ => Self::U8(interleaved(image, P::codes::<u8>)),
-        }
-    }
-}
-
-impl CodedImage<'static> {
-    pub(crate) fn new<P: ToFile>(image: &Image<P>, bits: Bits) -> Self {
-        let (width, height) = image.size();
-        Self {
-            width,
-            height,
-            names: P::NAMES,
-            codes: Codes::new(image, bits),
         }
     }
 }

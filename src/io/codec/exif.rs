@@ -51,7 +51,7 @@ const DAMAGED_STARTS: [&str; 3] = [
 ];
 
 /// The part of the EXIF data that means something here.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct CameraNotes {
     pub(crate) orientation: Orientation,
     /// Focal length that would give the same view on 36 x 24 mm film, millimetres.
@@ -69,21 +69,6 @@ pub(crate) struct CameraNotes {
     pub(crate) color: Option<ColorDescription>,
     /// There are notes, and none of them can be read.
     pub(crate) unreadable: bool,
-}
-
-impl Default for CameraNotes {
-    fn default() -> Self {
-        Self {
-            orientation: Orientation(1),
-            focal_35mm: None,
-            focal_by_sensor: false,
-            digital_zoom: false,
-            size: None,
-            edited: false,
-            color: None,
-            unreadable: false,
-        }
-    }
 }
 
 impl CameraNotes {
@@ -122,7 +107,7 @@ impl CameraNotes {
     /// The same of a picture that stands upright already.
     pub(crate) fn upright(self) -> Self {
         Self {
-            orientation: Orientation(1),
+            orientation: Orientation::default(),
             ..self
         }
     }
@@ -134,7 +119,7 @@ impl CameraNotes {
         let taken = size.filter(|_| !edited && by_camera.is_none());
         let by_sensor = taken.and_then(|size| focal_35mm_by_sensor(exif, size));
         Self {
-            orientation: Orientation(orientation.unwrap_or(1)),
+            orientation: orientation.map(Orientation).unwrap_or_default(),
             focal_35mm: by_camera.or(by_sensor),
             focal_by_sensor: by_sensor.is_some(),
             digital_zoom: has_digital_zoom(exif),
@@ -187,12 +172,16 @@ fn count_pointers(file: &mut (impl BufRead + Seek)) -> std::io::Result<usize> {
     Ok(count)
 }
 
-fn is_big_tiff(header: &[u8]) -> bool {
+pub(super) fn is_big_tiff(header: &[u8]) -> bool {
     header.starts_with(b"II+\0") || header.starts_with(b"MM\0+")
 }
 
 /// So many bytes at a place in a file, or those up to its end.
-fn read_at(file: &mut (impl Read + Seek), place: u64, count: u64) -> std::io::Result<Vec<u8>> {
+pub(super) fn read_at(
+    file: &mut (impl Read + Seek),
+    place: u64,
+    count: u64,
+) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     file.seek(SeekFrom::Start(place))?;
     file.by_ref().take(count).read_to_end(&mut bytes)?;
@@ -201,7 +190,7 @@ fn read_at(file: &mut (impl Read + Seek), place: u64, count: u64) -> std::io::Re
 
 /// In which order a TIFF has the bytes of a number.
 #[derive(Clone, Copy)]
-enum TiffOrder {
+pub(super) enum TiffOrder {
     LittleEndian,
     BigEndian,
 }
@@ -225,7 +214,7 @@ impl TiffOrder {
         }
     }
 
-    fn number(self, bytes: &[u8]) -> u64 {
+    pub(super) fn number(self, bytes: &[u8]) -> u64 {
         let append = |number: u64, byte: &u8| (number << 8) | u64::from(*byte);
         match self {
             Self::LittleEndian => bytes.iter().rev().fold(0, append),
@@ -405,13 +394,8 @@ fn positive(exif: &Exif, tag: Tag) -> Option<f64> {
 
 /// A finite number.
 fn rational(exif: &Exif, tag: Tag) -> Option<f64> {
-    let number = first_rational(&exif.get_field(tag, In::PRIMARY)?.value)?;
-    number.is_finite().then_some(number)
-}
-
-fn first_rational(value: &Value) -> Option<f64> {
-    match value {
-        Value::Rational(values) => values.first().map(|v| v.to_f64()),
+    match &exif.get_field(tag, In::PRIMARY)?.value {
+        Value::Rational(values) => Some(values.first()?.to_f64()).filter(|v| v.is_finite()),
         _ => None,
     }
 }

@@ -152,29 +152,18 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     let mut light = vec![0_f32; width * height * 3];
     file.decoder
         .read_image(bytemuck::cast_slice_mut(&mut light))?;
-    if is_xyz {
-        convert_xyz(&mut light)?;
+    if is_xyz && let Some(matrix) = to_rec709(&XYZ_SPACE)? {
+        convert_primaries(&mut light, 3, &matrix);
     }
-    Ok(light_raster((width, height), light).upright(orientation))
-}
-
-fn light_raster((width, height): (usize, usize), light: Vec<f32>) -> Raster {
-    Raster {
+    let raster = Raster {
         width,
         height,
         names: default_names(3).unwrap_or_default(),
         samples: Samples::F32(light),
         display_encoded: false,
         premultiplied: false,
-    }
-}
-
-/// CIE XYZ as light of Rec. 709.
-fn convert_xyz(samples: &mut [f32]) -> Result<(), String> {
-    if let Some(matrix) = to_rec709(&XYZ_SPACE)? {
-        convert_primaries(samples, 3, &matrix);
-    }
-    Ok(())
+    };
+    Ok(raster.upright(orientation))
 }
 
 /// The header ends in time: its lines are kept, however many and long they are.

@@ -13,7 +13,8 @@ pub(crate) fn color_description(bytes: &[u8]) -> Option<ColorDescription> {
     let mut colors = own.iter().filter_map(color_of);
     let first = colors.next()?;
     // A profile says more than code points do.
-    Some(colors.find(is_profile).unwrap_or(first))
+    let profile = colors.find(|color| matches!(color, ColorDescription::Icc(_)));
+    Some(profile.unwrap_or(first))
 }
 
 /// Width and height of the primary picture the way up that the file says; none where it is cropped.
@@ -42,10 +43,6 @@ fn primary_properties(bytes: &[u8]) -> Option<Vec<HeifBox<'_>>> {
     let all = boxes(child(properties, b"ipco")?).enumerate();
     let own = all.filter(|(at, _)| numbers.contains(&(at + 1)));
     Some(own.map(|(_, property)| property).collect())
-}
-
-fn is_profile(description: &ColorDescription) -> bool {
-    matches!(description, ColorDescription::Icc(_))
 }
 
 /// A box without its header.

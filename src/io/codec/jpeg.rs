@@ -55,16 +55,12 @@ pub(crate) fn read_before_scan(file: &mut impl Read, limits: &Limits) -> Result<
 /// Appends a marker and its segment; returns the marker.
 fn append_segment(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<u8, Refusal> {
     let marker = append_marker(bytes, file)?;
-    let length = append_length(bytes, file)?;
-    append(bytes, file, length.saturating_sub(2))?;
-    Ok(marker)
-}
-
-/// Appends the length of a segment, which counts its own two bytes.
-fn append_length(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<usize, Refusal> {
     let at = bytes.len();
     append(bytes, file, 2)?;
-    Ok(u16::from_be_bytes([bytes[at], bytes[at + 1]]).into())
+    // It counts its own two bytes.
+    let length = usize::from(u16::from_be_bytes([bytes[at], bytes[at + 1]]));
+    append(bytes, file, length.saturating_sub(2))?;
+    Ok(marker)
 }
 
 /// Reads a marker that a segment follows.
@@ -243,11 +239,12 @@ fn is_marker(pair: &[u8]) -> bool {
     pair[0] == 0xff && !matches!(pair[1], 0 | 0xff | 0xd0..=0xd7)
 }
 
-/// A whole file from 8-bit codes of one or three channels.
+/// A whole file, of a quality of 1 to 100, from 8-bit codes of one or three channels.
 pub(crate) fn encode(
     (width, height): (usize, usize),
     codes: &[u8],
-    coding: JpegCoding,
+    quality: u8,
+    chroma: Chroma,
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>, String> {
     let [Ok(columns), Ok(rows)] = [width, height].map(u16::try_from) else {
@@ -260,22 +257,14 @@ pub(crate) fn encode(
         _ => ColorType::Rgb,
     };
     let mut bytes = Vec::new();
-    let mut encoder = Encoder::new(&mut bytes, coding.quality);
-    encoder.set_sampling_factor(coding.chroma.sampling_factor());
+    let mut encoder = Encoder::new(&mut bytes, quality);
+    encoder.set_sampling_factor(chroma.sampling_factor());
     // As cameras do; the colour of one pixel of each block would alias.
     encoder.set_chroma_subsampling_method(ChromaSubsamplingMethod::Average);
     let encoded = encoder.encode(codes, columns, rows, color);
     encoded.map_err(|e| e.to_string())?;
-    insert_comment(&mut bytes, &metadata.to_vec())?;
+    insert_comment(&mut bytes, metadata)?;
     Ok(bytes)
-}
-
-/// How much a JPEG file may lose.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct JpegCoding {
-    /// 1 to 100.
-    pub(crate) quality: u8,
-    pub(crate) chroma: Chroma,
 }
 
 /// How many samples of colour a JPEG file has beside those of brightness (ITU-T T.871).
@@ -307,8 +296,7 @@ impl Chroma {
 /// as one without pixels.
 pub fn through_jpeg(image: &Image<Srgb8>, quality: u8, chroma: Chroma) -> Option<Image<Srgb8>> {
     let codes = bytemuck::cast_slice(image.pixels());
-    let coding = JpegCoding { quality, chroma };
-    let file = encode(image.size(), codes, coding, &[]).ok()?;
+    let file = encode(image.size(), codes, quality, chroma, &[]).ok()?;
     let raster = decode(&file, &Limits::default()).ok()?;
     let Samples::U8(codes) = raster.samples else {
         return None;
@@ -318,7 +306,7 @@ pub fn through_jpeg(image: &Image<Srgb8>, quality: u8, chroma: Chroma) -> Option
 }
 
 /// Puts the notes into a comment segment right behind the start marker.
-fn insert_comment(jpeg: &mut Vec<u8>, notes: &Notes) -> Result<(), String> {
+fn insert_comment(jpeg: &mut Vec<u8>, notes: &[(String, String)]) -> Result<(), String> {
     if notes.is_empty() {
         return Ok(());
     }
@@ -392,11 +380,7 @@ mod tests {
     #[test]
     fn fewer_samples_of_color_are_means_of_their_pixels() {
         let columns: Vec<u8> = [[255, 0, 0], [0, 0, 255]].concat().repeat(16 * 8);
-        let coding = JpegCoding {
-            quality: 100,
-            chroma: Chroma::Quarter,
-        };
-        let file = encode((16, 16), &columns, coding, &[]).unwrap();
+        let file = encode((16, 16), &columns, 100, Chroma::Quarter, &[]).unwrap();
         let Samples::U8(codes) = decode(&file, &Limits::default()).unwrap().samples else {
             panic!("8 bits come back as 8 bits");
         };
@@ -410,19 +394,11 @@ mod tests {
     #[test]
     fn comments_come_back() {
         let notes = vec![("petcomp:seed".to_string(), "17".to_string())];
-        let coding = JpegCoding {
-            quality: 90,
-            chroma: Chroma::Quarter,
-        };
-        let bytes = encode((8, 8), &[90; 8 * 8 * 3], coding, &notes).unwrap();
+        let bytes = encode((8, 8), &[90; 8 * 8 * 3], 90, Chroma::Quarter, &notes).unwrap();
         let start = read_before_scan(&mut &bytes[..], &Limits::default()).unwrap();
         assert!(start.len() < bytes.len());
-        assert_eq!(
-            header(&start, bytes.len() as u64, &Limits::default())
-                .unwrap()
-                .metadata,
-            notes
-        );
+        let read = header(&start, bytes.len() as u64, &Limits::default()).unwrap();
+        assert_eq!(read.metadata, notes);
         assert!(decode(&bytes, &Limits::default()).is_ok());
     }
 }

@@ -243,17 +243,13 @@ pub struct SampleRows<'a> {
 impl SampleRows<'_> {
     /// A photo must not hide the share of a pixel that is missing.
     fn refuse_transparency(&self) -> Result<(), String> {
-        match self.count_transparent_colors()? {
+        let picked = Wanted::Color.pick(&self.raster.names)?;
+        match picked.get(3).map_or(0, |&a| self.count_transparent(a)) {
             0 => Ok(()),
             count => Err(format!(
                 "{count} pixels with alpha below 1, expected an opaque picture (put it over a background first)"
             )),
         }
-    }
-
-    fn count_transparent_colors(&self) -> Result<usize, String> {
-        let picked = Wanted::Color.pick(&self.raster.names)?;
-        Ok(picked.get(3).map_or(0, |&a| self.count_transparent(a)))
     }
 
     /// Pixels that are not opaque by channel `a`.
@@ -271,7 +267,10 @@ impl SampleRows<'_> {
         let colored = self.count_colored([r, g, b]);
         match alpha.first() {
             None if colored == 0 => Ok(r),
-            None => Err(not_a_matte(colored)),
+            None => {
+                let expected = Wanted::Coverage.expected();
+                Err(format!("{colored} coloured pixels, expected {expected}"))
+            }
             Some(&a) if colored == 0 && self.count_transparent(a) == 0 => Ok(r),
             Some(&a) if r != g => Ok(a),
             Some(_) => Err(Wanted::Coverage.missing_among(&self.raster.names)),
@@ -408,11 +407,6 @@ impl SampleRows<'_> {
         samples[self.rows.start * row..self.rows.end * row]
             .par_chunks_exact(self.raster.names.len())
     }
-}
-
-fn not_a_matte(colored: usize) -> String {
-    let expected = Wanted::Coverage.expected();
-    format!("{colored} coloured pixels, expected {expected}")
 }
 
 /// How far apart three channels lie.

@@ -1,6 +1,6 @@
 //! PNG: 8 or 16 bits, display-encoded as the file describes or as sRGB, straight alpha.
 
-use super::codes::{CodedImage, Codes};
+use super::codes::Codes;
 use super::profile::{ColorDescription, known_code_points};
 use super::raster::{Raster, Samples, default_names};
 use super::refusal::Refusal;
@@ -71,18 +71,11 @@ pub(crate) fn header(
 }
 
 fn texts(info: &png::Info<'_>) -> Notes {
-    let latin = info.uncompressed_latin1_text.iter().map(latin_note);
-    latin
-        .chain(info.utf8_text.iter().filter_map(utf8_note))
-        .collect()
-}
-
-fn latin_note(text: &png::text_metadata::TEXtChunk) -> (String, String) {
-    note(&text.keyword, &text.text)
-}
-
-fn utf8_note(text: &png::text_metadata::ITXtChunk) -> Option<(String, String)> {
-    Some(note(&text.keyword, &text.get_text().ok()?))
+    let latin = info.uncompressed_latin1_text.iter();
+    let latin = latin.map(|text| note(&text.keyword, &text.text));
+    let utf8 = info.utf8_text.iter();
+    let utf8 = utf8.filter_map(|text| Some(note(&text.keyword, &text.get_text().ok()?)));
+    latin.chain(utf8).collect()
 }
 
 /// How the file describes its colours, by the chunk that takes precedence (PNG 3rd edition, 4.3):
@@ -172,29 +165,22 @@ fn compression(effort: Quality) -> Compression {
 
 /// A whole file.
 pub(crate) fn encode(
-    picture: &CodedImage<'_>,
+    (width, height): (usize, usize),
+    channels: usize,
+    codes: &Codes,
     effort: Quality,
     metadata: &[(String, String)],
-) -> Result<Vec<u8>, String> {
+) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
-    write(&mut bytes, picture, effort, metadata).map_err(|e| e.to_string())?;
-    Ok(bytes)
-}
-
-fn write(
-    out: &mut Vec<u8>,
-    picture: &CodedImage<'_>,
-    effort: Quality,
-    metadata: &[(String, String)],
-) -> Result<(), png::EncodingError> {
-    let mut encoder = png::Encoder::new(out, picture.width as u32, picture.height as u32);
-    encoder.set_color(color_type(picture.names.len()));
+    let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
+    encoder.set_color(color_type(channels));
     encoder.set_compression(compression(effort));
-    if picture.names.len() > 1 {
+    if channels > 1 {
         encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
     }
     add_texts(&mut encoder, metadata)?;
-    write_codes(encoder, &picture.codes)
+    write_codes(encoder, codes)?;
+    Ok(bytes)
 }
 
 fn write_codes(
@@ -227,25 +213,13 @@ fn add_texts(
     encoder: &mut png::Encoder<'_, &mut Vec<u8>>,
     metadata: &[(String, String)],
 ) -> Result<(), png::EncodingError> {
-    for (key, value) in metadata {
-        add_text(encoder, key.clone(), value.clone())?;
+    for (key, value) in metadata.iter().cloned() {
+        match value.chars().all(|c| (c as u32) < 256) {
+            true => encoder.add_text_chunk(key, value)?,
+            false => encoder.add_itxt_chunk(key, value)?,
+        }
     }
     Ok(())
-}
-
-fn add_text(
-    encoder: &mut png::Encoder<'_, &mut Vec<u8>>,
-    key: String,
-    value: String,
-) -> Result<(), png::EncodingError> {
-    match is_latin(&value) {
-        true => encoder.add_text_chunk(key, value),
-        false => encoder.add_itxt_chunk(key, value),
-    }
-}
-
-fn is_latin(text: &str) -> bool {
-    text.chars().all(|c| (c as u32) < 256)
 }
 
 #[cfg(test)]

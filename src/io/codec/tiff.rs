@@ -2,8 +2,8 @@
 //! without alpha, in strips or tiles, planes side by side or apart. Other kinds are left to
 //! OpenImageIO.
 
-use super::codes::{CodedImage, Codes};
-use super::exif::CameraNotes;
+use super::codes::Codes;
+use super::exif::{CameraNotes, TiffOrder, is_big_tiff, read_at};
 use super::orient::Orientation;
 use super::raster::{Raster, Samples, default_names};
 use super::refusal::Refusal;
@@ -12,7 +12,7 @@ use crate::io::format::Format;
 use crate::io::header::{Header, lines_of_notes, notes_of_lines};
 use crate::io::limits::{Demand, Limits};
 use std::collections::BTreeMap;
-use std::io::{BufRead, Cursor, Read, Seek, SeekFrom};
+use std::io::{BufRead, Cursor, Read, Seek};
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::encoder::colortype::{self, Gray8, Gray16, Gray32Float, RGB8, RGB16, RGB32Float};
 use tiff::encoder::{TiffEncoder, TiffValue};
@@ -179,49 +179,31 @@ fn is_reduced(decoder: &mut Decoder<impl Read + Seek>) -> bool {
 }
 
 /// The first directory's tags, of a file of either byte order, classic or BigTIFF, with the value
-/// of those that are one number of 16 bits.
+/// of those that are one number of 16 bits; none of a directory that the file ends in.
 fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<BTreeMap<u16, u16>> {
-    let mut start = [0; 4];
-    file.read_exact(&mut start)?;
-    let (little, big) = (start.starts_with(b"II"), start.contains(&43));
-    // Bytes of an offset, of the number of entries, and in an entry between its tag and its value;
-    // BigTIFF states how long its offsets are, which is 8.
-    let (offset, count, between) = if big { (8, 8, 10) } else { (4, 2, 6) };
-    if big {
-        read_integer(file, 4, little)?;
+    let start = read_at(file, 0, 16)?;
+    let order = match start.starts_with(b"II") {
+        true => TiffOrder::LittleEndian,
+        false => TiffOrder::BigEndian,
+    };
+    // Where the directory's place is, bytes of the number of entries and of an entry, and where its
+    // value begins.
+    let (place, count, entry, value) = match is_big_tiff(&start) {
+        true => (8..16, 8, 20, 12),
+        false => (4..8, 2, 12, 8),
+    };
+    let place = order.number(start.get(place).unwrap_or_default());
+    let entries = order.number(&read_at(file, place, count)?);
+    let length = entries.min(u16::MAX.into()) * entry as u64;
+    let bytes = read_at(file, place.saturating_add(count), length)?;
+    if bytes.len() as u64 != length {
+        return Ok(BTreeMap::new());
     }
-    let directory = read_integer(file, offset, little)?;
-    file.seek(SeekFrom::Start(directory))?;
-    let entries = read_integer(file, count, little)?.min(u64::from(u16::MAX));
-    (0..entries)
-        .map(|_| read_tag(file, between, little))
-        .collect()
-}
-
-/// The tag of an entry, and the first 16 bits of its value, which so many bytes are between; the
-/// file is then behind the entry.
-fn read_tag(
-    file: &mut (impl Read + Seek),
-    between: i64,
-    little: bool,
-) -> std::io::Result<(u16, u16)> {
-    // Of the kind of the value, of 2 bytes, and of their number, as long as the value itself.
-    const KIND: i64 = 2;
-    let tag = read_integer(file, 2, little)? as u16;
-    file.seek_relative(between)?;
-    let value = read_integer(file, 2, little)? as u16;
-    file.seek_relative(between - KIND - 2)?;
-    Ok((tag, value))
-}
-
-/// An integer of at most 8 bytes.
-fn read_integer(file: &mut impl Read, bytes: usize, little: bool) -> std::io::Result<u64> {
-    let mut integer = [0; 8];
-    file.read_exact(&mut integer[..bytes])?;
-    if !little {
-        integer[..bytes].reverse();
-    }
-    Ok(u64::from_le_bytes(integer))
+    let tags = bytes.chunks_exact(entry).map(|tag| {
+        let [name, value] = [&tag[..2], &tag[value..][..2]];
+        (order.number(name) as u16, order.number(value) as u16)
+    });
+    Ok(tags.collect())
 }
 
 /// What OpenImageIO reads in wrong colours: CIELab in another white, and a palette that is not
@@ -600,12 +582,13 @@ fn left_by_inks<T: Copy + Into<u64> + TryFrom<u64> + Default>(inks: &[T], full: 
 
 /// A whole file of integer codes; alpha is straight.
 pub(crate) fn encode_codes(
-    picture: &CodedImage<'_>,
+    size: (usize, usize),
+    n: usize,
+    codes: &Codes,
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>, String> {
-    let (size, n) = ((picture.width, picture.height), picture.names.len());
     let alpha = ExtraSamples::UnassociatedAlpha;
-    match &picture.codes {
+    match codes {
         Codes::U8(v) => encode_grey_or_rgb::<Gray8, RGB8>(size, n, v, alpha, metadata),
         Codes::U16(v) => encode_grey_or_rgb::<Gray16, RGB16>(size, n, v, alpha, metadata),
     }
@@ -671,7 +654,7 @@ where
 
 /// Texts in the letters that the format knows.
 fn ascii_notes(metadata: &[(String, String)]) -> String {
-    let mut text = lines_of_notes(&metadata.to_vec());
+    let mut text = lines_of_notes(metadata);
     text.retain(|c| c.is_ascii());
     text
 }

@@ -11,12 +11,6 @@ pub(super) struct DocumentMistake {
 }
 
 impl DocumentMistake {
-    /// One that is not a field's.
-    pub(super) fn in_document(line: Option<usize>, what: String) -> Self {
-        let at = String::new();
-        Self { at, line, what }
-    }
-
     pub(super) fn into_error(self) -> Error {
         let (at, what) = self.place_and_message();
         let is_document = matches!(at, "" | "." | "?");

@@ -15,6 +15,7 @@ use duplicate_keys::{check_json, find_invalid_toml};
 use mistake::DocumentMistake;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::ops::Range;
 use std::path::Path;
 use toml::de::DeTable;
 
@@ -234,32 +235,19 @@ pub fn write_text(path: impl AsRef<Path>, text: &str) -> Result<()> {
 /// [`Error::Value`] for what is not TOML, a key twice, a number that is not finite, and values that
 /// do not fit.
 pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
-    parse_toml_lines(text, |byte| Some(line_of(text, byte)))
-}
-
-/// `line` gives the line of a byte, if that means something to the person who wrote the document.
-fn parse_toml_lines<T: DeserializeOwned>(
-    text: &str,
-    line: impl Fn(usize) -> Option<usize>,
-) -> Result<T> {
     let document = DeTable::parse(text)
-        .map_err(|e| toml_mistake(&e, String::new(), e.message().into(), &line))?;
+        .map_err(|e| toml_mistake(text, e.span(), String::new(), e.message().into()))?;
     if let Some((what, span)) = find_invalid_toml(&document, max_depth()) {
-        return Err(DocumentMistake::in_document(line(span.start), what).into_error());
+        return Err(toml_mistake(text, Some(span), String::new(), what));
     }
     serde_path_to_error::deserialize(toml::Deserializer::from(document)).map_err(|e| {
         let what = no_name::message::<T>(&e, || text.parse().ok().map(toml::Value::Table));
-        toml_mistake(e.inner(), e.path().to_string(), what, &line)
+        toml_mistake(text, e.inner().span(), e.path().to_string(), what)
     })
 }
 
-fn toml_mistake(
-    e: &toml::de::Error,
-    at: String,
-    what: String,
-    line: impl Fn(usize) -> Option<usize>,
-) -> Error {
-    let line = e.span().and_then(|span| line(span.start));
+fn toml_mistake(text: &str, span: Option<Range<usize>>, at: String, what: String) -> Error {
+    let line = span.map(|span| line_of(text, span.start));
     DocumentMistake { at, line, what }.into_error()
 }
 

@@ -31,16 +31,11 @@ impl Syncing {
         SYNCING.set(before);
         done
     }
-
-    /// As the job on this thread has it.
-    fn now() -> Self {
-        SYNCING.get()
-    }
 }
 
 /// Writes a file in one step: readers see the old one or the new one, never a part.
 pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
-    let alone = Syncing::now() == Syncing::Alone;
+    let alone = SYNCING.get() == Syncing::Alone;
     work::add_all([
         (Kind::BytesWritten, bytes.len() as u64),
         (Kind::SyncedFiles, u64::from(alone)),
@@ -112,7 +107,10 @@ fn fill_and_move(
     fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> std::io::Result<()> {
     keep_permissions(file.as_file(), path)?;
-    fill_buffered(&mut file, fill)?;
+    let mut buffered = BufWriter::new(&mut file);
+    fill(&mut buffered)?;
+    buffered.flush()?;
+    drop(buffered);
     put_on_disk(file.as_file())?;
     file.persist(path).map_err(|e| e.error)?;
     Ok(())
@@ -133,18 +131,9 @@ fn keep_permissions(_: &File, _: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-fn fill_buffered(
-    file: impl Write,
-    fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
-) -> std::io::Result<()> {
-    let mut buffered = BufWriter::new(file);
-    fill(&mut buffered)?;
-    buffered.flush()
-}
-
 /// Puts a file or the names in a folder on the disk, unless that is done for many at once.
 fn put_on_disk(file: &File) -> std::io::Result<()> {
-    match Syncing::now() {
+    match SYNCING.get() {
         Syncing::Alone => file.sync_all(),
         Syncing::Together => Ok(()),
     }

@@ -11,15 +11,16 @@ mod own_file;
 mod sanitize_path;
 mod text_name;
 
-pub(crate) use atomic::absolute_folder;
 pub use atomic::{absolute, check_folder_of, create_folder, relative, relative_on_disk};
 pub use checksum::{Checksum, copy};
 pub use distinct::check_distinct;
-pub(crate) use distinct::real_path;
 pub use sanitize_path::{below, inside};
 pub use text_name::path_text;
 
-pub(crate) use atomic::{Syncing, sync_file_system, with_last_step, write_bytes, write_through};
+pub(crate) use atomic::{
+    Syncing, absolute_folder, sync_file_system, with_last_step, write_bytes, write_through,
+};
+pub(crate) use distinct::real_path;
 pub(crate) use listing::{files_below, is_apple_double};
 pub(crate) use natural_order::natural_key;
 pub(crate) use open::{open_regular, read_regular, read_to_end, reason};

@@ -16,14 +16,9 @@ use half::f16;
 use std::ops::Range;
 use std::sync::OnceLock;
 
-/// The OpenImageIO that this library was built with.
-pub(crate) fn version() -> String {
-    ffi::version()
-}
-
 /// All libraries that it was built with, for people.
 pub(crate) fn libraries() -> String {
-    format!("OpenImageIO {}, {}", version(), ffi::heif_version())
+    format!("OpenImageIO {}, {}", ffi::version(), ffi::heif_version())
 }
 
 /// Answers a request about a file.
@@ -139,7 +134,9 @@ impl Layout {
 
     /// Nothing to cut, to pad or to leave out.
     fn is_shown_as_stored(&self, picked: &[usize]) -> bool {
-        self.shows_all() && picked.iter().copied().eq(0..self.channels.len())
+        let data = (self.x, self.y, self.data_width, self.data_height);
+        let shows_all = data == (0, 0, self.width, self.height);
+        shows_all && picked.iter().copied().eq(0..self.channels.len())
     }
 
     fn check(&self, file_bytes: u64, limits: &Limits) -> Result<(), Refusal> {
@@ -189,12 +186,6 @@ impl Layout {
         let pixels = (self.data_width * self.data_height).max(self.width * self.height);
         let channels = self.channels.len().max(shown_channels) as u64;
         pixels as u64 * channels * u64::from(self.bytes.unsigned_abs())
-    }
-
-    /// The data window is the display window.
-    fn shows_all(&self) -> bool {
-        let data = (self.x, self.y, self.data_width, self.data_height);
-        data == (0, 0, self.width, self.height)
     }
 
     /// Index in the data window of a pixel of the display window that has data.
@@ -363,12 +354,9 @@ pub(crate) fn write_file(
     samples: &[u8],
     metadata: &[(String, String)],
 ) -> Result<(), Refusal> {
-    let notes: Vec<_> = metadata.iter().cloned().map(note).collect();
+    let notes = metadata.iter().cloned();
+    let notes: Vec<_> = notes.map(|(key, value)| ffi::Note { key, value }).collect();
     ffi::write(path, format.name(), layout, samples, &notes).map_err(|e| refused(format, &e))
-}
-
-fn note((key, value): (String, String)) -> ffi::Note {
-    ffi::Note { key, value }
 }
 
 #[cfg(test)]

@@ -111,7 +111,7 @@ impl WorkerPool {
             worker.check_sandbox(strict)?;
             match worker.answer(source, request) {
                 Ok(response) => {
-                    self.give_back(worker);
+                    self.idle().push(worker);
                     return response;
                 }
                 Err(WorkerFailure::TimedOut(timeout)) => return Err(timed_out(library, timeout)),
@@ -141,10 +141,6 @@ impl WorkerPool {
         let mut idle = self.idle();
         let at = idle.iter().rposition(|worker| worker.limits == *limits)?;
         Some(idle.swap_remove(at))
-    }
-
-    fn give_back(&self, worker: Worker) {
-        self.idle().push(worker);
     }
 
     fn idle(&self) -> MutexGuard<'_, Vec<Worker>> {
@@ -405,6 +401,24 @@ mod tests {
             count = count.display()
         );
         write_program(&program, &text);
+        let request = Request::Pixels {
+            wanted: Wanted::Coverage,
+            window: Window::Display,
+        };
+        match answer_of(&program, limits, strict, request) {
+            Ok(Response::Raster(raster)) => Ok(raster),
+            Ok(Response::Shape(shape)) => panic!("{shape:?}"),
+            Err(e) => Err(e.to_string()),
+        }
+    }
+
+    /// The answer of a program about a file of three bytes.
+    fn answer_of(
+        program: &Path,
+        limits: &Limits,
+        strict: bool,
+        request: Request,
+    ) -> std::result::Result<Response, Refusal> {
         let source = SourceFile {
             path: "a.tif".into(),
             bytes: vec![0; 3],
@@ -413,15 +427,7 @@ mod tests {
         let pool = WorkerPool {
             idle: Mutex::new(Vec::new()),
         };
-        let request = Request::Pixels {
-            wanted: Wanted::Coverage,
-            window: Window::Display,
-        };
-        match pool.ask(&program, &source, limits, strict, request) {
-            Ok(Response::Raster(raster)) => Ok(raster),
-            Ok(Response::Shape(shape)) => panic!("{shape:?}"),
-            Err(e) => Err(e.to_string()),
-        }
+        pool.ask(program, &source, limits, strict, request)
     }
 
     const SHAPE: &str =
@@ -494,11 +500,8 @@ mod tests {
         let start = Instant::now();
         let e = asked("exec <&- >&- sleep 600", &Limits::default()).unwrap_err();
         assert!(e.contains("closed its pipes"), "{e}");
-        assert!(
-            start.elapsed() < Duration::from_secs(120),
-            "{:?}",
-            start.elapsed()
-        );
+        let took = start.elapsed();
+        assert!(took < Duration::from_secs(120), "{took:?}");
     }
 
     #[test]
@@ -511,14 +514,8 @@ mod tests {
             e.ends_with("its worker has no full sandbox here (Landlock: not in this kernel)"),
             "{e}"
         );
-        assert!(
-            asked_of(
-                &format!("{GREETING}\n{}; sleep 5", grey()),
-                &Limits::default(),
-                true
-            )
-            .is_ok()
-        );
+        let script = format!("{GREETING}\n{}; sleep 5", grey());
+        assert!(asked_of(&script, &Limits::default(), true).is_ok());
     }
 
     #[test]
@@ -535,26 +532,10 @@ mod tests {
 
     #[test]
     fn a_program_that_is_no_worker_is_named() {
-        let source = SourceFile {
-            path: "a.tif".into(),
-            bytes: vec![0; 3],
-            format: Format::Tiff,
-        };
-        let pool = WorkerPool {
-            idle: Mutex::new(Vec::new()),
-        };
         for program in ["/bin/true", "/bin/echo", "/no/such/program"] {
-            let e = pool
-                .ask(
-                    Path::new(program),
-                    &source,
-                    &Limits::default(),
-                    false,
-                    Request::Header,
-                )
-                .err()
-                .unwrap()
-                .to_string();
+            let limits = Limits::default();
+            let answer = answer_of(Path::new(program), &limits, false, Request::Header);
+            let e = answer.err().unwrap().to_string();
             assert!(e.contains(program) && e.contains("does not start"), "{e}");
         }
     }

@@ -232,16 +232,12 @@ mod tests {
         is_within: impl Fn(usize, usize) -> bool + Sync,
     ) -> ObjectRegion {
         let (width, height) = SIZE;
-        let whole = Roi {
-            x: 0,
-            y: 0,
-            width,
-            height,
-        };
+        let whole = Roi::spanning(0..width, 0..height);
         let paint = |x: usize, y: usize| if is_object(x, y) { RED } else { GREEN };
         ObjectRegion {
             around: whole,
             kept: whole,
+            scale: 1.0,
             photo: Image::from_fn(width, height, paint),
             cut: Image::from_fn(width, height, is_within).to_coverage(),
             claims: None,

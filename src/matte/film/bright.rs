@@ -1,12 +1,11 @@
 //! Pixels that are not bare plastic: paint, and glints that hide what is behind them.
 
-use super::claimed;
 use super::object::{interior, ramp, share, side_px};
 use super::solve::Factor;
+use super::{FilmInput, claimed};
 use crate::filter;
 use crate::image::{Image, Mask};
 use crate::matte::screen::screen_shade;
-use crate::matte::stroke::Claims;
 use crate::pixel::{Coverage, LinearRgb};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
@@ -22,41 +21,30 @@ const PAINT_SHARE: RangeInclusive<f32> = 0.4..=0.7;
 /// screen that a wide mask lets in is not paint, nor is what a person says is see-through. Gives the
 /// share of the object that has the screen's hue.
 ///
-/// `longer_side` is that of the whole photo, pixels.
+/// `photo` is the one that the transmittance is measured in.
 pub(super) fn make_opaque(
     factors: &mut Image<Factor>,
     photo: &Image<LinearRgb>,
-    plate: &Image<LinearRgb>,
-    inside: &Image<Coverage>,
-    longer_side: usize,
-    claims: Option<&Claims>,
+    object: FilmInput<'_>,
 ) -> f32 {
-    let bright = brighter_than_screen(factors, photo, plate);
+    let bright = brighter_than_screen(factors, photo, &object.plate.image);
     let painted = factors.zip_map(&bright, |f, bright| bright || f.coloured && !f.is_bare());
     if !painted.pixels().contains(&true) {
         return 0.0;
     }
-    let mut paint = softened(&painted.zip_map(&interior(inside, longer_side), |p, i| p && i));
-    claimed::clear_paint(&mut paint, claims);
-    cover_with_paint(factors, &paint);
+    let interior = interior(object.inside, object.longer_side);
+    let mut paint = softened(&painted.zip_map(&interior, |p, i| p && i));
+    claimed::clear_paint(&mut paint, object.claims);
+    for (factor, paint) in factors.pixels_mut().iter_mut().zip(paint.pixels()) {
+        factor.value *= 1.0 - paint;
+        factor.raise_sigma(*paint);
+    }
     let of_hue = paint
         .pixels()
         .iter()
         .zip(bright.pixels())
         .map(|(paint, bright)| *bright && *paint > 0.5);
-    share(of_hue, inside)
-}
-
-fn cover_with_paint(factors: &mut Image<Factor>, paint: &Image<f32>) {
-    for (factor, paint) in factors.pixels_mut().iter_mut().zip(paint.pixels()) {
-        paint_over(factor, *paint);
-    }
-}
-
-#[inline]
-fn paint_over(factor: &mut Factor, paint: f32) {
-    factor.value *= 1.0 - paint;
-    factor.raise_sigma(paint);
+    share(of_hue, object.inside)
 }
 
 /// The pixels that are brighter in the screen's hue than plastic in front of it can be.
@@ -91,19 +79,17 @@ const FILLED_SIGMA: f32 = 0.35;
 
 /// Gives pixels under glints the factor of their surroundings, as far as they are hidden: clipped
 /// ones wholly, others only more of it, since what reflects much is treated as paint by itself.
-/// Gives the share of the object that is clipped, from `clipped_at` on.
-pub(super) fn fill_glints(
-    factors: &mut Image<Factor>,
-    photo: &Image<LinearRgb>,
-    inside: &Image<Coverage>,
-    clipped_at: f32,
-) -> f32 {
-    let clipped = photo.zip_map(inside, |p, c| c.0 > 0.0 && p.max_channel() >= clipped_at);
+/// Gives the share of the object that is clipped.
+pub(super) fn fill_glints(factors: &mut Image<Factor>, object: FilmInput<'_>) -> f32 {
+    let inside = object.inside;
+    let clipped = object.photo.zip_map(inside, |p, c| {
+        c.0 > 0.0 && p.max_channel() >= object.clipped
+    });
     let hidden = factors.zip_map(&clipped, |f, clipped| {
         if clipped {
             1.0
         } else {
-            hidden_share(f.reflected)
+            ramp(f.reflected, &GLINT_LIGHT)
         }
     });
     fill_hidden(factors, &hidden, &surroundings(factors, &hidden, inside));
@@ -148,9 +134,4 @@ fn fill(factor: &mut Factor, hidden: f32, around: f32) {
         more
     };
     factor.raise_sigma(hidden * FILLED_SIGMA);
-}
-
-/// How much of what lies behind is hidden by this much reflected light.
-fn hidden_share(reflected: f32) -> f32 {
-    ramp(reflected, &GLINT_LIGHT)
 }

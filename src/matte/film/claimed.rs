@@ -10,7 +10,7 @@ use std::borrow::Cow;
 pub(super) fn make_opaque(factors: &mut Image<Factor>, claims: Option<&Claims>) {
     for (factor, claim) in claimed(factors, claims) {
         if claim == Some(false) {
-            *factor = Factor::OPAQUE;
+            *factor = Factor::default();
         }
     }
 }

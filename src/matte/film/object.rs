@@ -38,15 +38,9 @@ pub(super) fn side_px(inside: &Image<Coverage>) -> f32 {
 /// The share of the object's area that a set of pixels has.
 pub(super) fn share(set: impl Iterator<Item = bool>, inside: &Image<Coverage>) -> f32 {
     let object = area(inside);
-    if object > 0.0 {
-        (area_of(set, inside) / object) as f32
-    } else {
-        0.0
+    if object <= 0.0 {
+        return 0.0;
     }
-}
-
-/// Area of the object in a set of pixels.
-fn area_of(set: impl Iterator<Item = bool>, inside: &Image<Coverage>) -> f64 {
     let covered = set.zip(inside.pixels()).filter(|(set, _)| *set);
-    covered.map(|(_, c)| f64::from(c.0)).sum()
+    (covered.map(|(_, c)| f64::from(c.0)).sum::<f64>() / object) as f32
 }

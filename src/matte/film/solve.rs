@@ -1,12 +1,12 @@
 //! One pixel of film: by which factor it is the plastic of its photo.
 
 use super::FilmOptions;
-use super::tint::{CLEAR_TRANSMITTANCE, MAX_THICKNESS_FACTOR, scattered_tint};
+use super::tint::{CLEAR_TRANSMITTANCE, MAX_THICKNESS_FACTOR, bare_shade, scattered_tint};
 use crate::matte::arrays::largest;
 use crate::pixel::LinearRgb;
 use std::ops::RangeInclusive;
 
-/// How see-through a pixel is beside flat plastic.
+/// How see-through a pixel is beside flat plastic; by default it surely lets nothing through.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Factor {
     /// Transmittance over that of flat plastic, the same in all channels.
@@ -24,16 +24,6 @@ pub(super) struct Factor {
 }
 
 impl Factor {
-    /// Of what surely lets nothing through.
-    pub(super) const OPAQUE: Self = Self {
-        value: 0.0,
-        sigma: 0.0,
-        unbounded: 0.0,
-        reflected: 0.0,
-        coloured: false,
-        bare_shade: None,
-    };
-
     pub(super) fn is_bare(&self) -> bool {
         self.bare_shade.is_some()
     }
@@ -141,7 +131,10 @@ impl Solver {
         let measured = self.measure(pixel, screen);
         let [a, b] = self.others.map(|c| pixel[c]);
         let brightest = a.max(b).max(measured.reflected);
-        self.combine(pixel, &measured, plastic_factor(brightest))
+        Factor {
+            bare_shade: bare_shade(pixel, screen, self.flat, self.key),
+            ..self.combine(pixel, &measured, plastic_factor(brightest))
+        }
     }
 
     /// The factor on a screen that has too little hue to measure much: that of flat plastic unless
@@ -149,7 +142,8 @@ impl Solver {
     /// or may not be plastic.
     pub(super) fn guess(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
         let measured = self.measure(pixel, screen);
-        let left = measured.most_left(pixel);
+        let left = (0..3).map(|c| pixel[c] - measured.through[c]);
+        let left = left.fold(0.0, f32::max);
         self.combine(pixel, &measured, plastic_factor(left))
             .guessed(self.spread)
     }
@@ -241,16 +235,6 @@ struct PixelMeasurement {
     factor: f32,
     /// Of the factor.
     variance: f32,
-}
-
-impl PixelMeasurement {
-    /// The most light of a channel that the screen through flat plastic leaves; not less than 0.
-    #[inline]
-    fn most_left(&self, pixel: [f32; 3]) -> f32 {
-        (0..3)
-            .map(|c| pixel[c] - self.through[c])
-            .fold(0.0, f32::max)
-    }
 }
 
 /// The factor at which a channel is all screen: nothing reflects less than no light. Channels in

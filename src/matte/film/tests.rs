@@ -12,14 +12,41 @@ const BLUE: LinearRgb = LinearRgb::new(0.03, 0.095, 0.52);
 const CLEAR: LinearRgb = LinearRgb::grey(0.55);
 
 fn inside() -> Image<Coverage> {
-    Image::from_fn(SIZE.0, SIZE.1, |x, y| {
-        Coverage(f32::from(u8::from(is_inside(x, y))))
-    })
+    Image::from_fn(SIZE.0, SIZE.1, is_inside).to_coverage()
 }
 
 fn is_inside(x: usize, y: usize) -> bool {
     let (u, v) = ((x as f32 - 90.0) / 65.0, (y as f32 - 60.0) / 38.0);
     u * u + v * v < 1.0
+}
+
+/// The plate that is fitted around the object.
+fn fitted(photo: &Image<LinearRgb>) -> ScreenPlate {
+    let free = inside().map(|c| c.0 == 0.0);
+    ScreenPlate::fit(photo, &free, &PlateOptions::default()).unwrap()
+}
+
+fn solved(photo: &Image<LinearRgb>, plate: &ScreenPlate) -> FilmMatte {
+    film(photo, plate, &inside(), &FilmOptions::default()).unwrap()
+}
+
+fn solved_on(screen: LinearRgb, photo: &Image<LinearRgb>) -> FilmMatte {
+    solved(photo, &ScreenPlate::even(screen, SIZE))
+}
+
+/// The film as it lay on the screen, its shadow included.
+fn shaded(film: &Image<Film>, transmittance: &Image<LinearRgb>) -> Image<Film> {
+    film.zip_map(transmittance, |film, t| Film::new(film.color, t))
+}
+
+fn is_told(found: &FilmMatte, code: Code) -> bool {
+    found.diagnostics.iter().any(|d| d.code == code)
+}
+
+/// A person should look at that.
+fn is_warned(found: &FilmMatte, code: Code) -> bool {
+    let mut diagnostics = found.diagnostics.iter();
+    diagnostics.any(|d| d.code == code && d.needs_review())
 }
 
 /// A label across the middle.
@@ -86,15 +113,13 @@ impl World {
 
     fn solved(&self) -> FilmMatte {
         let photo = self.photo();
-        let free = inside().map(|c| c.0 == 0.0);
-        let plate = ScreenPlate::fit(&photo, &free, &PlateOptions::default()).unwrap();
-        film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap()
+        solved(&photo, &fitted(&photo))
     }
 
     /// Mean absolute error inside, over a grey background in the object's shadow, of what a
     /// function chooses.
     fn error(&self, found: &FilmMatte, of: impl Fn(usize) -> bool) -> f32 {
-        let shaded = found.shaded();
+        let shaded = shaded(&found.film, &found.transmittance);
         let behind = LinearRgb::new(0.5, 0.35, 0.3);
         let (mut sum, mut count) = (0.0, 0.0);
         for y in 0..SIZE.1 {
@@ -164,20 +189,20 @@ fn the_tint_of_plastic_depends_on_no_exposure() {
         let plastic = haze + LinearRgb::from(flat).scale(thickness) * GREEN;
         if is_inside(x, y) { plastic } else { GREEN }
     });
-    let solved = |exposure: f32| {
-        let plate = ScreenPlate::even(GREEN.scale(exposure), SIZE);
-        let exposed = photo.map(|p| p.scale(exposure));
-        film(&exposed, &plate, &inside(), &FilmOptions::default()).unwrap()
+    let exposed = |exposure: f32| {
+        let photo = photo.map(|p| p.scale(exposure));
+        solved_on(GREEN.scale(exposure), &photo)
     };
-    let bright = solved(1.0);
+    let bright = exposed(1.0);
     for exposure in [0.5, 0.25, 4.0] {
-        let found = solved(exposure);
+        let found = exposed(exposure);
         let off = (0..3).map(|c| found.flat.channels()[c] - bright.flat.channels()[c]);
         let most = off.fold(0.0, |most: f32, off| most.max(off.abs()));
         assert!(most < 0.02, "{:?} at {exposure}", found.flat);
         let [sure, usual] = [&found, &bright].map(|f| f.color_uncertainty.confidence());
         assert!(sure < usual + 0.1, "{sure} at {exposure}, {usual} at 1");
-        let shown = found.shaded()[(90, 60)].over_color(GREEN.scale(exposure));
+        let on_screen = shaded(&found.film, &found.transmittance);
+        let shown = on_screen[(90, 60)].over_color(GREEN.scale(exposure));
         let off = shown.g / exposure - photo[(90, 60)].g;
         assert!(off.abs() < 1e-4, "{off} at {exposure}");
     }
@@ -224,19 +249,8 @@ fn outside_there_is_nothing_even_where_the_screen_is_uneven() {
 fn bare_screen_within_a_mask_that_is_too_wide_is_nearly_nothing() {
     let world = World::default();
     let photo = world.photo();
-    let plate = ScreenPlate::fit(
-        &photo,
-        &inside().map(|c| c.0 == 0.0),
-        &PlateOptions::default(),
-    )
-    .unwrap();
-    let found = film(
-        &photo,
-        &plate,
-        &Image::filled(SIZE.0, SIZE.1, Coverage(1.0)),
-        &FilmOptions::default(),
-    )
-    .unwrap();
+    let all = Image::filled(SIZE.0, SIZE.1, Coverage(1.0));
+    let found = film(&photo, &fitted(&photo), &all, &FilmOptions::default()).unwrap();
     let outside = inside()
         .pixels()
         .iter()
@@ -301,8 +315,7 @@ fn a_label_of_the_screens_hue_is_opaque_and_said() {
     let found = world.solved();
     assert!(world.error(&found, is_label) < 0.08);
     assert!(
-        found.diagnostics.iter().any(|d| d.code == Code::ScreenHue)
-            && found.color_uncertainty.screen_hue > 0.1,
+        is_told(&found, Code::ScreenHue) && found.color_uncertainty.screen_hue > 0.1,
         "{:?}",
         found.diagnostics
     );
@@ -312,8 +325,7 @@ fn a_label_of_the_screens_hue_is_opaque_and_said() {
 fn cardboard_and_wood_have_not_the_screens_hue() {
     for brown in [[0.4, 0.25, 0.12], [0.3, 0.17, 0.08]].map(LinearRgb::from) {
         let photo = inside().map(|c| if c.0 > 0.0 { brown } else { GREEN });
-        let plate = ScreenPlate::even(GREEN, SIZE);
-        let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
+        let found = solved_on(GREEN, &photo);
         assert_eq!(found.color_uncertainty.screen_hue, 0.0, "{brown:?}");
         let middle = found.film[(90, 60)];
         assert!(middle.opacity.g > 0.98, "{middle:?}");
@@ -325,9 +337,7 @@ fn a_screen_outside_the_gamut_shows_what_is_let_through() {
     let screen = LinearRgb::new(-0.09, 0.417, 0.056);
     let plastic = LinearRgb::grey(0.074) + screen.scale(0.7);
     let photo = inside().map(|c| if c.0 > 0.0 { plastic } else { screen });
-    let free = inside().map(|c| c.0 == 0.0);
-    let plate = ScreenPlate::fit(&photo, &free, &PlateOptions::default()).unwrap();
-    let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
+    let found = solved(&photo, &fitted(&photo));
     let (film, t) = (found.film[(90, 60)], found.transmittance[(90, 60)]);
     assert!((t.r - 0.7).abs() < 0.03, "{t:?}");
     assert!((film.color.r - 0.074).abs() < 0.01, "{film:?}");
@@ -337,13 +347,8 @@ fn a_screen_outside_the_gamut_shows_what_is_let_through() {
 fn a_clipped_screen_is_told() {
     let clipped = |green: f32| {
         let screen = LinearRgb { g: green, ..GREEN };
-        let photo = inside().map(|c| screen.scale(1.0 - 0.4 * c.0));
-        let plate = ScreenPlate::even(screen, SIZE);
-        let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
-        found
-            .diagnostics
-            .iter()
-            .any(|d| d.code == Code::ClippedScreen)
+        let found = solved_on(screen, &inside().map(|c| screen.scale(1.0 - 0.4 * c.0)));
+        is_told(&found, Code::ClippedScreen)
     };
     assert!(clipped(1.0) && !clipped(GREEN.g));
 }
@@ -352,11 +357,9 @@ fn a_clipped_screen_is_told() {
 fn an_opaque_red_card_has_no_uncertain_tint() {
     let card = LinearRgb::new(0.46, 0.02, 0.02);
     let photo = inside().map(|c| if c.0 > 0.0 { card } else { GREEN });
-    let plate = ScreenPlate::even(GREEN, SIZE);
-    let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
-    let is_tint = |d: &Diagnostic| d.code == Code::TintUncertain;
+    let found = solved_on(GREEN, &photo);
     assert!(
-        !found.diagnostics.iter().any(is_tint),
+        !is_told(&found, Code::TintUncertain),
         "{:?}",
         found.diagnostics
     );
@@ -399,13 +402,7 @@ fn dyed_plastic_is_seen_through_under_a_glint_as_beside_it() {
     for y in 58..=62 {
         (48..=52).for_each(|x| photo[(x, y)] = photo[(x, y)] + LinearRgb::grey(0.7));
     }
-    let plate = ScreenPlate::fit(
-        &photo,
-        &inside().map(|c| c.0 == 0.0),
-        &PlateOptions::default(),
-    )
-    .unwrap();
-    let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
+    let found = solved(&photo, &fitted(&photo));
     let off = found.film[glint].opacity.g - plain.film[glint].opacity.g;
     assert!(off.abs() < 0.1 && found.film[glint].color.g > 0.6, "{off}");
 }
@@ -465,38 +462,21 @@ fn awkward_input_is_named_not_a_panic() {
         Image::filled(20, 20, GREEN),
         ScreenPlate::even(GREEN, (20, 20)),
     );
-    let empty = film(&photo, &plate, &Image::new(20, 20), &FilmOptions::default()).unwrap_err();
-    assert!(
-        empty
-            .to_string()
-            .contains("the mask of the object is empty")
-    );
+    let said = |photo: &Image<LinearRgb>, c: f32, options: &FilmOptions| {
+        let inside = Image::filled(20, 20, Coverage(c));
+        let refused = film(photo, &plate, &inside, options).unwrap_err();
+        refused.to_string()
+    };
+    let usual = FilmOptions::default();
+    assert!(said(&photo, 0.0, &usual).contains("the mask of the object is empty"));
+    let strange = Image::filled(20, 20, LinearRgb::new(f32::NAN, 0.5, 0.5));
+    assert!(said(&strange, 1.0, &usual).contains("pixel (0, 0) is not a finite number"));
     let wrong = FilmOptions {
         thickness_spread: 0.0,
-        ..FilmOptions::default()
+        ..usual
     };
-    let said = film(
-        &photo,
-        &plate,
-        &Image::filled(20, 20, Coverage(1.0)),
-        &wrong,
-    )
-    .unwrap_err()
-    .to_string();
-    assert_eq!(said, "thickness_spread: 0, expected more than 0");
-    let strange = Image::filled(20, 20, LinearRgb::new(f32::NAN, 0.5, 0.5));
-    let refused = film(
-        &strange,
-        &plate,
-        &Image::filled(20, 20, Coverage(1.0)),
-        &FilmOptions::default(),
-    )
-    .unwrap_err();
-    assert!(
-        refused
-            .to_string()
-            .contains("pixel (0, 0) is not a finite number")
-    );
+    let expected = "thickness_spread: 0, expected more than 0";
+    assert_eq!(said(&photo, 1.0, &wrong), expected);
 }
 
 #[test]
@@ -509,30 +489,17 @@ fn a_label_of_the_screens_colour_is_keyed_away_and_that_is_said() {
         };
         let painted = World {
             label: screen,
-            ..World {
-                screen,
-                uneven: 0.0,
-                ..World::default()
-            }
+            ..plain
         };
         let [plain, painted] = [plain.solved(), painted.solved()];
-        let keyed = |found: &FilmMatte| {
-            found
-                .diagnostics
-                .iter()
-                .any(|d| d.code == Code::KeyedAway && d.needs_review())
-        };
         assert!(
-            keyed(&painted) && !keyed(&plain),
+            is_warned(&painted, Code::KeyedAway) && !is_warned(&plain, Code::KeyedAway),
             "{:?} {:?}",
             painted.diagnostics,
             plain.diagnostics
         );
         assert!(
-            !painted
-                .diagnostics
-                .iter()
-                .any(|d| d.code == Code::ScreenHue),
+            !is_told(&painted, Code::ScreenHue),
             "{:?}",
             painted.diagnostics
         );
@@ -562,7 +529,7 @@ fn the_screen_in_a_hole_is_see_through_whatever_the_dye_seems_to_be() {
         let found = film(&photo, &plate, &inside, &FilmOptions::default()).unwrap();
         let hole = found.film[(60, 60)];
         assert!(hole.opacity.max_channel() < 0.05, "{ring:?}: {hole:?}");
-        assert!(found.diagnostics.iter().any(|d| d.code == Code::KeyedAway));
+        assert!(is_told(&found, Code::KeyedAway));
     }
 }
 
@@ -577,7 +544,7 @@ fn clear_plastic_beside_a_large_label_is_no_print() {
     });
     let plate = ScreenPlate::even(screen, (120, 120));
     let found = film(&photo, &plate, &inside, &FilmOptions::default()).unwrap();
-    assert!(!found.diagnostics.iter().any(|d| d.code == Code::KeyedAway));
+    assert!(!is_told(&found, Code::KeyedAway));
 }
 
 #[test]
@@ -596,12 +563,7 @@ fn a_print_of_the_screens_hue_on_something_opaque_is_told() {
         let plate = ScreenPlate::even(screen.into(), (120, 120));
         film(&photo, &plate, &inside, &FilmOptions::default()).unwrap()
     };
-    let is_told = |print| {
-        let found = solved(print).diagnostics;
-        found
-            .iter()
-            .any(|d| d.code == Code::KeyedAway && d.needs_review())
-    };
+    let is_told = |print| is_warned(&solved(print), Code::KeyedAway);
     for shade in [0.3, 0.5, 0.8, 1.0] {
         assert!(is_told(screen.map(|c| shade * c)), "{shade}");
     }
@@ -631,8 +593,7 @@ impl Lattice {
                 _ => self.screen,
             }
         });
-        let plate = ScreenPlate::even(self.screen, SIZE);
-        film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap()
+        solved_on(self.screen, &photo)
     }
 
     /// Mean opacity of the bars, and of the holes.
@@ -670,12 +631,6 @@ fn coloured_bars_are_no_dyed_plastic_and_their_holes_no_paint() {
     }
 }
 
-/// A person should look at the tint.
-fn is_tint_told(found: &FilmMatte) -> bool {
-    let mut diagnostics = found.diagnostics.iter();
-    diagnostics.any(|d| d.code == Code::TintUncertain && d.needs_review())
-}
-
 #[test]
 fn dark_paint_that_may_be_dark_plastic_is_told() {
     for screen in [GREEN, BLUE] {
@@ -687,7 +642,8 @@ fn dark_paint_that_may_be_dark_plastic_is_told() {
             }
             .solved();
             let [bar, hole] = Lattice::opacities(&found);
-            assert!(bar > 0.9 || is_tint_told(&found), "{bars:?}: {bar}");
+            let is_told = is_warned(&found, Code::TintUncertain);
+            assert!(bar > 0.9 || is_told, "{bars:?}: {bar}");
             assert!(hole < 0.35, "{bars:?}: {hole}");
         }
     }
@@ -705,8 +661,7 @@ fn the_screen_in_the_shadow_of_dark_plastic_is_see_through() {
             false => GREEN,
         }
     });
-    let plate = ScreenPlate::even(GREEN, SIZE);
-    let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
+    let found = solved_on(GREEN, &photo);
     let (film, t) = (found.film[(45, 60)], found.transmittance[(45, 60)]);
     assert!(film.opacity.max_channel() < 0.05, "{film:?}");
     assert!(
@@ -726,8 +681,7 @@ fn dyed(flat: [f32; 3], scattered: f32, screen: LinearRgb) -> FilmMatte {
             false => screen,
         }
     });
-    let plate = ScreenPlate::even(screen, SIZE);
-    film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap()
+    solved_on(screen, &photo)
 }
 
 /// On a dark screen plastic reflects as much of it as paint.
@@ -740,7 +694,7 @@ fn dyed_plastic_is_not_taken_for_paint_without_a_word() {
         assert!(!is_clear(&ordinary), "{flat:?} on {screen:?}");
         let dark = dyed(flat, 0.04, screen.scale(0.35));
         assert!(
-            !is_clear(&dark) && is_tint_told(&dark),
+            !is_clear(&dark) && is_warned(&dark, Code::TintUncertain),
             "{flat:?} on dark {screen:?}"
         );
     }

@@ -73,9 +73,9 @@ const MIN_PIXEL_NOISE: f32 = 1e-6;
 /// Misfit beyond which a pixel is something else than plastic.
 const MAX_MISFIT: f32 = 25.0;
 /// Weight of thickness: the misfit of plastic that is twice as see-through as it should be.
-const THICKNESS_WEIGHT: f32 = 1.0;
+pub(in crate::matte) const THICKNESS_WEIGHT: f32 = 1.0;
 /// Misfit by which a dye must be better than clear plastic.
-const DYE_HANDICAP: f32 = 0.4;
+pub(in crate::matte) const DYE_HANDICAP: f32 = 0.4;
 /// How much the light that plastic scatters has of its tint: as if it went halfway through.
 const SCATTER_DEPTH: f32 = 0.5;
 /// Flat plastic passes at most this many times what two walls do.
@@ -193,15 +193,12 @@ impl TintSamples {
         key: usize,
         share: f64,
     ) -> Self {
-        let pairs = PhotoOnScreen {
-            photo,
-            screen: &plate.image,
-        };
-        let least_bare = least_bare_share(plate);
+        let (pictures, least_bare) = ([photo, &plate.image], least_bare_share(plate));
         let object: Vec<usize> = (0..photo.pixels().len())
-            .filter(|&i| inside.pixels()[i].0 >= OPAQUE && !pairs.pair(i).is_bare(key, least_bare))
+            .filter(|&i| inside.pixels()[i].0 >= OPAQUE)
+            .filter(|&i| !ScreenPair::at(pictures, i).is_bare(key, least_bare))
             .collect();
-        let sampled = thinned(object, OBJECT_SAMPLES).map(|i| pairs.pair(i));
+        let sampled = thinned(object, OBJECT_SAMPLES).map(|i| ScreenPair::at(pictures, i));
         let darkest = darkest(sampled.collect(), key, share);
         Self {
             key,
@@ -236,13 +233,10 @@ impl TintSamples {
     /// Clear plastic, and then every dye in every amount.
     fn hypotheses(&self) -> Vec<TintHypothesis> {
         let clear = self.judge([CLEAR_TRANSMITTANCE; 3], 0.0);
-        std::iter::once(clear).chain(self.judged_dyes()).collect()
-    }
-
-    fn judged_dyes(&self) -> impl Iterator<Item = TintHypothesis> {
-        dyed()
+        let dyes = dyed()
             .filter(|flat| flat[self.key] >= MIN_KEY_TRANSMITTANCE)
-            .map(|flat| self.judge(flat, DYE_HANDICAP))
+            .map(|flat| self.judge(flat, DYE_HANDICAP));
+        std::iter::once(clear).chain(dyes).collect()
     }
 
     fn judge(&self, flat: [f32; 3], handicap: f32) -> TintHypothesis {
@@ -389,7 +383,8 @@ struct PixelFit {
 impl PixelFit {
     /// The median of each number.
     fn median_of(fits: &[Self]) -> Self {
-        let median = |of: fn(&Self) -> f32| median_or_zero(fits.iter().map(of));
+        let median =
+            |of: fn(&Self) -> f32| median(fits.iter().map(of), f32::total_cmp).unwrap_or(0.0);
         Self {
             misfit: median(|fit| fit.misfit),
             thickness: median(|fit| fit.thickness),
@@ -399,23 +394,15 @@ impl PixelFit {
     }
 }
 
-/// A photo and the screen behind it.
-struct PhotoOnScreen<'a> {
-    photo: &'a Image<LinearRgb>,
-    screen: &'a Image<LinearRgb>,
-}
-
-impl PhotoOnScreen<'_> {
+impl ScreenPair {
     #[inline]
-    fn pair(&self, index: usize) -> ScreenPair {
-        ScreenPair {
-            pixel: self.photo.pixels()[index].into(),
-            screen: self.screen.pixels()[index].into(),
+    fn at([photo, screen]: [&Image<LinearRgb>; 2], index: usize) -> Self {
+        Self {
+            pixel: photo.pixels()[index].into(),
+            screen: screen.pixels()[index].into(),
         }
     }
-}
 
-impl ScreenPair {
     /// See [`is_screen`].
     fn is_bare(&self, key: usize, least: f32) -> bool {
         is_screen(self.pixel, self.screen, key, least)
@@ -466,10 +453,6 @@ fn non_negative_fit(seen: [f32; 3], through: [f32; 3], body: [f32; 3]) -> (f32, 
     let f = ((sb - u * ab) / bb.max(f32::MIN_POSITIVE)).max(0.0);
     let u = ((sa - f * ab) / aa.max(f32::MIN_POSITIVE)).clamp(0.0, MAX_THICKNESS_FACTOR);
     (u, f)
-}
-
-fn median_or_zero(values: impl Iterator<Item = f32>) -> f32 {
-    median(values, f32::total_cmp).unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! How certain the colour and the transmittance of a film are.
 
+use super::FilmInput;
 use super::object::{interior, share};
 use super::solve::Factor;
 use crate::diagnostic::{Code, Diagnostic, Severity};
@@ -148,27 +149,28 @@ fn certainty(cause: f64, limit: f64) -> f64 {
 
 /// The share of the object that looks like the screen, away from its rim, and was left see-through:
 /// like bare screen or, in something that is opaque for the most part, like the screen in some
-/// shade. `flat` is what flat plastic passes in the screen's channel, `longer_side` that of the
-/// whole photo, pixels.
+/// shade. `photo` is the one that the transmittance is measured in, `flat` what flat plastic passes
+/// in the screen's channel.
 pub(super) fn keyed_away(
     factors: &Image<Factor>,
-    [photo, plate]: [&Image<LinearRgb>; 2],
-    inside: &Image<Coverage>,
+    photo: &Image<LinearRgb>,
+    object: FilmInput<'_>,
     flat: f32,
-    longer_side: usize,
 ) -> f32 {
+    let inside = object.inside;
     let passed = factors.map(|f| if f.is_bare() { 1.0 } else { f.value * flat });
     let limit = match is_mostly_opaque(&passed, inside) {
         true => OPAQUE_TRANSMITTANCE,
         false => BARE_TRANSMITTANCE,
     };
-    let gone = photo.zip3_map(plate, &passed, |p, k, passed| {
+    let gone = photo.zip3_map(&object.plate.image, &passed, |p, k, passed| {
         passed > BARE_TRANSMITTANCE || passed > limit && is_in_its_hue(p, k)
     });
     if !gone.pixels().contains(&true) {
         return 0.0;
     }
-    let gone = gone.zip_map(&interior(inside, longer_side), |gone, inner| gone && inner);
+    let interior = interior(inside, object.longer_side);
+    let gone = gone.zip_map(&interior, |gone, inner| gone && inner);
     share(gone.pixels().iter().copied(), inside)
 }
 
@@ -228,52 +230,32 @@ mod tests {
             keyed_away: 0.1,
             ..tint
         };
-        assert!(
-            both.confidence() < 0.1
-                && ColorUncertainty {
-                    guessed: 0.56,
-                    ..both
-                }
-                .confidence()
-                    < 0.05
-        );
+        let all = ColorUncertainty {
+            guessed: 0.56,
+            ..both
+        };
+        assert!(both.confidence() < 0.1 && all.confidence() < 0.05);
     }
 
     #[test]
     fn what_was_keyed_away_is_not_said_to_be_opaque() {
-        let said = |doubts: ColorUncertainty| {
-            doubts
-                .diagnostics()
-                .iter()
-                .map(ToString::to_string)
-                .collect::<Vec<_>>()
+        let told = |doubt: fn(&mut ColorUncertainty)| {
+            let mut doubts = ColorUncertainty::default();
+            doubt(&mut doubts);
+            let mut told = doubts.diagnostics();
+            assert_eq!(told.len(), 1, "{told:?}");
+            told.remove(0)
         };
-        let keyed = said(ColorUncertainty {
-            keyed_away: 0.1,
-            ..ColorUncertainty::default()
-        });
+        let keyed = told(|d| d.keyed_away = 0.1).message;
         assert!(
-            matches!(&keyed[..], [one] if one.contains("keyed away") && !one.contains("opaque")),
-            "{keyed:?}"
+            keyed.contains("keyed away") && !keyed.contains("opaque"),
+            "{keyed}"
         );
-        let painted = said(ColorUncertainty {
-            screen_hue: 0.1,
-            ..ColorUncertainty::default()
-        });
+        let painted = told(|d| d.screen_hue = 0.1).message;
+        assert!(painted.contains("treated as opaque"), "{painted}");
+        let tint = told(|d| d.tint = 0.1);
         assert!(
-            matches!(&painted[..], [one] if one.contains("treated as opaque")),
-            "{painted:?}"
-        );
-        let tint = ColorUncertainty {
-            tint: 0.1,
-            ..ColorUncertainty::default()
-        }
-        .diagnostics();
-        assert!(
-            tint.len() == 1
-                && tint[0].code == Code::TintUncertain
-                && tint[0].needs_review()
-                && tint[0].code.is_about_color()
+            tint.code == Code::TintUncertain && tint.needs_review() && tint.code.is_about_color()
         );
     }
 }

@@ -136,11 +136,10 @@ mod tests {
     const SIZE: (usize, usize) = (90, 60);
 
     fn slab() -> Image<Coverage> {
-        Image::from_fn(SIZE.0, SIZE.1, |x, y| {
-            Coverage(f32::from(u8::from(
-                (10..80).contains(&x) && (10..50).contains(&y),
-            )))
-        })
+        let slab = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+            (10..80).contains(&x) && (10..50).contains(&y)
+        });
+        slab.to_coverage()
     }
 
     /// V in the middle of a slab, and at its rim.

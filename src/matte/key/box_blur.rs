@@ -63,19 +63,13 @@ impl BoxKernel {
 
     /// The samples whose weight is not 0.
     pub(super) fn reach(&self) -> BoxReach {
-        match self {
-            Self::CutOff { radius, .. } => BoxReach {
-                radius: *radius,
-                repeat: false,
-            },
+        let (radius, repeat) = match self {
+            Self::CutOff { radius, .. } => (*radius, false),
             Self::Repeat { weights, .. } => {
-                let radius = weights.iter().filter(|w| **w > 0.0).count() - 1;
-                BoxReach {
-                    radius,
-                    repeat: true,
-                }
+                (weights.iter().filter(|w| **w > 0.0).count() - 1, true)
             }
-        }
+        };
+        BoxReach { radius, repeat }
     }
 
     pub(super) fn radius(&self) -> usize {
@@ -235,7 +229,7 @@ impl BoxKernel {
 }
 
 /// Offsets from the centre outwards, at each distance the one ahead first.
-fn from_the_middle(radius: usize) -> impl Iterator<Item = isize> {
+pub(super) fn from_the_middle(radius: usize) -> impl Iterator<Item = isize> {
     std::iter::once(0).chain((1..=radius as isize).flat_map(|i| [i, -i]))
 }
 

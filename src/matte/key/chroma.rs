@@ -1,7 +1,7 @@
 //! Chroma pre-blur: the colour difference signals of a photo blurred, its brightness left sharp.
 
 use super::box_blur::BoxKernel;
-use super::model::{Behaviour, Model, Robust, V34, V45};
+use super::model::{Model, Robust, V34, V45};
 use super::options::{Blur, KeyOptions, Profile};
 use super::photo::Photo;
 use super::rows::{RowWindow, Rows, rows_around, window_rows};
@@ -14,18 +14,17 @@ use std::ops::Range;
 #[derive(Clone, Copy)]
 struct Differences<'a, P> {
     photo: ImageView<'a, P>,
-    careful: bool,
-    behaviour: Behaviour,
+    profile: Profile,
 }
 
 impl<P: Photo> Differences<'_, P> {
     /// Writes both differences of row `y`, unit scale.
     fn row(&self, y: usize, [cb, cr]: [&mut [f32]; 2]) {
         let pixels = self.photo.row(y);
-        match (self.behaviour, self.careful) {
-            (Behaviour::V45, _) => difference_rows::<P, V45>(pixels, cb, cr),
-            (_, true) => difference_rows::<P, Robust>(pixels, cb, cr),
-            _ => difference_rows::<P, V34>(pixels, cb, cr),
+        match self.profile {
+            Profile::Blender45 => difference_rows::<P, V45>(pixels, cb, cr),
+            Profile::Robust => difference_rows::<P, Robust>(pixels, cb, cr),
+            Profile::Blender34 | Profile::Blender42 => difference_rows::<P, V34>(pixels, cb, cr),
         }
     }
 }
@@ -156,14 +155,10 @@ pub(super) struct ChromaBlur<'a, P> {
 
 impl<'a, P: Photo> ChromaBlur<'a, P> {
     pub(super) fn new(photo: ImageView<'a, P>, options: &KeyOptions) -> Self {
-        let (behaviour, width) = (options.profile.behaviour(), photo.width());
-        let careful = options.profile == Profile::Robust;
-        let both = Differences {
-            photo,
-            careful,
-            behaviour,
-        };
-        let kernel = BoxKernel::new(behaviour, options.blur_pre as usize, photo.size());
+        let (profile, width) = (options.profile, photo.width());
+        let both = Differences { photo, profile };
+        let size = options.blur_pre as usize;
+        let kernel = BoxKernel::new(profile.behaviour(), size, photo.size());
         let blur = match options.blur {
             Blur::Exact => BlurOf::Exact(ExactBlur::new(both, kernel)),
             Blur::RunningSum => BlurOf::RunningSum([false, true].map(|red| {

@@ -96,9 +96,7 @@ impl<'a> Dilate<'a> {
             width,
         }
     }
-}
 
-impl Dilate<'_> {
     /// Makes the runs of the rows around row `y` present.
     fn cover_rows(&mut self, y: usize) {
         let Self {

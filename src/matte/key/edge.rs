@@ -105,27 +105,16 @@ impl<'a> EdgeSearch<'a> {
                     let samples = &self.window.row(near)[columns.start..columns.end + 2 * half];
                     count_alike(edges, &matte[columns.clone()], samples, self.tolerance);
                 }
-                let window = WindowInside {
-                    rows: seen,
-                    columns: &self.columns[columns.clone()],
-                    half,
-                };
+                let window = (seen, &self.columns[columns.clone()], half);
                 mark_edges(
                     edges,
                     &matte[columns],
-                    &window,
+                    window,
                     self.tolerance,
                     self.behaviour,
                 );
             });
     }
-}
-
-/// How much of a search window lies inside the picture.
-struct WindowInside<'a> {
-    rows: f32,
-    columns: &'a [f32],
-    half: usize,
 }
 
 #[inline(always)]
@@ -153,7 +142,8 @@ fn count_alike(counts: &mut [f32], matte: &[f32], padded: &[f32], tolerance: f32
     }
 }
 
-/// Turns numbers of alike samples into 1 at edges and 0 elsewhere.
+/// Turns numbers of alike samples into 1 at edges and 0 elsewhere; `rows` and `columns` of the
+/// window of half-size `half` lie inside the picture.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
@@ -162,21 +152,21 @@ fn count_alike(counts: &mut [f32], matte: &[f32], padded: &[f32], tolerance: f32
 fn mark_edges(
     counts: &mut [f32],
     matte: &[f32],
-    seen: &WindowInside<'_>,
+    (rows, columns, half): (f32, &[f32], usize),
     tolerance: f32,
     behaviour: Behaviour,
 ) {
     // Longer than elsewhere: a loop for each behaviour, all compiled for each vector width.
-    let pixels = counts.iter_mut().zip(matte).zip(seen.columns);
-    let all = ((2 * seen.half + 1) * (2 * seen.half + 1)) as f32;
+    let pixels = counts.iter_mut().zip(matte).zip(columns);
+    let all = ((2 * half + 1) * (2 * half + 1)) as f32;
     match behaviour {
         Behaviour::V34 => pixels.for_each(|((count, m), columns)| {
             let others = *count - alike_value(*m, *m, tolerance);
-            let samples = columns * seen.rows - 1.0;
+            let samples = columns * rows - 1.0;
             *count = edge_value((others < (ALIKE_SHARE * samples).ceil()) | (samples == 0.0));
         }),
         Behaviour::V42 => pixels.for_each(|((count, _), columns)| {
-            *count = edge_value(*count < (ALIKE_SHARE * (columns * seen.rows)).ceil());
+            *count = edge_value(*count < (ALIKE_SHARE * (columns * rows)).ceil());
         }),
         Behaviour::V45 => {
             pixels.for_each(|((count, _), _)| *count = edge_value(*count < ALIKE_SHARE * all))

@@ -1,6 +1,7 @@
 //! Feather: the matte grows along a falloff, and blends into a Gaussian blur of itself where it
 //! does.
 
+use super::box_blur::from_the_middle;
 use super::calm::{Calm, Extremes, RUN_COLUMNS};
 use super::model::Behaviour;
 use super::options::{Falloff, KeyOptions};
@@ -49,7 +50,7 @@ impl FeatherKernel {
         Self {
             gauss: gaussian_table(distance, behaviour),
             falloff,
-            order: visiting_order(distance as isize, behaviour),
+            order: visiting_order(distance, behaviour),
             behaviour,
             inward: options.feather_distance < 0,
         }
@@ -81,15 +82,11 @@ fn gaussian_table(distance: usize, behaviour: Behaviour) -> Vec<f32> {
 }
 
 /// Offsets in the order in which the profile visits samples.
-fn visiting_order(radius: isize, behaviour: Behaviour) -> Vec<isize> {
+fn visiting_order(radius: usize, behaviour: Behaviour) -> Vec<isize> {
     match behaviour {
-        Behaviour::V45 => from_the_middle(radius).collect(),
-        Behaviour::V34 | Behaviour::V42 => (-radius..=radius).collect(),
+        Behaviour::V45 => from_the_middle(radius).map(|ahead| -ahead).collect(),
+        Behaviour::V34 | Behaviour::V42 => (-(radius as isize)..=radius as isize).collect(),
     }
-}
-
-fn from_the_middle(radius: isize) -> impl Iterator<Item = isize> {
-    std::iter::once(0).chain((1..=radius).flat_map(|i| [-i, i]))
 }
 
 fn total_from_centre(gauss: &[f32]) -> f32 {

@@ -258,17 +258,15 @@ fn clamped_fraction(v: f32) -> f32 {
     if v > 0.0 { v.min(1.0) } else { 0.0 }
 }
 
-fn check_inside<T: PartialEq + std::fmt::Display>(
+fn check_inside<T: PartialEq + fmt::Display>(
     at: &str,
     value: T,
     nearest: T,
     range: &str,
 ) -> Result<()> {
-    if value == nearest {
-        Ok(())
-    } else {
-        Err(Error::value(at, format!("{value}, expected {range}")))
-    }
+    check_value(value == nearest, at, || {
+        format!("{value}, expected {range}")
+    })
 }
 
 #[cfg(test)]
@@ -296,22 +294,15 @@ mod tests {
 
     #[test]
     fn a_setting_out_of_range_is_named() {
-        let options = KeyOptions {
-            feather_distance: -101,
-            ..KeyOptions::default()
+        let said = |change: fn(&mut KeyOptions)| {
+            let mut options = KeyOptions::default();
+            change(&mut options);
+            options.check().unwrap_err().to_string()
         };
-        assert_eq!(
-            options.check().unwrap_err().to_string(),
-            "key.feather_distance: -101, expected -100 to 100"
-        );
-        let options = KeyOptions {
-            screen_balance: f32::NAN,
-            ..KeyOptions::default()
-        };
-        assert_eq!(
-            options.check().unwrap_err().to_string(),
-            "key.screen_balance: NaN, expected 0 to 1"
-        );
+        let expected = "key.feather_distance: -101, expected -100 to 100";
+        assert_eq!(said(|o| o.feather_distance = -101), expected);
+        let expected = "key.screen_balance: NaN, expected 0 to 1";
+        assert_eq!(said(|o| o.screen_balance = f32::NAN), expected);
     }
 
     #[test]

@@ -79,11 +79,17 @@ pub(super) struct FilledPlate {
 ///
 /// # Method
 /// A pyramid of halved means that count only the usable pixels; a hole takes the colour of the
-/// finest level that has one. # Errors
+/// finest level that has one.
+///
+/// # Errors
 /// [`Error::Value`] where no pixel of the plate is usable.
 pub(super) fn fill_plate(plate: &Image<LinearRgb>, options: &KeyOptions) -> Result<FilledPlate> {
     let channel = primary_channel(usable_mean(plate));
-    let known = usable_keys(plate, channel, options);
+    // Holes are transparent.
+    let known = plate.map(|c| match is_usable_key(c, channel, options) {
+        true => c.opaque(),
+        false => PremulRgba::TRANSPARENT,
+    });
     let count = known.pixels().par_iter().filter(|p| p.a == 0.0).count();
     if count == plate.pixels().len() && count > 0 {
         return Err(no_usable_key(channel));
@@ -96,21 +102,6 @@ pub(super) fn fill_plate(plate: &Image<LinearRgb>, options: &KeyOptions) -> Resu
         plate,
         channel,
         count,
-    })
-}
-
-/// The plate with its holes transparent.
-fn usable_keys(
-    plate: &Image<LinearRgb>,
-    channel: usize,
-    options: &KeyOptions,
-) -> Image<PremulRgba> {
-    plate.map(|c| {
-        if is_usable_key(c, channel, options) {
-            c.opaque()
-        } else {
-            PremulRgba::TRANSPARENT
-        }
     })
 }
 
@@ -227,15 +218,10 @@ mod tests {
                 && message.contains("accept_weak_key")
         );
         assert!(check_color(GREEN, &options).is_ok());
-        assert!(
-            check_color(
-                LinearRgb::grey(0.5),
-                &KeyOptions {
-                    accept_weak_key: true,
-                    ..options
-                }
-            )
-            .is_ok()
-        );
+        let accepting = KeyOptions {
+            accept_weak_key: true,
+            ..options
+        };
+        assert!(check_color(LinearRgb::grey(0.5), &accepting).is_ok());
     }
 }

@@ -26,27 +26,18 @@ const BAND_PER_HALO: usize = 6;
 /// Rows of the raw matte.
 struct RawMatte<'a, P> {
     photo: ImageView<'a, P>,
+    /// The photo's colour differences, where they are blurred.
+    blur: Option<ChromaBlur<'a, P>>,
     keyer: Keyer<'a, P>,
 }
 
 impl<P: Photo> Rows for RawMatte<'_, P> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
-        self.keyer.matte_row(y, self.photo.row(y), out);
-    }
-}
-
-/// Rows of the raw matte of a photo whose chroma is blurred.
-struct BlurredMatte<'a, P> {
-    photo: ImageView<'a, P>,
-    blur: ChromaBlur<'a, P>,
-    keyer: Keyer<'a, P>,
-}
-
-impl<P: Photo> Rows for BlurredMatte<'_, P> {
-    fn row(&mut self, y: usize, out: &mut [f32]) {
-        let differences = self.blur.row(y);
-        self.keyer
-            .recolored_matte_row(y, self.photo.row(y), differences, out);
+        let pixels = self.photo.row(y);
+        match &mut self.blur {
+            Some(blur) => self.keyer.recolored_matte_row(y, pixels, blur.row(y), out),
+            None => self.keyer.matte_row(y, pixels, out),
+        }
     }
 }
 
@@ -98,18 +89,14 @@ impl<'a, P: Photo> Stream<'a, P> {
         let bands = matte.pixels_mut().par_chunks_mut(width * rows).enumerate();
         let cutouts = bands_of(cutout, width * rows, height.div_ceil(rows));
         let seen = bands.zip(cutouts).map(|((band, matte), cutout)| {
-            self.compute_band(plane, band * rows, matte, cutout);
-            self.count_unusable(band * rows, matte.len() / width)
+            let (first, count) = (band * rows, matte.len() / width);
+            self.compute_band(plane, first, matte, cutout);
+            robust::count_unusable(&self.keying, self.options, first..first + count)
         });
         Deviations {
             clamped: self.clamped.load(Ordering::Relaxed),
             ..seen.sum()
         }
-    }
-
-    /// What cannot be used of so many rows of the inputs.
-    fn count_unusable(&self, first: usize, rows: usize) -> Deviations {
-        robust::count_unusable(&self.keying, self.options, first..first + rows)
     }
 
     fn compute_band(
@@ -120,7 +107,10 @@ impl<'a, P: Photo> Stream<'a, P> {
         cutout: &mut [PremulRgba],
     ) {
         let width = self.keying.photo.width();
-        let mut plane = self.plane_source(plane);
+        let mut plane = match plane {
+            Plane::Matte => self.finished_matte(),
+            Plane::Edges => self.edge_plane(),
+        };
         let keyer = self.keyer();
         let mut cutout = cutout.chunks_exact_mut(width);
         for (y, matte) in (first..).zip(matte.chunks_exact_mut(width)) {
@@ -135,12 +125,9 @@ impl<'a, P: Photo> Stream<'a, P> {
     /// often.
     fn band_rows(&self, height: usize) -> usize {
         let threads = rayon::current_num_threads();
-        let rounds = height / (threads * self.min_band_rows());
+        let least = (self.halo_rows() * BAND_PER_HALO).max(MIN_BAND_ROWS);
+        let rounds = height / (threads * least);
         height.div_ceil(threads * rounds.max(1)).max(1)
-    }
-
-    fn min_band_rows(&self) -> usize {
-        (self.halo_rows() * BAND_PER_HALO).max(MIN_BAND_ROWS)
     }
 
     /// Rows above a band that its windows reach.
@@ -150,28 +137,15 @@ impl<'a, P: Photo> Stream<'a, P> {
         (o.blur_pre + o.edge_kernel_radius + o.blur_post + distances) as usize
     }
 
-    fn plane_source(&self, plane: Plane) -> Source<'_> {
-        match plane {
-            Plane::Matte => self.finished_matte(),
-            Plane::Edges => self.edge_plane(),
-        }
-    }
-
     fn keyer(&self) -> Keyer<'a, P> {
         Keyer::new(self.keying.screen, self.channel, self.options)
     }
 
     fn raw_matte(&self) -> Source<'_> {
-        let photo = self.keying.photo;
-        if self.options.blur_pre == 0 {
-            return Box::new(RawMatte {
-                photo,
-                keyer: self.keyer(),
-            });
-        }
-        Box::new(BlurredMatte {
+        let (photo, options) = (self.keying.photo, self.options);
+        Box::new(RawMatte {
             photo,
-            blur: ChromaBlur::new(photo, self.options),
+            blur: (options.blur_pre > 0).then(|| ChromaBlur::new(photo, options)),
             keyer: self.keyer(),
         })
     }
@@ -187,16 +161,11 @@ impl<'a, P: Photo> Stream<'a, P> {
 
     /// The edges: Blender up to 4.3 looks for them in the clipped matte, later ones in the raw one.
     fn edge_plane(&self) -> Source<'_> {
-        let searched = self.searched_matte();
+        let searched = match self.behaviour() {
+            Behaviour::V34 | Behaviour::V42 => self.clipped_matte(),
+            Behaviour::V45 => self.raw_matte(),
+        };
         Box::new(Edges::new(searched, self.size(), self.options))
-    }
-
-    fn searched_matte(&self) -> Source<'_> {
-        if self.behaviour() == Behaviour::V45 {
-            self.raw_matte()
-        } else {
-            self.clipped_matte()
-        }
     }
 
     fn limited_matte(&self) -> Source<'_> {

@@ -4,7 +4,7 @@
 //! Its two matrices are not exact inverses of each other: even without blurring, colours move by up
 //! to 7e-4 per unit.
 
-use super::model::{Behaviour, Model};
+use super::model::Model;
 use crate::pixel::PremulRgba;
 
 /// Code value 1.0.
@@ -28,8 +28,8 @@ fn code_value(p: PremulRgba, w: [f32; 3], offset: f32) -> f32 {
 
 /// Code values to unit scale.
 #[inline(always)]
-fn to_unit(code: f32, behaviour: Behaviour) -> f32 {
-    if behaviour == Behaviour::V45 {
+fn to_unit(code: f32, is_late: bool) -> f32 {
+    if is_late {
         code / CODE_MAX
     } else {
         code * PER_CODE_MAX
@@ -39,24 +39,14 @@ fn to_unit(code: f32, behaviour: Behaviour) -> f32 {
 /// Blue and red difference of a colour in unit scale, 128/255 being neutral.
 #[inline(always)]
 pub(in crate::matte) fn differences(p: PremulRgba, is_late: bool) -> [f32; 2] {
-    let behaviour = late_behaviour(is_late);
-    DIFFERENCES.map(|w| to_unit(code_value(p, w, NEUTRAL_CODE), behaviour))
-}
-
-#[inline(always)]
-fn late_behaviour(is_late: bool) -> Behaviour {
-    if is_late {
-        Behaviour::V45
-    } else {
-        Behaviour::V34
-    }
+    DIFFERENCES.map(|w| to_unit(code_value(p, w, NEUTRAL_CODE), is_late))
 }
 
 /// All three signals of a colour in unit scale.
 pub(in crate::matte) fn to_ycc(p: PremulRgba, is_late: bool) -> [f32; 3] {
     let luma = code_value(p, LUMA_WEIGHTS, LUMA_OFFSET);
     let [cb, cr] = differences(p, is_late);
-    [to_unit(luma, late_behaviour(is_late)), cb, cr]
+    [to_unit(luma, is_late), cb, cr]
 }
 
 /// The colour of three signals in unit scale.

@@ -2,7 +2,7 @@
 //! must not count.
 
 use crate::image::{Image, Mask};
-use crate::matte::arrays::largest_difference;
+use crate::matte::arrays::{differences, largest_difference};
 use crate::pixel::LinearRgb;
 use crate::quantile::median;
 use std::ops::Range;
@@ -161,23 +161,19 @@ pub(super) fn deviation(
     background: &Mask,
 ) -> LinearRgb {
     let step = (photo.pixels().len() / DEVIATION_SAMPLES).max(1);
-    let differences: Vec<[f64; 3]> = (0..photo.pixels().len())
+    let off: Vec<[f32; 3]> = (0..photo.pixels().len())
         .step_by(step)
         .filter(|&i| background.pixels()[i])
-        .map(|i| channel_differences(photo.pixels()[i], plate.pixels()[i]))
+        .map(|i| differences(photo.pixels()[i], plate.pixels()[i]))
         .collect();
     [0, 1, 2]
-        .map(|c| robust_sigma(differences.iter().map(|d| d[c])) as f32)
+        .map(|c| robust_sigma(off.iter().map(|off| f64::from(off[c]))) as f32)
         .into()
 }
 
 /// Standard deviation, by the median of absolute differences; 0 of none.
 pub(super) fn robust_sigma(differences: impl Iterator<Item = f64>) -> f64 {
     SIGMA_OF_MEDIAN * median(differences, f64::total_cmp).unwrap_or(0.0)
-}
-
-fn channel_differences(a: LinearRgb, b: LinearRgb) -> [f64; 3] {
-    [a.r - b.r, a.g - b.g, a.b - b.b].map(|d| f64::from(d.abs()))
 }
 
 /// Pixels that are sampled for a standard deviation: 1 % of error.

@@ -67,7 +67,8 @@ impl Polynomial {
     /// The screen in every pixel.
     pub(super) fn image(&self, size: (usize, usize)) -> Image<LinearRgb> {
         let mut out = Image::new(size.0, size.1);
-        let u = normalized_columns(size);
+        let columns = (0..size.0).map(|x| normalized([x as f64 + 0.5, 0.0], size)[0] as f32);
+        let u: Vec<f32> = columns.collect();
         out.par_rows_mut().enumerate().for_each(|(y, row)| {
             self.fill_row(normalized([0.0, y as f64 + 0.5], size)[1], &u, row)
         });
@@ -155,13 +156,6 @@ fn exponents(degree: usize) -> Vec<[usize; 2]> {
 fn normalized([x, y]: [f64; 2], (w, h): (usize, usize)) -> [f64; 2] {
     let half = 0.5 * w.max(h) as f64;
     [(x - 0.5 * w as f64) / half, (y - 0.5 * h as f64) / half]
-}
-
-/// The first coordinate of each column's pixels.
-fn normalized_columns(size: (usize, usize)) -> Vec<f32> {
-    (0..size.0)
-        .map(|x| normalized([x as f64 + 0.5, 0.0], size)[0] as f32)
-        .collect()
 }
 
 /// What is added to a channel before its logarithm. A screen outside the gamut of Rec. 709 has less

@@ -46,6 +46,14 @@ fn photo(plate: &Image<LinearRgb>, noise: f32) -> Image<LinearRgb> {
     photo
 }
 
+fn fitted(photo: &Image<LinearRgb>) -> ScreenPlate {
+    ScreenPlate::fit(photo, &free(), &PlateOptions::default()).unwrap()
+}
+
+fn by_empty(empty: &Image<LinearRgb>, photo: &Image<LinearRgb>) -> Result<ScreenPlate> {
+    ScreenPlate::from_photo(empty, photo, &free(), &PlateOptions::default())
+}
+
 /// Largest error of the strongest channel, as a share of the screen's brightest.
 fn worst(found: &ScreenPlate, truth: &Image<LinearRgb>) -> f32 {
     let pairs = found.image.pixels().iter().zip(truth.pixels());
@@ -56,8 +64,7 @@ fn worst(found: &ScreenPlate, truth: &Image<LinearRgb>) -> f32 {
 fn an_uneven_screen_is_found_under_the_object_and_beside_its_shadow() {
     for (uneven, tolerance) in [(0.0, 0.005), (0.15, 0.05), (0.6, 0.07)] {
         let truth = screen(uneven);
-        let found =
-            ScreenPlate::fit(&photo(&truth, 0.004), &free(), &PlateOptions::default()).unwrap();
+        let found = fitted(&photo(&truth, 0.004));
         assert!(
             worst(&found, &truth) < tolerance,
             "{} at {uneven}",
@@ -73,15 +80,7 @@ fn an_uneven_screen_is_found_under_the_object_and_beside_its_shadow() {
 
 #[test]
 fn the_degree_is_no_higher_than_needed() {
-    let degree = |uneven| {
-        ScreenPlate::fit(
-            &photo(&screen(uneven), 0.004),
-            &free(),
-            &PlateOptions::default(),
-        )
-        .unwrap()
-        .degree
-    };
+    let degree = |uneven| fitted(&photo(&screen(uneven), 0.004)).degree;
     assert_eq!(degree(0.0), Some(0));
     assert!(degree(0.6) >= Some(2), "{:?}", degree(0.6));
 }
@@ -89,7 +88,7 @@ fn the_degree_is_no_higher_than_needed() {
 #[test]
 fn noise_of_3_percent_is_survived() {
     let truth = screen(0.15);
-    let found = ScreenPlate::fit(&photo(&truth, 0.03), &free(), &PlateOptions::default()).unwrap();
+    let found = fitted(&photo(&truth, 0.03));
     assert!(worst(&found, &truth) < 0.12, "{}", worst(&found, &truth));
 }
 
@@ -122,13 +121,7 @@ fn a_photographed_screen_is_aligned_and_its_exposure_matched() {
     for shift in [[0.0, 0.0], [3.0, 2.0], [-1.6, 0.7]] {
         // The empty screen was photographed darker, and lies so far off.
         let empty = dirty(&screen(0.0), shift.map(|s: f64| -s)).map(|p| p.scale(0.9));
-        let found = ScreenPlate::from_photo(
-            &empty,
-            &photo(&truth, 0.002),
-            &free(),
-            &PlateOptions::default(),
-        )
-        .unwrap();
+        let found = by_empty(&empty, &photo(&truth, 0.002)).unwrap();
         let [dx, dy] = found.shift_px;
         assert!(
             (dx - shift[0]).abs() < 0.2 && (dy - shift[1]).abs() < 0.2,
@@ -150,13 +143,7 @@ fn a_photographed_screen_is_aligned_and_its_exposure_matched() {
 fn a_photographed_screen_without_dirt_is_taken_as_it_lies() {
     let truth = screen(0.3);
     let empty = truth.map(|p| p.scale(0.9));
-    let found = ScreenPlate::from_photo(
-        &empty,
-        &photo(&truth, 0.002),
-        &free(),
-        &PlateOptions::default(),
-    )
-    .unwrap();
+    let found = by_empty(&empty, &photo(&truth, 0.002)).unwrap();
     assert_eq!((found.degree, found.shift_px), (None, [0.0; 2]));
     // The border of the blur is flat where the screen slopes.
     assert!(worst(&found, &truth) < 0.03, "{}", worst(&found, &truth));
@@ -166,13 +153,8 @@ fn a_photographed_screen_without_dirt_is_taken_as_it_lies() {
 fn an_empty_screen_without_light_in_a_channel_is_a_plate() {
     let without_red = |image: Image<LinearRgb>| image.map(|p| LinearRgb { r: 0.0, ..p });
     let truth = without_red(screen(0.3));
-    let found = ScreenPlate::from_photo(
-        &truth.map(|p| p.scale(0.9)),
-        &without_red(photo(&truth, 0.002)),
-        &free(),
-        &PlateOptions::default(),
-    )
-    .unwrap();
+    let empty = truth.map(|p| p.scale(0.9));
+    let found = by_empty(&empty, &without_red(photo(&truth, 0.002))).unwrap();
     assert!(worst(&found, &truth) < 0.03, "{}", worst(&found, &truth));
     assert!(found.image.pixels().iter().all(|p| p.r == 0.0));
 }
@@ -197,18 +179,10 @@ fn another_screen_is_not_taken_for_the_empty_one() {
     let other = Image::from_fn(SIZE.0, SIZE.1, |x, _| {
         GREEN.scale(if x < 120 { 0.5 } else { 1.5 })
     });
-    let said = ScreenPlate::from_photo(&other, &photo, &free(), &PlateOptions::default())
-        .unwrap_err()
-        .to_string();
+    let said = by_empty(&other, &photo).unwrap_err().to_string();
     assert!(said.contains("did the light change?"), "{said}");
-    let small =
-        ScreenPlate::from_photo(&Image::new(8, 8), &photo, &free(), &PlateOptions::default());
-    assert!(
-        small
-            .unwrap_err()
-            .to_string()
-            .contains("8 x 8 pixels, expected 240 x 160")
-    );
+    let small = by_empty(&Image::new(8, 8), &photo).unwrap_err().to_string();
+    assert!(small.contains("8 x 8 pixels, expected 240 x 160"));
 }
 
 #[test]
@@ -216,38 +190,25 @@ fn an_empty_screen_with_a_pixel_that_is_not_finite_is_refused() {
     let mut empty = screen(0.0);
     empty[(120, 80)].b = f32::INFINITY;
     let photo = photo(&screen(0.0), 0.002);
-    let said = ScreenPlate::from_photo(&empty, &photo, &free(), &PlateOptions::default())
-        .unwrap_err()
-        .to_string();
+    let said = by_empty(&empty, &photo).unwrap_err().to_string();
     let expected = "the empty screen: pixel (120, 80) is not a finite number";
     assert!(said.contains(expected), "{said}");
 }
 
 #[test]
 fn no_background_or_no_light_is_refused() {
-    let photo = Image::filled(64, 64, GREEN);
-    let none = ScreenPlate::fit(
-        &photo,
-        &Image::filled(64, 64, false),
-        &PlateOptions::default(),
-    );
-    assert!(
-        none.unwrap_err()
+    let said = |color: LinearRgb, is_free: bool, options: &PlateOptions| {
+        let (photo, free) = (Image::filled(64, 64, color), Image::filled(64, 64, is_free));
+        ScreenPlate::fit(&photo, &free, options)
+            .unwrap_err()
             .to_string()
-            .contains("leaves no background")
-    );
-    let dark = ScreenPlate::fit(
-        &Image::new(64, 64),
-        &Image::filled(64, 64, true),
-        &PlateOptions::default(),
-    );
-    assert!(dark.unwrap_err().to_string().contains("black"));
+    };
+    let usual = PlateOptions::default();
+    assert!(said(GREEN, false, &usual).contains("leaves no background"));
+    assert!(said(LinearRgb::BLACK, true, &usual).contains("black"));
     let wrong = PlateOptions {
         max_degree: 9,
-        ..PlateOptions::default()
+        ..usual
     };
-    let said = ScreenPlate::fit(&photo, &Image::filled(64, 64, true), &wrong)
-        .unwrap_err()
-        .to_string();
-    assert_eq!(said, "max_degree: 9, expected 0 to 6");
+    assert_eq!(said(GREEN, true, &wrong), "max_degree: 9, expected 0 to 6");
 }

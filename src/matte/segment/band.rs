@@ -35,12 +35,6 @@ impl LumaMode {
         })
     }
 
-    /// The pictures whose bands are taken.
-    fn pictures(self, photo: &Image<LinearRgb>) -> Vec<Image<f32>> {
-        let weights = self.weights().into_iter();
-        weights.map(|weights| luma_root(photo, weights)).collect()
-    }
-
     /// The weights of red, green and blue in each picture.
     fn weights(self) -> Vec<[f32; 3]> {
         match self {
@@ -60,30 +54,21 @@ pub(super) struct Bands {
     pub(super) finest: Image<f32>,
     /// The other bands, each of its own size, from the second one.
     coarser: Vec<Image<f32>>,
-    /// Sizes of the pyramid's levels, the photo's own first.
-    sizes: Vec<(usize, usize)>,
 }
 
 impl Bands {
     /// Splits a photo into `count` bands.
     pub(super) fn new(photo: &Image<LinearRgb>, luma: LumaMode, count: usize) -> Self {
         let mut channels: Vec<_> = luma
-            .pictures(photo)
+            .weights()
             .into_iter()
-            .map(|picture| band_magnitudes(picture, count).into_iter())
+            .map(|weights| band_magnitudes(luma_root(photo, weights), count).into_iter())
             .collect();
         let mut bands = (0..count)
             .map(|_| in_units_of_noise(channels.iter_mut().filter_map(Iterator::next).collect()));
-        let finest = bands.next().unwrap_or_default();
-        Self::from_bands(finest, bands.map(|band| largest_around(&band, 1)).collect())
-    }
-
-    fn from_bands(finest: Image<f32>, coarser: Vec<Image<f32>>) -> Self {
-        let sizes = iter::once(finest.size()).chain(coarser.iter().map(Image::size));
         Self {
-            sizes: sizes.collect(),
-            finest,
-            coarser,
+            finest: bands.next().unwrap_or_default(),
+            coarser: bands.map(|band| largest_around(&band, 1)).collect(),
         }
     }
 
@@ -92,9 +77,11 @@ impl Bands {
     /// Each pixel holds the largest of the 3 x 3 values around it: a band passes through 0 on the
     /// very edge that it shows.
     pub(super) fn at_full_size(&self, level: usize) -> Image<f32> {
-        let band = self.coarser[level - 2].clone();
-        let finer = self.sizes[..level - 1].iter().rev();
-        finer.fold(band, |picture, &(w, h)| filter::expand(&picture, w, h))
+        let (finer, band) = (&self.coarser[..level - 2], self.coarser[level - 2].clone());
+        let finer = iter::once(&self.finest).chain(finer).rev();
+        finer.fold(band, |picture, finer| {
+            filter::expand(&picture, finer.width(), finer.height())
+        })
     }
 }
 
@@ -128,7 +115,8 @@ fn band_magnitudes(picture: Image<f32>, count: usize) -> Vec<Image<f32>> {
 /// all of them, and one that seems to have none is clipped.
 fn in_units_of_noise(bands: Vec<Image<f32>>) -> Image<f32> {
     let noises: Vec<f32> = bands.iter().map(noise_sigma).collect();
-    let least = 0.5 * median_noise(&noises);
+    let typical = median(noises.iter().copied(), f32::total_cmp).unwrap_or(ROUNDING_SIGMA);
+    let least = 0.5 * typical;
     let squares = bands
         .iter()
         .zip(&noises)
@@ -174,11 +162,6 @@ fn raise(row: &mut [f32], other: &[f32]) {
     for (value, &other) in row.iter_mut().zip(other) {
         *value = if other > *value { other } else { *value };
     }
-}
-
-/// The median; the least noise where there is none.
-fn median_noise(noises: &[f32]) -> f32 {
-    median(noises.iter().copied(), f32::total_cmp).unwrap_or(ROUNDING_SIGMA)
 }
 
 /// Width of the frame along the border that shows the background, as a share of the longer side.

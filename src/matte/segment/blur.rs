@@ -78,9 +78,7 @@ mod tests {
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * i as f64 / 200.0);
             Point2::new(50.0 + 30.0 * cos, 45.0 + 30.0 * sin)
         };
-        let circle = Outline {
-            rings: vec![(0..200).map(at).collect()],
-        };
+        let circle = Outline::from_ring((0..200).map(at).collect());
         for sigma in [1.0f32, 1.5, 2.0] {
             let found = edge_blur_px(&circle, &filter::gaussian_blur(&sharp, sigma), 1.0);
             // The slope is taken over a pixel, and pixels and sampling blur by about half of one

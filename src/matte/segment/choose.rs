@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
 use crate::matte::prepared::{longer_side, scaled_sides};
-use crate::matte::stroke::{Claims, StrokesOnPhoto};
+use crate::matte::stroke::StrokesOnPhoto;
 use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -20,16 +20,11 @@ pub(super) struct ChosenSearch<'a> {
     pub(super) pass: Pass,
     /// The picture that it searched.
     pub(super) picture: Cow<'a, Image<LinearRgb>>,
-    /// Its finest band.
-    pub(super) finest: Image<f32>,
-    /// Where that is above its threshold.
-    pub(super) finest_binary: Mask,
+    search: Search,
     /// The band that served as the coarsest one.
     pub(super) levels: usize,
     /// How well it agrees.
     pub(super) confidence: Confidence,
-    /// What a person says of the outline, in the picture that it searched.
-    claims: Option<Claims>,
 }
 
 /// A picture size and the depths to search it at, the default one first.
@@ -135,17 +130,14 @@ impl<'a> SearchScale<'a> {
     ) -> Self {
         let picture = reduced(whole, reduction);
         let claims = strokes.about_outline(picture.size());
+        let deepest = depths.iter().copied().max().unwrap_or(2);
         Self {
             reduction,
-            search: Search::new(&picture, options, deepest(&depths), claims),
+            search: Search::new(&picture, options, deepest, claims),
             picture,
             depths,
         }
     }
-}
-
-fn deepest(depths: &[usize]) -> usize {
-    depths.iter().copied().max().unwrap_or(2)
 }
 
 fn reduced(picture: &Image<LinearRgb>, reduction: usize) -> Cow<'_, Image<LinearRgb>> {
@@ -161,22 +153,15 @@ fn scales<'a>(
     strokes: StrokesOnPhoto<'_>,
     options: &SegmentOptions,
 ) -> Vec<SearchScale<'a>> {
-    let longer = longer_side(picture);
-    searched_sizes(picture.size())
-        .par_iter()
-        .map(|&(reduction, depths)| {
+    let (longer, shorter) = (longer_side(picture), picture.width().min(picture.height()));
+    SEARCHED_SIZES
+        .into_par_iter()
+        .filter(|(reduction, _)| *reduction == 1 || shorter / reduction >= MIN_SEARCHED_SIDE_PX)
+        .map(|(reduction, depths)| {
             let asked = options.levels.filter(|_| reduction == 1);
             let depths = usable_depths(depths, longer / reduction, asked);
             SearchScale::new(picture, reduction, depths, strokes, options)
         })
-        .collect()
-}
-
-/// The reductions, and the depths for each, that leave enough of a picture.
-fn searched_sizes((w, h): (usize, usize)) -> Vec<(usize, &'static [usize])> {
-    SEARCHED_SIZES
-        .into_iter()
-        .filter(|(reduction, _)| *reduction == 1 || w.min(h) / reduction >= MIN_SEARCHED_SIDE_PX)
         .collect()
 }
 
@@ -259,15 +244,12 @@ impl SearchRun {
         confidence: Confidence,
     ) -> Result<ChosenSearch<'_>> {
         let scale = scales.swap_remove(self.scale);
-        let (finest, finest_binary, claims) = scale.search.into_parts();
         Ok(ChosenSearch {
             pass: self.pass?,
             picture: scale.picture,
-            finest,
-            finest_binary,
+            search: scale.search,
             levels: self.levels,
             confidence,
-            claims,
         })
     }
 
@@ -305,16 +287,11 @@ fn agreement(areas: &[Option<Mask>], i: usize) -> f64 {
         return 1.0;
     }
     let others = (0..areas.len()).filter(|&j| j != i);
-    let own = areas[i].as_ref();
-    let sum: f64 = others
-        .map(|j| overlap_or_zero(own, areas[j].as_ref()))
-        .sum();
-    sum / (areas.len() - 1) as f64
-}
-
-/// 0 where one area was not found.
-fn overlap_or_zero(a: Option<&Mask>, b: Option<&Mask>) -> f64 {
-    a.zip(b).map_or(0.0, |(a, b)| overlap(a, b))
+    // 0 where one area was not found.
+    let overlaps = others
+        .map(|j| areas[i].as_ref().zip(areas[j].as_ref()))
+        .map(|both| both.map_or(0.0, |(a, b)| overlap(a, b)));
+    overlaps.sum::<f64>() / (areas.len() - 1) as f64
 }
 
 /// Intersection over union.
@@ -337,21 +314,19 @@ impl ChosenSearch<'_> {
     /// What the edges enclose, without holes, as a person corrected it.
     pub(super) fn object_area(&self) -> ObjectArea {
         let found = holes::object_area(&self.picture, &self.pass.inside);
-        found.corrected(self.claims.as_ref())
+        found.corrected(self.search.claims.as_ref())
     }
 
     /// The pictures (a) to (e) of the paper's Figure 2, and what lies between; `whole` is the
     /// picture at full search size.
     pub(super) fn into_steps(self, whole: &Image<LinearRgb>) -> Vec<SegmentStep> {
-        let pass = self.pass;
-        let both = self
-            .finest_binary
-            .zip_map(&pass.coarsest_binary, |a, b| a && b);
+        let (pass, finest_binary) = (self.pass, self.search.finest_binary);
+        let both = finest_binary.zip_map(&pass.coarsest_binary, |a, b| a && b);
         let steps = [
             ("grey", band::luma_root(whole, [1.0; 3])),
-            ("first_band", self.finest),
+            ("first_band", self.search.bands.finest),
             ("last_band", pass.coarsest),
-            ("first_binary", as_plane(&self.finest_binary)),
+            ("first_binary", as_plane(&finest_binary)),
             ("last_binary", as_plane(&pass.coarsest_binary)),
             ("both", as_plane(&both)),
             ("edges", as_plane(&pass.edges)),
@@ -374,15 +349,11 @@ const BORDERS: [&str; 4] = ["left", "top", "right", "bottom"];
 
 /// The warning about an object that the photo cuts off; none for a whole one.
 fn truncated(touches: [bool; 4]) -> Option<Diagnostic> {
-    let reached = border_names(touches);
-    (!reached.is_empty()).then(|| truncated_at(&reached))
-}
-
-fn border_names(touches: [bool; 4]) -> Vec<&'static str> {
     let borders = BORDERS.into_iter().zip(touches);
-    borders
+    let reached: Vec<&str> = borders
         .filter_map(|(name, reached)| reached.then_some(name))
-        .collect()
+        .collect();
+    (!reached.is_empty()).then(|| truncated_at(&reached))
 }
 
 fn truncated_at(borders: &[&str]) -> Diagnostic {

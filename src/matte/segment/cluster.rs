@@ -26,6 +26,11 @@ impl PixelRun {
         let pixels = members.row(self.row)[self.columns.clone()].iter();
         pixels.filter(|p| **p).count()
     }
+
+    fn reaches_border(&self, (w, h): (usize, usize)) -> bool {
+        let Range { start, end } = self.columns;
+        self.row == 0 || self.row + 1 == h || start == 0 || end == w
+    }
 }
 
 impl PixelGroups {
@@ -73,13 +78,6 @@ impl PixelGroups {
             reaching[run.group] |= run.reaches_border(self.size);
         }
         reaching
-    }
-}
-
-impl PixelRun {
-    fn reaches_border(&self, (w, h): (usize, usize)) -> bool {
-        let Range { start, end } = self.columns;
-        self.row == 0 || self.row + 1 == h || start == 0 || end == w
     }
 }
 

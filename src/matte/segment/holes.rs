@@ -4,7 +4,7 @@ use super::cluster::PixelGroups;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::filter;
 use crate::image::{Image, Mask};
-use crate::matte::arrays::largest;
+use crate::matte::arrays::{differences, largest};
 use crate::matte::plate::{PlateOptions, ScreenPlate};
 use crate::matte::prepared::longer_side;
 use crate::matte::screen::{is_keyable, masked_pixels, screen_shade};
@@ -175,11 +175,8 @@ impl Hole {
             .zip_map(unlike, |rim, unlike| rim && unlike)
             .count();
         let least = OPAQUE_RIM_SHARE * self.rim.count() as f64;
-        self.is_enclosed(inside) && opaque as f64 >= least
-    }
-
-    fn is_enclosed(&self, inside: &Mask) -> bool {
-        without(&self.rim, inside).count() == 0
+        let is_enclosed = without(&self.rim, inside).count() == 0;
+        is_enclosed && opaque as f64 >= least
     }
 }
 
@@ -187,10 +184,6 @@ impl Hole {
 fn are_distinguishable(picture: &Image<LinearRgb>, background: &Mask) -> bool {
     let free = masked_pixels(picture, background);
     is_keyable(free.fold(LinearRgb::BLACK, |sum, p| sum + p))
-}
-
-fn differences(a: LinearRgb, b: LinearRgb) -> [f32; 3] {
-    [(a.r - b.r).abs(), (a.g - b.g).abs(), (a.b - b.b).abs()]
 }
 
 /// The pixels that surely show the screen: farther than a margin from what is enclosed.

@@ -48,7 +48,7 @@ fn center_or_border(i: usize, len: usize) -> f64 {
 }
 
 /// Left, top, right and bottom of a polygon; infinite where it has no corner.
-pub(super) fn sides(polygon: &[Point2<f64>]) -> [f64; 4] {
+pub(in crate::matte) fn sides(polygon: &[Point2<f64>]) -> [f64; 4] {
     let unbounded = [f64::INFINITY, f64::INFINITY, -f64::INFINITY, -f64::INFINITY];
     polygon
         .iter()

@@ -2,8 +2,8 @@
 
 use super::Segmentation;
 use crate::filter;
-use crate::image::{Image, Mask};
-use crate::matte::screen::{screen_pixels, strongest_channel};
+use crate::image::Image;
+use crate::matte::screen::strongest_channel;
 use crate::pixel::{Coverage, LinearRgb};
 
 /// Width of the zone around the outline that is left to the keyer, pixels of the search: what an
@@ -15,11 +15,6 @@ const CORE_DEPTH_PX: f64 = 2.0;
 const CORE_TRANSMITTANCE: f32 = 0.1;
 
 impl Segmentation {
-    /// The pixels that surely show nothing but the screen: outside the hull and a margin around it.
-    pub fn background(&self) -> Mask {
-        screen_pixels(&self.mask)
-    }
-
     /// Garbage and core matte of a photo on a screen plate, as a keyer takes them: what it leaves
     /// of the screen beside the object goes, and what surely lets nothing through stays.
     ///
@@ -30,16 +25,9 @@ impl Segmentation {
         photo: &Image<LinearRgb>,
         plate: &Image<LinearRgb>,
     ) -> [Image<Coverage>; 2] {
-        [
-            self.garbage(GARBAGE_MARGIN_PX * self.reduction.max(1.0)),
-            self.core(photo, plate),
-        ]
-    }
-
-    /// Garbage matte: 1 at more than `margin_px` from the tight outline, where there is no object.
-    pub fn garbage(&self, margin_px: f64) -> Image<Coverage> {
+        let margin_px = GARBAGE_MARGIN_PX * self.reduction.max(1.0);
         let near = filter::dilate(&self.tight.map(|c| c.0 > 0.0), margin_px);
-        near.complement().to_coverage()
+        [near.complement().to_coverage(), self.core(photo, plate)]
     }
 
     /// Core matte: 1 where the object is surely opaque, given the photo and its screen plate.
@@ -47,9 +35,7 @@ impl Segmentation {
     /// # Method
     /// Reflected light is not negative, so from `photo = F + T plate` follows `T <= photo / plate`
     /// in every channel; where the screen is strongest, that is below a tenth in the core.
-    /// # Panics
-    /// When the sizes differ.
-    pub fn core(&self, photo: &Image<LinearRgb>, plate: &Image<LinearRgb>) -> Image<Coverage> {
+    fn core(&self, photo: &Image<LinearRgb>, plate: &Image<LinearRgb>) -> Image<Coverage> {
         let deep = filter::erode(&self.tight.map(|c| c.0 >= 1.0), CORE_DEPTH_PX);
         let opaque = photo.zip_map(plate, |p, k| {
             let c = strongest_channel(k);

@@ -4,6 +4,7 @@ use super::band::LumaMode;
 use super::threshold::Threshold;
 use crate::bounds::Bounds;
 use crate::error::{Error, Result};
+use crate::matte::check::check_share;
 use crate::matte::prepared::MIN_SEARCH_SIZE_PX;
 use serde::{Deserialize, Serialize};
 
@@ -67,12 +68,5 @@ impl SegmentOptions {
         self.tone.check()?;
         let sizes = Bounds::new(MIN_SEARCH_SIZE_PX as f64, 32_768.0, "pixels");
         sizes.check("working_size", self.working_size as f64)
-    }
-}
-
-fn check_share(at: &str, value: f64) -> Result<()> {
-    match (0.0..=1.0).contains(&value) {
-        true => Ok(()),
-        false => Err(Error::value(at, format!("{value}, expected 0 to 1"))),
     }
 }

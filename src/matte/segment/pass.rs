@@ -8,7 +8,7 @@ use super::hull;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::geom::Point2;
+use crate::geom::{BBox, Point2};
 use crate::image::{Image, Mask};
 use crate::matte::Outline;
 use crate::matte::check::refused;
@@ -20,15 +20,15 @@ use std::ops::Range;
 
 /// A picture ready to be searched at any depth.
 pub(super) struct Search {
-    bands: Bands,
+    pub(super) bands: Bands,
     /// Threshold of the finest band, in units of noise.
     threshold: f32,
     /// Where the finest band is above its threshold.
-    finest_binary: Mask,
+    pub(super) finest_binary: Mask,
     /// Where the finest band is more than the smear of a stronger edge.
     ridges: Mask,
     /// What a person says of the outline.
-    claims: Option<Claims>,
+    pub(super) claims: Option<Claims>,
 }
 
 /// What a search at one depth found, in pixels of the picture that was searched.
@@ -83,11 +83,6 @@ impl Search {
             threshold,
             claims,
         }
-    }
-
-    /// The finest band, where it is above its threshold, and what is said of the outline.
-    pub(super) fn into_parts(self) -> (Image<f32>, Mask, Option<Claims>) {
-        (self.bands.finest, self.finest_binary, self.claims)
     }
 
     /// Finds the object with band `levels` as the coarsest one.
@@ -262,12 +257,7 @@ impl<'a> EdgeClusters<'a> {
     fn others(&self) -> impl Iterator<Item = (usize, f64)> {
         (0..self.sizes.len())
             .filter(|&i| !self.belongs(i))
-            .map(|i| (i, self.relative_size(i)))
-    }
-
-    /// Pixels of a cluster over those of the main one.
-    fn relative_size(&self, i: usize) -> f64 {
-        self.sizes[i] as f64 / self.sizes[self.main] as f64
+            .map(|i| (i, self.sizes[i] as f64 / self.sizes[self.main] as f64))
     }
 }
 
@@ -444,7 +434,8 @@ fn is_any_set(set: &Mask, columns: Range<usize>, mut rows: Range<usize>) -> bool
 const MIN_OBJECT_LENGTH: f64 = 0.05;
 
 fn check_object(hull: &[Point2<f64>], touches: [bool; 4], (w, h): (usize, usize)) -> Result<()> {
-    let [width, height] = box_size(hull);
+    let found = BBox::around(hull.iter().copied());
+    let (width, height) = (found.width(), found.height());
     if hull.is_empty() || width.max(height) < MIN_OBJECT_LENGTH * w.max(h) as f64 {
         return Err(refused(format!(
             "the largest thing found is {width:.0} x {height:.0} of {w} x {h} pixels; is there an object, and is it in focus?"
@@ -456,10 +447,4 @@ fn check_object(hull: &[Point2<f64>], touches: [bool; 4], (w, h): (usize, usize)
         return Err(refused(what));
     }
     Ok(())
-}
-
-/// Width and height of a polygon; 0 without corners.
-fn box_size(polygon: &[Point2<f64>]) -> [f64; 2] {
-    let [left, top, right, bottom] = hull::sides(polygon);
-    [(right - left).max(0.0), (bottom - top).max(0.0)]
 }

@@ -57,7 +57,8 @@ impl ObjectShape {
         strokes: StrokesOnPhoto<'_>,
     ) -> Self {
         let scale = PixelScale::new(prepared.photo.size(), area.size());
-        let rough = rough_outline(area).map(|p| scale.to_photo(p));
+        let soft = filter::gaussian_blur(&area.to_coverage(), CRACK_BLUR_PX);
+        let rough = Outline::around(&soft).map(|p| scale.to_photo(p));
         let snapped = snap::snapped(&rough, &prepared.sqrt, scale.reduction());
         let outline = painted(snapped, strokes);
         let tips = inset(&chosen.pass.hull, TIP_INSET_PX).map(|p| scale.to_photo(p));
@@ -98,11 +99,6 @@ fn painted(outline: Outline, strokes: StrokesOnPhoto<'_>) -> Outline {
     };
     let covered = corrected_coverage(outline.coverage(w, h), Some(&claims));
     Outline::around(&covered)
-}
-
-/// The outline of a set, in its pixels.
-fn rough_outline(area: &Mask) -> Outline {
-    Outline::around(&filter::gaussian_blur(&area.to_coverage(), CRACK_BLUR_PX))
 }
 
 /// A convex polygon's corners moved towards its middle.

@@ -77,15 +77,10 @@ fn displacements(points: &[EdgePoint], roots: &Image<LinearRgb>, scale: f64) -> 
 
 /// The points of a ring, with normals across the chords between the neighbours `reach` points away.
 pub(super) fn edge_points(ring: &[Point2<f64>], reach: usize) -> Vec<EdgePoint> {
-    (0..ring.len())
-        .map(|i| EdgePoint::new(ring[i], neighbours(ring, i, reach)))
-        .collect()
-}
-
-/// The points of a ring `reach` before and after one.
-fn neighbours(ring: &[Point2<f64>], i: usize, reach: usize) -> [Point2<f64>; 2] {
     let n = ring.len();
-    [ring[(i + n - reach) % n], ring[(i + reach) % n]]
+    (0..n)
+        .map(|i| EdgePoint::new(ring[i], [ring[(i + n - reach) % n], ring[(i + reach) % n]]))
+        .collect()
 }
 
 /// The least change that is no noise, from the median noise of all profiles.
@@ -258,9 +253,7 @@ mod tests {
             let a = std::f64::consts::TAU * i as f64 / 200.0;
             Point2::new(50.0 + radius * libm::cos(a), 45.0 + radius * libm::sin(a))
         };
-        Outline {
-            rings: vec![(0..200).map(at).collect()],
-        }
+        Outline::from_ring((0..200).map(at).collect())
     }
 
     #[test]

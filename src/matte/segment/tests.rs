@@ -1,5 +1,6 @@
 use super::*;
 use crate::diagnostic::Code;
+use crate::matte::arrays::largest_difference;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 
@@ -37,25 +38,10 @@ fn find(photo: &Image<LinearRgb>) -> Result<Segmentation> {
     segment(photo, &SegmentOptions::default())
 }
 
-fn bounds(hull: &[Point2<f64>]) -> [f64; 4] {
-    let xs = || hull.iter().map(|p| p.x);
-    let ys = || hull.iter().map(|p| p.y);
-    [
-        xs().fold(f64::MAX, f64::min),
-        ys().fold(f64::MAX, f64::min),
-        xs().fold(0.0, f64::max),
-        ys().fold(0.0, f64::max),
-    ]
-}
-
 /// The hull's box is within 2 pixels of `truth`, the accuracy that is promised of photos.
 fn assert_box(found: &Segmentation, truth: [f64; 4]) {
-    let found = bounds(&found.hull);
-    let worst = found
-        .iter()
-        .zip(truth)
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f64::max);
+    let found = hull::sides(&found.hull);
+    let worst = largest_difference(found, truth);
     assert!(worst <= 2.0, "{found:?}, expected {truth:?}");
 }
 
@@ -158,14 +144,8 @@ fn large_photos_are_searched_small_and_told_in_their_own_pixels() {
         disc(x, y, [900.0, 700.0, 400.0]).then_some(WHITE)
     }))
     .unwrap();
-    let worst = bounds(&found.hull)
-        .into_iter()
-        .zip([500.0, 300.0, 1300.0, 1100.0])
-        .map(|(a, b)| (a - b).abs());
-    assert!(
-        worst.fold(0.0, f64::max) <= 4.0,
-        "2 pixels of the search are 4 of the photo"
-    );
+    let worst = largest_difference(hull::sides(&found.hull), [500.0, 300.0, 1300.0, 1100.0]);
+    assert!(worst <= 4.0, "2 pixels of the search are 4 of the photo");
     assert_eq!(
         (found.mask.size(), found.tight.size()),
         ((2000, 1500), (2000, 1500))
@@ -279,32 +259,15 @@ fn specks_all_over_are_told() {
 
 #[test]
 fn impossible_options_are_named() {
-    let said = |options: SegmentOptions| {
-        segment(&Image::filled(64, 64, GREEN), &options)
-            .unwrap_err()
-            .to_string()
+    let said = |change: fn(&mut SegmentOptions)| {
+        let mut options = SegmentOptions::default();
+        change(&mut options);
+        let refused = segment(&Image::filled(64, 64, GREEN), &options).unwrap_err();
+        refused.to_string()
     };
-    assert_eq!(
-        said(SegmentOptions {
-            levels: Some(1),
-            ..Default::default()
-        }),
-        "levels: 1, expected 2 to 8"
-    );
-    assert!(
-        said(SegmentOptions {
-            join: f64::NAN,
-            ..Default::default()
-        })
-        .starts_with("join: NaN")
-    );
-    assert!(
-        said(SegmentOptions {
-            tone: LumaMode::Grey([0.0; 3]),
-            ..Default::default()
-        })
-        .starts_with("tone.grey")
-    );
+    assert_eq!(said(|o| o.levels = Some(1)), "levels: 1, expected 2 to 8");
+    assert!(said(|o| o.join = f64::NAN).starts_with("join: NaN"));
+    assert!(said(|o| o.tone = LumaMode::Grey([0.0; 3])).starts_with("tone.grey"));
 }
 
 proptest! {

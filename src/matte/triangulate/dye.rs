@@ -3,7 +3,7 @@
 
 use super::lines::{FlatPlastic, PixelLines, opaque_pixels};
 use crate::image::Image;
-use crate::matte::film::tint;
+use crate::matte::film::tint::{self, DYE_HANDICAP, THICKNESS_WEIGHT};
 use crate::pixel::Coverage;
 use crate::quantile::median;
 use std::iter;
@@ -13,10 +13,6 @@ const DYE_SAMPLES: usize = 400;
 /// Standard deviation of a pixel's transmittance around flat plastic of another thickness, beside
 /// its noise.
 const SCATTER_SIGMA: f32 = 0.04;
-/// Misfit by which a dye must be better than clear plastic; as in [`tint`], where less is known.
-const DYE_HANDICAP: f32 = 0.4;
-/// Weight of thickness: the misfit of plastic that is twice as see-through as it should be.
-const THICKNESS_WEIGHT: f32 = 1.0;
 /// From this difference of what they let through on, two dyes are not amounts of one.
 const MIN_SPREAD: f32 = 0.2;
 

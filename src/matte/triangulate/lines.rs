@@ -114,6 +114,21 @@ pub(super) struct PixelFilm {
 }
 
 impl PixelFilm {
+    /// From the transmittance of each channel and its standard deviation.
+    #[inline]
+    fn new(pixel: &PixelLines, channels: [(f32, f32); 3]) -> Self {
+        let transmittance = channels.map(|(t, _)| t);
+        let reflected: [f32; 3] =
+            std::array::from_fn(|c| pixel.lines[c].intercept(transmittance[c]).max(0.0));
+        Self {
+            transmittance: transmittance.into(),
+            reflected: reflected.into(),
+            sigma: channels
+                .iter()
+                .fold(0.0, |worst, (_, sigma)| worst.max(*sigma)),
+        }
+    }
+
     /// The film in front of a screen.
     pub(super) fn over(&self, screen: LinearRgb) -> LinearRgb {
         self.reflected + self.transmittance * screen
@@ -134,11 +149,7 @@ pub(super) struct FlatPlastic {
 /// share, and bare in some.
 pub(super) struct Inferred {
     determined: [bool; 3],
-    /// Transmittance of the plastic where it lies flat.
-    plastic: [f32; 3],
-    /// How far that may be off in open channels, since other plastic explains the determined ones as
-    /// well.
-    spread: [f32; 3],
+    plastic: FlatPlastic,
 }
 
 impl Inferred {
@@ -152,21 +163,20 @@ impl Inferred {
     ) -> Self {
         let prior = Self {
             determined,
-            plastic: plastic.transmittance,
-            spread: plastic.spread,
+            plastic,
         };
         let scaled = [0, 1, 2].map(|c| prior.scaled_channel(pixels, inside, c));
-        Self {
-            plastic: scaled.map(|(plastic, _)| plastic),
+        let plastic = FlatPlastic {
+            transmittance: scaled.map(|(transmittance, _)| transmittance),
             spread: scaled.map(|(_, spread)| spread),
-            ..prior
-        }
+        };
+        Self { plastic, ..prior }
     }
 
     /// How far flat plastic may be off in its least certain channel, since other plastic explains
     /// the object as well.
     pub(super) fn largest_spread(&self) -> f32 {
-        self.spread.into_iter().fold(0.0, f32::max)
+        self.plastic.spread.into_iter().fold(0.0, f32::max)
     }
 
     /// Flat plastic in a channel, scaled where that is open, and what is left of its spread.
@@ -176,14 +186,14 @@ impl Inferred {
         inside: &Image<Coverage>,
         channel: usize,
     ) -> (f32, f32) {
-        let plastic = self.plastic[channel];
+        let plastic = self.plastic.transmittance[channel];
         if self.determined[channel] {
             return (plastic, 0.0);
         }
         let gain = self.gain(pixels, inside, channel);
         (
             scaled_plastic(plastic, gain),
-            self.spread[channel] * kept_prior(gain.1),
+            self.plastic.spread[channel] * kept_prior(gain.1),
         )
     }
 
@@ -216,7 +226,7 @@ impl Inferred {
         let measured = pixel.bounded_slope(channel) - bare;
         (
             f64::from(measured),
-            f64::from(share * self.plastic[channel]),
+            f64::from(share * self.plastic.transmittance[channel]),
         )
     }
 
@@ -227,7 +237,8 @@ impl Inferred {
         let mut sums = ShareSums::prior();
         for c in (0..3).filter(|&c| self.determined[c]) {
             let weight = 1.0 / (pixel.sigma(c).powi(2) + MODEL_SIGMA * MODEL_SIGMA);
-            sums.add(weight, self.plastic[c], pixel.slope(c).clamp(0.0, 1.0));
+            let plastic = self.plastic.transmittance[c];
+            sums.add(weight, plastic, pixel.slope(c).clamp(0.0, 1.0));
         }
         sums.shares()
     }
@@ -241,9 +252,9 @@ impl Inferred {
             if self.determined[c] {
                 (pixel.slope(c).clamp(0.0, 1.0), sigma)
             } else {
-                let inferred = share * self.plastic[c] + bare;
+                let inferred = share * self.plastic.transmittance[c] + bare;
                 let measured = (pixel.bounded_slope(c), sigma);
-                mixed(measured, inferred, share * self.spread[c])
+                mixed(measured, inferred, share * self.plastic.spread[c])
             }
         });
         PixelFilm::new(pixel, channels)
@@ -289,23 +300,6 @@ impl ShareSums {
         let bare =
             ((pp * tb - pb * tp) / (pp * bb - pb * pb).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
         (((tp - pb * bare) / pp).max(0.0), bare)
-    }
-}
-
-impl PixelFilm {
-    /// From the transmittance of each channel and its standard deviation.
-    #[inline]
-    fn new(pixel: &PixelLines, channels: [(f32, f32); 3]) -> Self {
-        let transmittance = channels.map(|(t, _)| t);
-        let reflected: [f32; 3] =
-            std::array::from_fn(|c| pixel.lines[c].intercept(transmittance[c]).max(0.0));
-        Self {
-            transmittance: transmittance.into(),
-            reflected: reflected.into(),
-            sigma: channels
-                .iter()
-                .fold(0.0, |worst, (_, sigma)| worst.max(*sigma)),
-        }
     }
 }
 
@@ -374,13 +368,11 @@ pub(super) fn flat_transmittance(solved: &Image<PixelFilm>, inside: &Image<Cover
 
 /// Channel by channel; white of none.
 fn median_color(colors: &[LinearRgb]) -> LinearRgb {
-    let medians = [0, 1, 2].map(|c| median_of_channel(colors, c));
-    LinearRgb::from(medians.map(|median| median.unwrap_or(1.0)))
-}
-
-fn median_of_channel(colors: &[LinearRgb], channel: usize) -> Option<f32> {
-    let values = colors.iter().map(|color| color.channels()[channel]);
-    median(values, f32::total_cmp)
+    let medians = [0, 1, 2].map(|c: usize| {
+        let values = colors.iter().map(|color| color.channels()[c]);
+        median(values, f32::total_cmp).unwrap_or(1.0)
+    });
+    medians.into()
 }
 
 /// Mean transmittance of the clearest pixels; none without pixels.

@@ -8,10 +8,21 @@ const BLUE: LinearRgb = LinearRgb::new(0.03, 0.095, 0.52);
 const RED: LinearRgb = LinearRgb::new(0.5, 0.04, 0.05);
 
 fn inside() -> Image<Coverage> {
-    Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+    let inside = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
         let (u, v) = ((x as f32 - 80.0) / 60.0, (y as f32 - 50.0) / 35.0);
-        Coverage(f32::from(u8::from(u * u + v * v < 1.0)))
-    })
+        u * u + v * v < 1.0
+    });
+    inside.to_coverage()
+}
+
+fn even_plates(screens: &[LinearRgb]) -> Vec<ScreenPlate> {
+    let plates = screens.iter().map(|&k| ScreenPlate::even(k, SIZE));
+    plates.collect()
+}
+
+fn of_photos(photos: &[Image<LinearRgb>], plates: &[ScreenPlate]) -> Result<Triangulated> {
+    let shots: Vec<_> = photos.iter().zip(plates).collect();
+    triangulate(&shots, &inside(), &TriangulateOptions::default())
 }
 
 /// Blue film with folds and glints.
@@ -48,12 +59,7 @@ fn solved(screens: &[LinearRgb], shift: [f64; 2], noise: f32) -> Result<Triangul
         .enumerate()
         .map(|(i, &k)| photo(k, if i == 0 { [0.0; 2] } else { shift }, noise, i as u64))
         .collect();
-    let plates: Vec<_> = screens
-        .iter()
-        .map(|&k| ScreenPlate::even(k, SIZE))
-        .collect();
-    let shots: Vec<_> = photos.iter().zip(&plates).collect();
-    triangulate(&shots, &inside(), &TriangulateOptions::default())
+    of_photos(&photos, &even_plates(screens))
 }
 
 /// Mean absolute errors of T in the three channels and of F, inside.
@@ -103,8 +109,7 @@ fn a_channel_in_which_the_plates_hardly_differ_follows_from_the_others() {
             f + plate.image[(x, y)].scale(1.0 - 0.3 * mask[(x, y)].0)
         })
     });
-    let shots = [(&photos[0], &plates[0]), (&photos[1], &plates[1])];
-    let found = triangulate(&shots, &mask, &TriangulateOptions::default()).unwrap();
+    let found = of_photos(&photos, &plates).unwrap();
     for t in lines::covered_pixels(&found.transmittance, &mask) {
         assert!((t.r - 0.7).abs() < 0.02, "{t:?}");
     }
@@ -132,8 +137,7 @@ fn exposure_that_differs_between_the_photos_is_told_instead_of_tint() {
             photos.push(clean.map(|p| p.scale(exposed(i))));
             plates.push(ScreenPlate::even(screen.scale(exposed(i)), SIZE));
         }
-        let shots: Vec<_> = photos.iter().zip(&plates).collect();
-        let found = triangulate(&shots, &inside(), &TriangulateOptions::default()).unwrap();
+        let found = of_photos(&photos, &plates).unwrap();
         let codes = found.diagnostics.into_iter().map(|d| d.code);
         let doubts = [Code::MatteExposureDrift, Code::TintUncertain];
         codes
@@ -154,11 +158,10 @@ fn an_exposure_that_differs_by_7_percent_is_told_and_by_2_is_not() {
             let mut photo = photo(screen, [0.0; 2], 0.002, 3);
             let at_label = (70..90).flat_map(|x| (35..65).map(move |y| (x, y)));
             at_label.for_each(|at| photo[at] = label);
-            let plate = ScreenPlate::even(screen.scale(gain), SIZE);
-            (photo.map(|p| p.scale(gain)), plate)
+            photo.map(|p| p.scale(gain))
         });
-        let shots = photos.each_ref().map(|(photo, plate)| (photo, plate));
-        let found = triangulate(&shots, &inside(), &TriangulateOptions::default()).unwrap();
+        let plates = even_plates(&[GREEN, BLUE.scale(gain)]);
+        let found = of_photos(&photos, &plates).unwrap();
         let mut diagnostics = found.diagnostics.into_iter();
         diagnostics.any(|d| d.code == Code::MatteExposureDrift && d.needs_review())
     };
@@ -193,10 +196,7 @@ fn brown_film(screens: &[LinearRgb]) -> (Triangulated, f32) {
         })
     };
     let photos: Vec<_> = screens.iter().map(on).collect();
-    let plates = screens.iter().map(|&k| ScreenPlate::even(k, SIZE));
-    let plates: Vec<_> = plates.collect();
-    let shots: Vec<_> = photos.iter().zip(&plates).collect();
-    let found = triangulate(&shots, &mask, &TriangulateOptions::default()).unwrap();
+    let found = of_photos(&photos, &even_plates(screens)).unwrap();
     let red = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
         (found.transmittance[(x, y)].r - film_at(x, y).1.r).abs()
     });
@@ -231,7 +231,7 @@ fn a_soft_rim_is_covered_once() {
     let paint = LinearRgb::new(0.5, 0.3, 0.3);
     let screens = [GREEN, BLUE, RED];
     let photos = screens.map(|k| mask.map(|c| paint.scale(c.0) + k.scale(1.0 - c.0)));
-    let plates = screens.map(|k| ScreenPlate::even(k, SIZE));
+    let plates = even_plates(&screens);
     let shots: Vec<_> = photos.iter().zip(&plates).collect();
     let found = triangulate(&shots, &mask, &TriangulateOptions::default()).unwrap();
     for (i, c) in mask.pixels().iter().map(|c| c.0).enumerate() {
@@ -294,17 +294,14 @@ fn an_object_that_moved_far_is_refused() {
         photo(GREEN, [0.0; 2], 0.002, 1),
         photo(BLUE, [1.6, -0.7], 0.002, 2),
     );
-    let (ka, kb) = (
-        ScreenPlate::even(GREEN, SIZE),
-        ScreenPlate::even(BLUE, SIZE),
-    );
+    let plates = even_plates(&[GREEN, BLUE]);
     let strict = TriangulateOptions {
         max_shift_px: 1.0,
         ..TriangulateOptions::default()
     };
-    let far = triangulate(&[(&a, &ka), (&b, &kb)], &inside(), &strict)
-        .unwrap_err()
-        .to_string();
+    let shots = [(&a, &plates[0]), (&b, &plates[1])];
+    let far = triangulate(&shots, &inside(), &strict).unwrap_err();
+    let far = far.to_string();
     assert!(far.contains("did it move?"), "{far}");
 }
 
@@ -350,19 +347,8 @@ fn turned(screen: LinearRgb, degrees: f64) -> Image<LinearRgb> {
 
 #[test]
 fn an_object_that_turned_is_refused_and_one_that_hardly_did_is_not() {
-    let plates = [
-        ScreenPlate::even(GREEN, SIZE),
-        ScreenPlate::even(BLUE, SIZE),
-    ];
-    let first = turned(GREEN, 0.0);
-    let on_blue = |degrees| {
-        let second = turned(BLUE, degrees);
-        triangulate(
-            &[(&first, &plates[0]), (&second, &plates[1])],
-            &inside(),
-            &TriangulateOptions::default(),
-        )
-    };
+    let plates = even_plates(&[GREEN, BLUE]);
+    let on_blue = |degrees| of_photos(&[turned(GREEN, 0.0), turned(BLUE, degrees)], &plates);
     for degrees in [-3.0, 2.0, 4.0] {
         let refusal = on_blue(degrees).unwrap_err().to_string();
         assert!(refusal.contains("turn"), "{degrees}: {refusal}");
@@ -382,13 +368,12 @@ fn screens_that_are_alike_and_single_photos_are_refused() {
 
 #[test]
 fn a_pixel_that_is_not_finite_is_named_with_its_photo() {
-    let plates = [GREEN, BLUE].map(|screen| ScreenPlate::even(screen, SIZE));
-    let first = photo(GREEN, [0.0; 2], 0.0, 1);
+    let plates = even_plates(&[GREEN, BLUE]);
     for at in [(80, 50), (5, 5)] {
         let mut second = photo(BLUE, [0.0; 2], 0.0, 2);
         second[at].r = f32::NAN;
-        let shots = [(&first, &plates[0]), (&second, &plates[1])];
-        let refusal = triangulate(&shots, &inside(), &TriangulateOptions::default()).unwrap_err();
+        let photos = [photo(GREEN, [0.0; 2], 0.0, 1), second];
+        let refusal = of_photos(&photos, &plates).unwrap_err();
         let expected = format!("photo 2: pixel {at:?} is not a finite number");
         assert!(refusal.to_string().contains(&expected), "{refusal}");
     }

@@ -16,7 +16,7 @@ use crate::render::RenderOptions;
 use crate::render::detail::{detail_level, texels_per_pixel};
 use crate::render::pixel_filter::filter_quantiles;
 use crate::render::view::{CameraView, ProjectedPlane, ScenePlane};
-use crate::scene::{Card, Cylinder, EdgeTreatment, Grade, Shot};
+use crate::scene::{Card, EdgeTreatment, Shot};
 use bend::BentShading;
 use painted_plane::PaintedPlane;
 use rayon::prelude::*;
@@ -124,7 +124,12 @@ impl Darkroom<'_> {
     fn retouch_side(&self, card: &Card, plane: &ScenePlane, side: &SeenSide<'_>) -> Card {
         let flat = self.paint(card, side);
         let painted = match card.cylinder_seen_from(&self.shot.camera.center()) {
-            Some(cylinder) => self.bend(&flat, card, plane, &cylinder),
+            Some(cylinder) => {
+                let shading = BentShading::new(self, card, plane, &cylinder);
+                let center = self.shot.camera.center();
+                let eye = card.quad.world_from_card.inverse_transform_point(&center);
+                bend::bend(&flat, card, &cylinder, &shading, &eye)
+            }
             None => flat,
         };
         painted.into_card(card)
@@ -150,19 +155,6 @@ impl Darkroom<'_> {
         }
         painted
     }
-
-    fn bend(
-        &self,
-        flat: &PaintedPlane,
-        card: &Card,
-        plane: &ScenePlane,
-        cylinder: &Cylinder,
-    ) -> PaintedPlane {
-        let world_from_card = &card.quad.world_from_card;
-        let eye = world_from_card.inverse_transform_point(&self.shot.camera.center());
-        let shading = BentShading::new(self, card, plane, cylinder);
-        bend::bend(flat, card, cylinder, &shading, &eye)
-    }
 }
 
 impl SeenSide<'_> {
@@ -170,16 +162,6 @@ impl SeenSide<'_> {
     fn surface_level(&self, level: usize) -> Image<SurfaceTexel> {
         let surface = self.surface.of(self.texture);
         painted_plane::turned(surface.level(level).clone(), self.mirrored)
-    }
-}
-
-/// The grade that is left once surfaces have changed.
-fn remaining_grade(grade: &Grade) -> Grade {
-    Grade {
-        hue_deg: grade.hue_deg,
-        saturation: grade.saturation,
-        value: grade.value,
-        ..Grade::default()
     }
 }
 

@@ -1,11 +1,10 @@
 //! A part of a card's plane as a picture.
 
-use super::remaining_grade;
 use crate::asset::Texture;
 use crate::geom::{Point2, Pose, Quad};
 use crate::image::Image;
-use crate::pixel::Film;
-use crate::scene::{Bend, Card};
+use crate::pixel::{Film, LinearRgb};
+use crate::scene::{Bend, Card, Grade};
 use std::sync::Arc;
 
 /// What is painted on a card's plane, x right and y up from its middle, metres.
@@ -71,8 +70,12 @@ impl PaintedPlane {
             outline_uv: self.outline(card),
             texture: self.film.into(),
             back: None,
-            grade: remaining_grade(&card.grade),
-            bend: Bend::FLAT,
+            grade: Grade {
+                tint: LinearRgb::WHITE,
+                glints: 1.0,
+                ..card.grade
+            },
+            bend: Bend::default(),
             surfaces: Default::default(),
             ..card.clone()
         }

@@ -10,7 +10,7 @@ use crate::image::{Image, Mask};
 use crate::label::{LabelOptions, label};
 use crate::pixel::{Film, LinearRgb, ObjectId, PremulRgba};
 use crate::render::{render, render_coverage, render_reference};
-use crate::scene::{AreaLight, Bend, LightShape};
+use crate::scene::{AreaLight, Bend, Grade};
 use geo::{Area, Contains};
 
 const OPTIONS: RenderOptions = RenderOptions {
@@ -82,7 +82,7 @@ fn alpha(deep: &DeepImage) -> Image<f32> {
 
 #[test]
 fn what_asks_for_nothing_is_passed_on() {
-    let shot = shot(card(Bend::FLAT, 0.0));
+    let shot = shot(card(Bend::default(), 0.0));
     assert!(matches!(retouched(&shot, &OPTIONS), Cow::Borrowed(_)));
     assert!(matches!(retouched_fully(&shot, &OPTIONS), Cow::Borrowed(_)));
 }
@@ -100,7 +100,7 @@ fn a_bent_card_and_its_outline_are_seen_where_the_cylinder_is() {
             let differ = inside.zip_map(hit, |a, b| a != b);
             differ.count()
         };
-        let [same, other] = [&hit, &pixels_hit(&card(Bend::FLAT, roll))].map(wrong);
+        let [same, other] = [&hit, &pixels_hit(&card(Bend::default(), roll))].map(wrong);
         assert!(
             same < 60 && other > 2 * same,
             "{deg}: {same} {other} of {}",
@@ -227,7 +227,7 @@ fn edges_of_a_card_smaller_than_a_pixel_stay_close_to_it() {
     let camera = Camera::look_at(far, Point3::origin(), 300.0, [64, 48]);
     let shot = Shot {
         edges: EdgeTreatment::Soft,
-        ..Shot::new(camera).with_card(card(Bend::FLAT, 0.0))
+        ..Shot::new(camera).with_card(card(Bend::default(), 0.0))
     };
     let size = retouched(&shot, &OPTIONS).cards[0].quad.size;
     assert!(size.iter().all(|side| *side < 4.0), "{size:?}");
@@ -236,14 +236,7 @@ fn edges_of_a_card_smaller_than_a_pixel_stay_close_to_it() {
 #[test]
 fn light_on_a_bent_card_follows_its_normal() {
     // So far away that its direction is the same all over the card.
-    let sun = AreaLight {
-        shape: LightShape::Rectangle,
-        position: [60.0, 10.0, 60.0],
-        target: [0.0; 3],
-        size: [0.1; 2],
-        power: 1e5,
-        color: LinearRgb::WHITE,
-    };
+    let sun = AreaLight::new([60.0, 10.0, 60.0], [0.1; 2], 1e5);
     let quad = Quad {
         world_from_card: Pose::translation(0.0, 0.0, 0.06),
         size: [0.26, 0.12],
@@ -277,7 +270,7 @@ fn light_on_a_bent_card_follows_its_normal() {
 
 #[test]
 fn retouching_nothing_at_another_level_changes_next_to_nothing() {
-    let plain = card(Bend::FLAT, 0.0);
+    let plain = card(Bend::default(), 0.0);
     let grade = Grade {
         glints: 0.5,
         ..Grade::default()

@@ -10,7 +10,7 @@ use crate::light;
 use crate::pixel::{Film, LinearRgb, ObjectId, PremulRgba};
 use crate::quality::Quality;
 use crate::render::{RenderOptions, check, render, render_coverage, render_reference};
-use crate::scene::{AreaLight, Card, EnvironmentMap, Grade, LightGrid, LightShape, Shot};
+use crate::scene::{AreaLight, Card, EnvironmentMap, Grade, LightGrid, Shot};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -45,14 +45,7 @@ pub(super) fn above(width: u32, height: u32, focal_px: f64) -> Camera {
 
 /// A light whose irradiance at five points was worked out by hand and checked in Cycles.
 fn square_light() -> AreaLight {
-    AreaLight {
-        shape: LightShape::Rectangle,
-        position: [0.3, 0.2, 0.9],
-        target: [0.0; 3],
-        size: [0.4; 2],
-        power: 10.0,
-        color: LinearRgb::WHITE,
-    }
+    AreaLight::new([0.3, 0.2, 0.9], [0.4; 2], 10.0)
 }
 
 pub(super) fn card(
@@ -426,12 +419,7 @@ fn ways_agree_on_a_pile() {
         (HIGH, 0.005),
     ] {
         let fast = composite::frame(&render(&shot, &options), Some(&plate(64, 48)));
-        let squares = fast
-            .pixels()
-            .iter()
-            .zip(exact.pixels())
-            .map(|(a, b)| f64::from((a.g - b.g).powi(2)));
-        let rmse = (squares.sum::<f64>() / (64.0 * 48.0)).sqrt();
+        let rmse = difference(&fast, &exact);
         assert!(rmse < limit, "{options:?}: {rmse}");
     }
 }

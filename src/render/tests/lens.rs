@@ -9,7 +9,7 @@ use crate::image::Image;
 use crate::label::{LabelOptions, label};
 use crate::pixel::PremulRgba;
 use crate::render::{RenderOptions, render, render_coverage, render_reference};
-use crate::scene::Shot;
+use crate::scene::{AreaLight, Shot};
 
 /// A barrel and a pincushion that move the corners of the pictures here by a tenth of the way.
 const BARREL: f64 = -0.25;
@@ -218,14 +218,7 @@ fn a_lens_that_bends_nothing_changes_no_bit() {
 
 #[test]
 fn shadows_are_bent_with_what_they_fall_on() {
-    let lamp = crate::scene::AreaLight {
-        shape: crate::scene::LightShape::Rectangle,
-        position: [0.0, 0.0, 3.0],
-        target: [0.0; 3],
-        size: [0.01; 2],
-        power: 10.0,
-        color: crate::pixel::LinearRgb::WHITE,
-    };
+    let lamp = AreaLight::new([0.0, 0.0, 3.0], [0.01; 2], 10.0);
     let at = Vector3::new(0.3, 0.2, 0.0);
     // Close over the surface: the shadow is where the card is, and seen through it.
     let half = Image::filled(64, 64, PremulRgba::new(0.2, 0.2, 0.2, 0.5));

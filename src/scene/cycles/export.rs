@@ -127,15 +127,12 @@ fn write_plate(folder: &Path, shot: &Shot) -> Result<Option<CyclesPicture>> {
 }
 
 fn write_picture<P: io::ToFile>(folder: &Path, name: &str, image: &Image<P>) -> Result<String> {
-    io::write_with(folder.join(name), image, &float_options())?;
-    Ok(name.into())
-}
-
-fn float_options() -> WriteOptions {
-    WriteOptions {
+    let options = WriteOptions {
         bits: Some(Bits::Float),
         ..Default::default()
-    }
+    };
+    io::write_with(folder.join(name), image, &options)?;
+    Ok(name.into())
 }
 
 fn cycles_camera(shot: &Shot) -> CyclesCamera {
@@ -177,12 +174,8 @@ fn checked_id(card: &Card) -> Result<u32> {
     if (1..=u32::from(u16::MAX)).contains(&id) {
         return Ok(id);
     }
-    Err(id_out_of_range(id))
-}
-
-fn id_out_of_range(id: u32) -> Error {
     let what = format!("id {id}, expected 1 to {}", u16::MAX);
-    Error::value("cards", what)
+    Err(Error::value("cards", what))
 }
 
 fn matrix_rows<const N: usize>(m: SMatrix<f64, N, N>) -> [[f64; N]; N] {

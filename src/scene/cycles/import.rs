@@ -1,8 +1,7 @@
 //! A shot from a file of the reference renderer.
 
 use super::file::{
-    CyclesAperture, CyclesCamera, CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad,
-    CyclesSide,
+    CyclesAperture, CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad, CyclesSide,
 };
 use crate::asset::{Panorama, Texture};
 use crate::camera::Camera;
@@ -99,7 +98,7 @@ impl PictureFolder {
 
     fn read_card(&self, quad: &CyclesQuad) -> Result<Card> {
         let placed = Quad {
-            world_from_card: world_from_card(&quad.pose),
+            world_from_card: pose_of([0, 1, 2].map(|i| quad.pose[i][3]), &quad.pose),
             size: quad.size,
         };
         let back = quad.back.as_ref();
@@ -127,7 +126,8 @@ impl PictureFolder {
         if size == expected {
             return Ok(opacity);
         }
-        Err(different_size(&path, size, expected))
+        let what = format!("{size:?} pixels, but its colour has {expected:?}");
+        Err(Error::file(&path, what))
     }
 
     /// Gives a shot the lights and the environment of a file.
@@ -187,7 +187,7 @@ fn known_camera(file: &CyclesFile) -> Camera {
         image: c.resolution.unwrap_or(rendered),
         focal_px: Vector2::new(c.K[0][0], c.K[1][1]),
         principal_px: Point2::new(c.K[0][2], c.K[1][2]),
-        camera_from_world: camera_pose(c),
+        camera_from_world: pose_of(c.t, &c.R),
     }
 }
 
@@ -198,28 +198,12 @@ fn thin_lens(aperture: CyclesAperture) -> ThinLens {
     }
 }
 
-fn camera_pose(camera: &CyclesCamera) -> Pose {
-    let translation = Vector3::from(camera.t);
-    Pose::from_parts(translation.into(), rotation_from_rows(camera.R))
-}
-
-fn world_from_card(pose: &[[f64; 4]; 4]) -> Pose {
-    let at = Vector3::new(pose[0][3], pose[1][3], pose[2][3]);
-    Pose::from_parts(at.into(), rotation_from_rows(axes_of(pose)))
-}
-
-fn axes_of(pose: &[[f64; 4]; 4]) -> [[f64; 3]; 3] {
-    std::array::from_fn(|i| std::array::from_fn(|j| pose[i][j]))
-}
-
-fn different_size(path: &Path, size: (usize, usize), expected: (usize, usize)) -> Error {
-    let what = format!("{size:?} pixels, but its colour has {expected:?}");
-    Error::file(path, what)
-}
-
-fn rotation_from_rows(rows: [[f64; 3]; 3]) -> UnitQuaternion<f64> {
+/// The pose of a translation and of a matrix whose first three rows and columns are a rotation.
+fn pose_of<const N: usize>(translation: [f64; 3], rows: &[[f64; N]; N]) -> Pose {
     let matrix = nalgebra::Matrix3::from_fn(|i, j| rows[i][j]);
-    UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(matrix))
+    let rotation = nalgebra::Rotation3::from_matrix_unchecked(matrix);
+    let rotation = UnitQuaternion::from_rotation_matrix(&rotation);
+    Pose::from_parts(Vector3::from(translation).into(), rotation)
 }
 
 fn area_light(light: &CyclesLight) -> AreaLight {
@@ -274,16 +258,11 @@ fn covered_shares(n: usize, len: usize) -> Vec<Vec<(usize, f32)>> {
 fn shares_between(start: f64, end: f64, scale: f64, len: usize) -> Vec<(usize, f32)> {
     (start as usize..len)
         .map(|i| {
-            let covered = covered_length(i, start, end);
+            let covered = end.min((i + 1) as f64) - start.max(i as f64);
             (i, (covered / scale) as f32)
         })
         .take_while(|&(_, share)| share > 0.0)
         .collect()
-}
-
-/// Of the pixel.
-fn covered_length(i: usize, start: f64, end: f64) -> f64 {
-    end.min((i + 1) as f64) - start.max(i as f64)
 }
 
 #[cfg(test)]

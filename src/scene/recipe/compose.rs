@@ -7,7 +7,7 @@ use crate::scene::belt::SequencePlace;
 use crate::scene::stack::DropColumn;
 use crate::scene::{
     AreaLight, AssetVariant, Background, Bend, DrawLog, Draws, EdgeTreatment, Exposure, LightShape,
-    LightTint, Object, PostProcess, Range, Recipe, Scene, SceneSettings, Surface, draw_paths,
+    LightTint, Object, Range, Recipe, Scene, Surface, draw_paths,
 };
 use std::f64::consts::PI;
 
@@ -20,18 +20,6 @@ pub(super) struct SceneNumber {
     pub(super) place: SequencePlace,
 }
 
-impl SceneNumber {
-    /// The draws of its sequence.
-    fn draws(self, log: &DrawLog) -> Draws<'_> {
-        Draws::new(self.seed, self.place.first).logged(log)
-    }
-
-    /// What is drawn anew for each picture of a sequence.
-    fn own_draws(self, log: &DrawLog) -> Draws<'_> {
-        Draws::new(self.seed, self.k).logged(log)
-    }
-}
-
 /// The backgrounds that a scene may have.
 #[derive(Clone, Copy)]
 pub(super) struct Places<'a> {
@@ -39,16 +27,6 @@ pub(super) struct Places<'a> {
     pub(super) viewpoints: &'a [Background],
     /// Without.
     pub(super) negatives: &'a [Background],
-}
-
-impl<'a> Places<'a> {
-    fn of(&self, is_negative: bool) -> &'a [Background] {
-        if is_negative {
-            self.negatives
-        } else {
-            self.viewpoints
-        }
-    }
 }
 
 impl Recipe {
@@ -60,13 +38,13 @@ impl Recipe {
         places: Places<'_>,
         catalog: &[AssetVariant],
     ) -> Result<Scene> {
-        let draws = number.draws(log);
-        let is_negative = self.draw_negative(&draws);
-        let background = pick_background(&draws, places.of(is_negative))?;
-        let mut objects = if is_negative {
-            Vec::new()
+        let draws = Draws::new(number.seed, number.place.first).logged(log);
+        let own_draws = Draws::new(number.seed, number.k).logged(log);
+        let (background, mut objects) = if Range::chance(self.negatives, &draws, "negative") {
+            (pick_background(&draws, places.negatives)?, Vec::new())
         } else {
-            self.select_objects(number, log, catalog)?
+            let background = pick_background(&draws, places.viewpoints)?;
+            (background, self.select_objects(number, log, catalog)?)
         };
         self.vary_objects(&mut objects, &draws);
         let surface = self.draw_surface(&draws, background);
@@ -74,7 +52,7 @@ impl Recipe {
             .stack(&mut objects)?;
         let scene = Scene {
             belt: self.belt.map(|belt| belt.draw(&draws, number.place)),
-            finish: self.finish.draw(&draws, &number.own_draws(log)),
+            finish: self.finish.draw(&draws, &own_draws),
             ..self.lit_scene(&draws, background, surface, objects)
         };
         scene.check()?;
@@ -106,12 +84,9 @@ impl Recipe {
     ) -> Scene {
         let lights = self.draw_lights(draws);
         Scene {
-            image: self.image,
             plate: background.name.clone(),
-            camera: background.camera,
             view: self.view.draw(draws),
             lens: self.lens.draw(draws, background),
-            surface,
             objects,
             ambient: ambient_radiance(&lights, self.ambient.draw(draws, "ambient")),
             lights,
@@ -122,16 +97,8 @@ impl Recipe {
             light_map: self.light_map.clone(),
             interreflection: self.draw_interreflection(draws, background),
             edges: EdgeTreatment::draw(&self.edges, draws),
-            belt: None,
-            finish: PostProcess::default(),
-            files: None,
-            settings: SceneSettings::default(),
+            ..Scene::new(self.image, background.camera, surface)
         }
-    }
-
-    /// Whether the scene stays empty.
-    fn draw_negative(&self, draws: &Draws) -> bool {
-        Range::chance(self.negatives, draws, "negative")
     }
 
     fn draw_surface(&self, draws: &Draws, background: &Background) -> Surface {
@@ -184,24 +151,20 @@ impl Recipe {
         }
     }
 
+    /// Gives objects their scale and their colours.
     fn vary_objects(&self, objects: &mut [Object], draws: &Draws) {
         let paths = draw_paths(objects);
         for (object, path) in objects.iter_mut().zip(paths) {
-            self.vary_object(object, draws, &path);
+            object.scale_by(self.scale.draw_field(draws, &path, "scale"));
+            object.grade = self.grade.draw(draws, &format!("{path}.grade"));
+            object.bend = self.draw_bend(draws, &format!("{path}.bend"));
         }
-    }
-
-    /// Gives an object its scale and its colours.
-    fn vary_object(&self, object: &mut Object, draws: &Draws, path: &str) {
-        object.scale_by(self.scale.draw_field(draws, path, "scale"));
-        object.grade = self.grade.draw(draws, &format!("{path}.grade"));
-        object.bend = self.draw_bend(draws, &format!("{path}.bend"));
     }
 
     /// A bend about an axis of any direction; flat, and nothing drawn, where the range is 0.
     fn draw_bend(&self, draws: &Draws, path: &str) -> Bend {
         if self.bend_deg.is_zero() {
-            return Bend::FLAT;
+            return Bend::default();
         }
         Bend {
             deg: self.bend_deg.draw_field(draws, path, "deg"),

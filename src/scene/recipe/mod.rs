@@ -300,17 +300,15 @@ impl Recipe {
         self.scale.check("scale", &SCALE)?;
         self.start.check()?;
         self.bend_deg.check("bend_deg", &BEND)?;
-        self.grade.check("grade")
+        self.grade.check()
     }
 
     fn check_surface(&self) -> Result<()> {
         self.friction.check("friction", &FRICTION)?;
         self.restitution.check("restitution", &SHARE)?;
         self.walls.map_or(Ok(()), |walls| walls.check())?;
-        match self.surface_albedo {
-            Some(albedo) => check_albedo(albedo, "surface_albedo"),
-            None => Ok(()),
-        }
+        self.surface_albedo
+            .map_or(Ok(()), |albedo| check_albedo(albedo, "surface_albedo"))
     }
 
     fn check_light(&self) -> Result<()> {

@@ -69,9 +69,8 @@ impl EnvironmentRanges {
 mod tests {
     use super::*;
     use crate::color::planckian;
-    use crate::scene::{
-        AssetVariant, Background, CameraSource, LightDirection, LightDirectionSource, Range, Scene,
-    };
+    use crate::scene::recipe::tests::{catalog, tray};
+    use crate::scene::{AssetVariant, LightDirection, LightDirectionSource, Range, Scene};
     use std::collections::BTreeSet;
 
     fn scenes(off: &[Variation]) -> Vec<Scene> {
@@ -83,31 +82,13 @@ mod tests {
     }
 
     fn scene_of(recipe: &Recipe, k: u64) -> Scene {
-        let camera = CameraSource::Rectangle {
-            corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
-            photo: [60, 40],
-            focal_px: Some(55.0),
-        };
-        let place = |name: &str| Background {
-            name: name.into(),
-            size: [0.6, 0.4],
-            k1: 0.0,
-            shown_share: 1.0,
-            albedo: None,
-            wall: None,
-            camera,
-        };
-        let choice = |i| AssetVariant {
-            asset: format!("b{i}"),
-            role: Default::default(),
+        let three_photos = |variant| AssetVariant {
             photo_sizes: vec![[0.2, 0.07]; 3],
-            photo_outlines: vec![],
-            thickness: 0.005,
-            mass: 0.03,
+            ..variant
         };
-        let catalog: Vec<AssetVariant> = (0..9).map(choice).collect();
+        let catalog: Vec<_> = catalog(9).into_iter().map(three_photos).collect();
         recipe
-            .scene(5, k, &[place("a"), place("b")], &catalog)
+            .scene(5, k, &[tray("a"), tray("b")], &catalog)
             .unwrap()
     }
 

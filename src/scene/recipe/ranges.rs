@@ -27,10 +27,6 @@ pub struct GradeRanges {
     pub glints: Range,
 }
 
-fn are_unchanged(glints: &Range) -> bool {
-    *glints == Range::fixed(1.0)
-}
-
 /// An area light that faces the centre of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -113,19 +109,19 @@ impl GradeRanges {
     }
 
     fn draw_glints(&self, draws: &Draws, path: &str) -> f64 {
-        if are_unchanged(&self.glints) {
+        if self.glints == Range::fixed(1.0) {
             1.0
         } else {
             self.glints.draw_field(draws, path, "glints")
         }
     }
 
-    pub(super) fn check(&self, at: &str) -> Result<()> {
-        self.hue_deg.check(&format!("{at}.hue_deg"), &TURN)?;
-        self.saturation.check(&format!("{at}.saturation"), &GRADE)?;
-        self.value.check(&format!("{at}.value"), &GRADE)?;
-        self.glints.check(&format!("{at}.glints"), &GRADE)?;
-        check_palette(&self.palette, &format!("{at}.palette"))
+    pub(super) fn check(&self) -> Result<()> {
+        self.hue_deg.check("grade.hue_deg", &TURN)?;
+        self.saturation.check("grade.saturation", &GRADE)?;
+        self.value.check("grade.value", &GRADE)?;
+        self.glints.check("grade.glints", &GRADE)?;
+        check_palette(&self.palette, "grade.palette")
     }
 }
 
@@ -147,7 +143,8 @@ impl LightRanges {
     fn draw_offset(&self, draws: &Draws, path: &str) -> [f64; 2] {
         let offset = self.offset.draw_field(draws, path, "offset");
         let azimuth = self.azimuth_deg.draw_field(draws, path, "azimuth_deg");
-        from_polar(offset, azimuth.to_radians())
+        let azimuth = azimuth.to_radians();
+        [offset * libm::cos(azimuth), offset * libm::sin(azimuth)]
     }
 
     fn draw_color(&self, draws: &Draws, path: &str) -> LinearRgb {
@@ -195,8 +192,4 @@ impl LightRanges {
             ("power", &self.power, &RADIANCE),
         ]
     }
-}
-
-fn from_polar(radius: f64, azimuth: f64) -> [f64; 2] {
-    [radius * libm::cos(azimuth), radius * libm::sin(azimuth)]
 }

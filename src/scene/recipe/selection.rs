@@ -122,11 +122,9 @@ impl Recipe {
         catalog: &[AssetVariant],
     ) -> Result<Vec<Object>> {
         let part = choice.part_of(catalog);
-        let count = choice.draw_count(draws);
-        choice.check_part(count, part.len())?;
-        if self.at_most_once {
-            choice.check_once(count, part.len())?;
-        }
+        let path = format!("selection.{}", choice.at);
+        let count = choice.count.draw(draws, &path);
+        self.check_selection(choice, count, part.len())?;
         let mut left = Vec::new();
         (0..count)
             .map(|i| {
@@ -139,16 +137,18 @@ impl Recipe {
 
     /// Fails where more may be asked for than there are assets, and none may be there twice.
     pub(super) fn check_selections(&self, catalog: &[AssetVariant]) -> Result<()> {
-        [Role::Object, Role::Distractor]
-            .into_iter()
-            .try_for_each(|role| self.check_selection(&self.choice_of(role), catalog))
+        for role in [Role::Object, Role::Distractor] {
+            let choice = self.choice_of(role);
+            let assets = choice.part_of(catalog).len();
+            self.check_selection(&choice, choice.count.max(), assets)?;
+        }
+        Ok(())
     }
 
-    fn check_selection(&self, choice: &Choice<'_>, catalog: &[AssetVariant]) -> Result<()> {
-        let (most, assets) = (choice.count.max(), choice.part_of(catalog).len());
-        choice.check_part(most, assets)?;
+    fn check_selection(&self, choice: &Choice<'_>, count: usize, assets: usize) -> Result<()> {
+        choice.check_part(count, assets)?;
         match self.at_most_once {
-            true => choice.check_once(most, assets),
+            true => choice.check_once(count, assets),
             false => Ok(()),
         }
     }
@@ -160,10 +160,6 @@ impl Recipe {
 }
 
 impl Choice<'_> {
-    fn draw_count(&self, draws: &Draws) -> usize {
-        self.count.draw(draws, &format!("selection.{}", self.at))
-    }
-
     /// The part of a catalog that it chooses from.
     fn part_of<'a>(&self, catalog: &'a [AssetVariant]) -> Vec<&'a AssetVariant> {
         let part = catalog.iter().filter(|variant| variant.role == self.role);

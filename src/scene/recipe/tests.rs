@@ -12,7 +12,7 @@ use crate::scene::{
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
-fn tray(name: &str) -> Background {
+pub(super) fn tray(name: &str) -> Background {
     Background {
         name: name.into(),
         size: [0.6, 0.4],
@@ -28,7 +28,7 @@ fn tray(name: &str) -> Background {
     }
 }
 
-fn catalog(n: usize) -> Vec<AssetVariant> {
+pub(super) fn catalog(n: usize) -> Vec<AssetVariant> {
     let choice = |i| AssetVariant {
         asset: format!("b{i}"),
         role: Role::Object,
@@ -38,6 +38,13 @@ fn catalog(n: usize) -> Vec<AssetVariant> {
         mass: 0.03,
     };
     (0..n).map(choice).collect()
+}
+
+fn of_count(objects: u32) -> Recipe {
+    Recipe {
+        objects: Count::fixed(objects),
+        ..Recipe::default()
+    }
 }
 
 fn scene(recipe: &Recipe, k: u64) -> Scene {
@@ -342,16 +349,12 @@ fn negatives_are_empty_and_leave_the_other_scenes_as_they_are() {
     assert!((26..=74).contains(&empty.len()), "{}", empty.len());
     let k = (0..200).find(|k| !empty.contains(k)).unwrap();
     assert_eq!(scene(&recipe, k), scene(&Recipe::default(), k));
-    assert!(
-        Recipe {
-            negatives: 1.5,
-            ..Recipe::default()
-        }
-        .check()
-        .unwrap_err()
-        .to_string()
-        .starts_with("negatives")
-    );
+    let wrong = Recipe {
+        negatives: 1.5,
+        ..Recipe::default()
+    };
+    let told = wrong.check().unwrap_err().to_string();
+    assert!(told.starts_with("negatives"));
 }
 
 #[test]
@@ -422,31 +425,13 @@ fn nothing_to_choose_from_is_told() {
 
 #[test]
 fn no_object_asked_for_is_an_empty_scene() {
-    let recipe = Recipe {
-        objects: Range::fixed(0.0).into(),
-        ..Recipe::default()
-    };
-    assert!(
-        recipe
-            .scene(0, 0, &[tray("a")], &[])
-            .unwrap()
-            .objects
-            .is_empty()
-    );
+    let drawn = of_count(0).scene(0, 0, &[tray("a")], &[]).unwrap();
+    assert!(drawn.objects.is_empty());
 }
 
 #[test]
 fn one_more_object_re_rolls_nothing_else() {
-    let with = |n| {
-        scene(
-            &Recipe {
-                objects: Range::fixed(n).into(),
-                ..Recipe::default()
-            },
-            4,
-        )
-    };
-    let (few, more) = (with(5.0), with(6.0));
+    let [few, more] = [5, 6].map(|n| scene(&of_count(n), 4));
     assert_eq!(more.objects[..5], few.objects);
     assert_eq!(
         Scene {
@@ -464,15 +449,13 @@ fn another_range_re_rolls_nothing_else() {
         hue_deg: Range::new(0.0, 1.0),
         ..Default::default()
     };
-    let mut other = scene(
-        &Recipe {
-            grade,
-            lights: vec![],
-            gain_ev: Range::fixed(1.0),
-            ..Recipe::default()
-        },
-        4,
-    );
+    let recipe = Recipe {
+        grade,
+        lights: vec![],
+        gain_ev: Range::fixed(1.0),
+        ..Recipe::default()
+    };
+    let mut other = scene(&recipe, 4);
     assert_ne!(other.objects, usual.objects);
     for (a, b) in other.objects.iter_mut().zip(&usual.objects) {
         a.grade.hue_deg = b.grade.hue_deg;
@@ -483,48 +466,26 @@ fn another_range_re_rolls_nothing_else() {
 #[test]
 fn assets_repeat_only_when_the_stock_is_used_up() {
     for k in 0..30 {
-        let all = scene(
-            &Recipe {
-                objects: Range::fixed(25.0).into(),
-                ..Recipe::default()
-            },
-            k,
-        );
+        let all = scene(&of_count(25), k);
         let distinct = |part: &[Object]| {
-            part.iter()
-                .map(|o| o.asset.clone())
-                .collect::<BTreeSet<_>>()
-                .len()
+            let assets: BTreeSet<_> = part.iter().map(|o| &o.asset).collect();
+            assets.len()
         };
-        let parts = [
-            distinct(&all.objects[..10]),
-            distinct(&all.objects[10..20]),
-            distinct(&all.objects[20..]),
-        ];
+        let parts: Vec<usize> = all.objects.chunks(10).map(distinct).collect();
         assert_eq!(parts, [10, 10, 5]);
     }
 }
 
 #[test]
 fn every_asset_photo_and_background_is_used_as_often() {
-    let recipe = Recipe {
-        objects: Range::fixed(2.0).into(),
-        ..Recipe::default()
-    };
-    let scenes: Vec<Scene> = (0..2000).map(|k| scene(&recipe, k)).collect();
+    let scenes: Vec<Scene> = (0..2000).map(|k| scene(&of_count(2), k)).collect();
     let share =
         |claim: &dyn Fn(&Object) -> bool| scenes.iter().filter(|s| claim(&s.objects[1])).count();
     // Binomial, 2000 draws: standard deviation 13 at 1/10 and 22 at 1/2.
     (0..10).for_each(|i| assert!(share(&|o| o.asset == format!("b{i}")).abs_diff(200) < 5 * 13));
     assert!(share(&|o| o.photo == 1).abs_diff(1000) < 5 * 22);
-    assert!(
-        scenes
-            .iter()
-            .filter(|s| s.plate == "a")
-            .count()
-            .abs_diff(1000)
-            < 5 * 22
-    );
+    let on_first = scenes.iter().filter(|s| s.plate == "a").count();
+    assert!(on_first.abs_diff(1000) < 5 * 22);
 }
 
 #[test]
@@ -637,15 +598,11 @@ fn friction_and_bounce_are_drawn_for_a_scene() {
 #[test]
 fn hulls_fall_only_where_they_are_asked_for_and_known_and_grow_with_their_card() {
     let with = |collider| {
-        scene(
-            &Recipe {
-                collider,
-                objects: Range::fixed(9.0).into(),
-                ..Recipe::default()
-            },
-            2,
-        )
-        .objects
+        let recipe = Recipe {
+            collider,
+            ..of_count(9)
+        };
+        scene(&recipe, 2).objects
     };
     let (boxes, hulls) = (with(Collider::Box), with(Collider::Hull));
     assert!(boxes.iter().all(|object| object.outline.is_empty()));
@@ -773,7 +730,7 @@ fn what_retouches_photos_is_drawn_for_each_object_and_changes_nothing_else() {
             assert!((0.2..0.9).contains(&grade.glints) && grade.hue_deg == 0.0);
             assert!(object.bend.deg.abs() <= 20.0 && !object.bend.is_flat());
             (grade.tint, grade.glints) = (LinearRgb::WHITE, 1.0);
-            object.bend = Bend::FLAT;
+            object.bend = Bend::default();
         }
         assert_eq!(retouched, scene(&plain, k));
     }

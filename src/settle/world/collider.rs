@@ -13,14 +13,12 @@ pub(super) fn collider(
     length: f64,
     mass: f64,
 ) -> ColliderBuilder {
-    let ring = scaled(&object.outline, length);
+    let corners = object.outline.iter();
+    let ring: Vec<_> = corners.map(|corner| corner.map(|x| x * length)).collect();
+    let cuboid = || ColliderBuilder::cuboid(half.x as f32, half.y as f32, half.z as f32);
     prism(&ring, half.z)
-        .unwrap_or_else(|| cuboid(half))
+        .unwrap_or_else(cuboid)
         .mass(mass as f32)
-}
-
-fn cuboid(half: &Vector3<f64>) -> ColliderBuilder {
-    ColliderBuilder::cuboid(half.x as f32, half.y as f32, half.z as f32)
 }
 
 /// None where the ring has no area or the engine finds the prism too thin a shape.
@@ -28,8 +26,4 @@ fn prism(ring: &[[f64; 2]], half_height: f64) -> Option<ColliderBuilder> {
     let has_area = ring.len() > 2 && doubled_area(ring) > 0.0;
     let prism = has_area.then(|| Prism::new(ring, half_height))??;
     Some(ColliderBuilder::new(SharedShape::new(prism)))
-}
-
-fn scaled(ring: &[[f64; 2]], by: f64) -> Vec<[f64; 2]> {
-    ring.iter().map(|corner| corner.map(|x| x * by)).collect()
 }

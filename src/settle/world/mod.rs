@@ -153,26 +153,14 @@ impl Drop<'_> {
     ) -> (PhysicsWorld, Vec<RigidBodyHandle>) {
         let mut world = self.empty_world(step);
         self.add_room(&mut world, units, members);
-        self.add_standing(&mut world, units);
-        let falling = members.iter();
-        let bodies = falling.map(|&i| self.add_falling(&mut world, i, units));
+        for object in self.standing() {
+            self.add_body(&mut world, object, 0.0, units);
+        }
+        let bodies = members
+            .iter()
+            .map(|&i| self.add_body(&mut world, &self.scene.objects[i], self.heights[i], units));
         let bodies = bodies.collect();
         (world, bodies)
-    }
-
-    fn add_falling(
-        &self,
-        world: &mut PhysicsWorld,
-        i: usize,
-        units: &WorldUnits,
-    ) -> RigidBodyHandle {
-        self.add_body(world, &self.scene.objects[i], self.heights[i], units)
-    }
-
-    fn add_standing(&self, world: &mut PhysicsWorld, units: &WorldUnits) {
-        for object in self.standing() {
-            self.add_body(world, object, 0.0, units);
-        }
     }
 
     fn pace(&self, members: &[usize], units: &WorldUnits) -> Pace {

@@ -108,7 +108,10 @@ pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     for (name, list) in lists {
         io::write_text(folder.join(format!("{name}.txt")), &list)?;
     }
-    write_variants(folder, place, &variants, &real.classes)?;
+    for variant in &variants {
+        let path = folder.join(format!("{}.yaml", variant.name));
+        io::write_text(path, &variant.to_yaml(place, &real.classes))?;
+    }
     io::write_json(folder.join("balance.json"), &balance)?;
     let commands = commands_head(options, counts) + &without_validation(&left_out);
     write_scripts(folder, &(commands + &training_commands(options, &variants)))
@@ -118,20 +121,6 @@ fn write_scripts(folder: &Path, commands: &str) -> Result<()> {
     io::write_text(folder.join("hyp.yaml"), HYP_YAML)?;
     io::write_text(folder.join("balanced.py"), BALANCED_PY)?;
     io::write_text(folder.join("commands.sh"), commands)
-}
-
-/// `place` is the folder's whole path.
-fn write_variants(
-    folder: &Path,
-    place: &str,
-    variants: &[&Variant],
-    classes: &[String],
-) -> Result<()> {
-    for variant in variants {
-        let path = folder.join(format!("{}.yaml", variant.name));
-        io::write_text(path, &variant.to_yaml(place, classes))?;
-    }
-    Ok(())
 }
 
 fn balance_document(balance: &Balance, [real, synthetic]: [u64; 2]) -> Result<serde_json::Value> {
@@ -338,18 +327,12 @@ mod tests {
         let kit = written(root.path(), "kit");
         for variant in &VARIANTS {
             let text = io::read_text(kit.join(format!("{}.yaml", variant.name))).unwrap();
-            variant
-                .train
-                .iter()
-                .for_each(|list| assert!(text.contains(&format!("  - {list}.txt")), "{text}"));
+            for list in variant.train {
+                assert!(text.contains(&format!("  - {list}.txt")), "{text}");
+            }
         }
-        assert_eq!(
-            io::read_text(kit.join("synthetic_train.txt"))
-                .unwrap()
-                .lines()
-                .count(),
-            6
-        );
+        let list = io::read_text(kit.join("synthetic_train.txt")).unwrap();
+        assert_eq!(list.lines().count(), 6);
         let balance: serde_json::Value = io::read_json(kit.join("balance.json")).unwrap();
         assert_eq!(
             balance["weights"],
@@ -374,10 +357,8 @@ mod tests {
         assert_eq!(there, [true, false, true, false, true]);
         assert!(!commands.contains("--data synthetic.yaml"), "{commands}");
         let said = write(&kit, &KitOptions::new(made, real)).unwrap_err();
-        assert!(
-            said.to_string()
-                .ends_with("val: no images, expected at least one")
-        );
+        let said = said.to_string();
+        assert!(said.ends_with("val: no images, expected at least one"));
     }
 
     #[test]
@@ -422,12 +403,8 @@ mod tests {
             "mosaic: 1.0",
             "fliplr: 0.5",
         ] {
-            assert!(
-                HYP_YAML
-                    .lines()
-                    .any(|l| l.split('#').next().unwrap_or_default().trim() == line),
-                "{line}"
-            );
+            let mut lines = HYP_YAML.lines().filter_map(|line| line.split('#').next());
+            assert!(lines.any(|told| told.trim() == line), "{line}");
         }
     }
 

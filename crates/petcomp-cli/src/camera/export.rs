@@ -32,7 +32,9 @@ enum ExportFormat {
 
 pub(super) fn export_cameras(args: &ExportCameraArgs) -> anyhow::Result<()> {
     io::check_distinct(&args.cameras, &args.output)?;
-    let (files, output) = (args.read_cameras()?, args.output.as_deref());
+    let files = args.cameras.iter().map(io::read_json);
+    let files: Vec<CameraFile> = files.collect::<petcomp::Result<_>>()?;
+    let output = args.output.as_deref();
     match args.to {
         ExportFormat::Colmap => {
             check_names(&args.cameras, &files)?;
@@ -44,12 +46,6 @@ pub(super) fn export_cameras(args: &ExportCameraArgs) -> anyhow::Result<()> {
             write_or_print(output, &file.camera().to_blender_script())
         }
         ExportFormat::Opencv => write_or_print(output, &opencv_document(only_file(&files)?)?),
-    }
-}
-
-impl ExportCameraArgs {
-    fn read_cameras(&self) -> petcomp::Result<Vec<CameraFile>> {
-        self.cameras.iter().map(io::read_json).collect()
     }
 }
 
@@ -116,14 +112,12 @@ fn check_names(paths: &[PathBuf], files: &[CameraFile]) -> anyhow::Result<()> {
 fn write_colmap(folder: Option<&Path>, files: &[CameraFile]) -> anyhow::Result<()> {
     let folder = folder
         .ok_or_else(|| anyhow::anyhow!("-o: missing, expected a folder for COLMAP's files"))?;
-    Ok(write_model(folder, &colmap_model(files))?)
-}
-
-fn write_model(folder: &Path, model: &ColmapModel) -> petcomp::Result<()> {
+    let model = colmap_model(files);
     io::create_folder(folder)?;
     io::write_text(folder.join("cameras.txt"), &model.cameras)?;
     io::write_text(folder.join("images.txt"), &model.images)?;
-    io::write_text(folder.join("points3D.txt"), &model.points)
+    io::write_text(folder.join("points3D.txt"), &model.points)?;
+    Ok(())
 }
 
 fn colmap_model(files: &[CameraFile]) -> ColmapModel {

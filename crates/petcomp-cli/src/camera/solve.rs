@@ -104,19 +104,12 @@ pub(super) fn solve_each(args: &SolveArgs, global: &GlobalArgs) -> anyhow::Resul
     args.labels.for_each(|labelled| {
         let solution = accepted(solved(labelled)?, labelled, args.force)?;
         let file = CameraFile::new(&labelled.label, &solution);
-        write_camera(&args.target_for(labelled), labelled, &file, &solution)?;
+        let beside = || labelled.beside("camera.json");
+        let target = args.output.clone().unwrap_or_else(beside);
+        write_camera(&target, labelled, &file, &solution)?;
         report_solution(labelled, &solution, global);
         Ok(())
     })
-}
-
-impl SolveArgs {
-    fn target_for(&self, labelled: &LabelledPhoto) -> PathBuf {
-        match &self.output {
-            Some(path) => path.clone(),
-            None => labelled.beside("camera.json"),
-        }
-    }
 }
 
 /// Solves the labels of each camera together.
@@ -191,14 +184,10 @@ pub(super) fn explain_each(args: &LabelFileArgs) -> anyhow::Result<()> {
     })
 }
 
-fn solve_label(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
+pub(super) fn solved(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
     warn_of_outside(labelled, &labelled.label);
     let solution = camera::solve(&labelled.label, &SolveOptions::default());
-    solution.map_err(|e| located(e, labelled))
-}
-
-pub(super) fn solved(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
-    possible(solve_label(labelled)?, labelled)
+    possible(solution.map_err(|e| located(e, labelled))?, labelled)
 }
 
 /// A solution whose camera can see objects on the surface.

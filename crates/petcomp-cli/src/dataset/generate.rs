@@ -60,7 +60,9 @@ pub(crate) struct GenerateArgs {
 }
 
 pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let (whole, range) = (args.whole_config()?, args.sample_range()?);
+    // In pictures of the recipe's own size.
+    let whole = args.recipe.read_config_at(args.quality)?;
+    let range = args.sample_range()?;
     let (whole_px, config) = (whole.scene.image, args.reduced(whole));
     let archives = config.labels.archives();
     let folder = range.folder(&args.output.folder(args.scratch.as_deref())?, archives);
@@ -84,22 +86,25 @@ pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()
 impl GenerateArgs {
     /// Has what is damaged made again.
     fn repair(&self, folder: &Path, range: SampleRange, archives: bool) -> petcomp::Result<()> {
-        match &self.output {
-            Output::Folder(_) if archives => repair_archives(folder, range),
-            Output::Folder(_) => repair_folder(folder),
-            Output::Store(_) => Err(Error::value(
-                "resume",
-                "an object store, expected a folder: what has a receipt there is whole",
-            )),
+        if let Output::Store(_) = self.output {
+            let what = "an object store, expected a folder: what has a receipt there is whole";
+            return Err(Error::value("resume", what));
         }
+        let ((good, bad), what) = match archives {
+            true => (
+                dataset::repair_archives(folder, range)?,
+                "archives are whole",
+            ),
+            false => (dataset::repair(folder)?, "images are as they were written"),
+        };
+        let folder = folder.display();
+        print::line(format_args!(
+            "{folder}: {good} {what}, {bad} are made again"
+        ));
+        Ok(())
     }
 
-    /// The recipe as the flags change it, in pictures of its own size.
-    fn whole_config(&self) -> anyhow::Result<DatasetConfig> {
-        self.recipe.read_config_at(self.quality)
-    }
-
-    /// The same for the pictures that are asked for.
+    /// The recipe for the pictures that are asked for.
     fn reduced(&self, whole: DatasetConfig) -> DatasetConfig {
         match self.preview {
             Some(_) => whole.preview(),
@@ -131,33 +136,12 @@ impl GenerateArgs {
 
     fn sample_range(&self) -> petcomp::Result<SampleRange> {
         match self.shard {
-            Some(choice) => shard_range(choice),
+            Some(choice) => choice
+                .within(|name| std::env::var(name).ok())
+                .map(SampleRange::Shard),
             None => Ok(self.only.map_or(SampleRange::All, SampleRange::One)),
         }
     }
-}
-
-fn repair_folder(folder: &Path) -> petcomp::Result<()> {
-    let (good, bad) = dataset::repair(folder)?;
-    print::line(format_args!(
-        "{}: {good} images are as they were written, {bad} are made again",
-        folder.display()
-    ));
-    Ok(())
-}
-
-fn repair_archives(folder: &Path, range: SampleRange) -> petcomp::Result<()> {
-    let (good, bad) = dataset::repair_archives(folder, range)?;
-    print::line(format_args!(
-        "{}: {good} archives are whole, {bad} are made again",
-        folder.display()
-    ));
-    Ok(())
-}
-
-fn shard_range(choice: ShardChoice) -> petcomp::Result<SampleRange> {
-    let shard = choice.within(|name| std::env::var(name).ok());
-    shard.map(SampleRange::Shard)
 }
 
 fn write_preview_sheet(folder: &Path, count: u64) -> petcomp::Result<()> {

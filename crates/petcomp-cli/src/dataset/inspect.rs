@@ -76,17 +76,11 @@ fn check_dataset(args: &CheckArgs, global: &GlobalArgs) -> anyhow::Result<()> {
         global.print_status(located(&folder, note));
     }
     print_findings(&checked, &args.folder)?;
-    args.check_note_count(notes.len())
-}
-
-impl CheckArgs {
-    fn check_note_count(&self, count: usize) -> anyhow::Result<()> {
-        if self.strict && count > 0 {
-            let folder = self.folder.display();
-            return Err(NeedsReview(format!("{folder}: {}", counted(count, "note"))).into());
-        }
-        Ok(())
+    if args.strict && !notes.is_empty() {
+        let notes = counted(notes.len(), "note");
+        return Err(NeedsReview(format!("{folder}: {notes}")).into());
     }
+    Ok(())
 }
 
 /// Prints what is wrong, which is an error, or how much was checked.
@@ -181,10 +175,7 @@ pub(crate) fn write_contact_sheet(
     count: usize,
     output: &Path,
 ) -> petcomp::Result<()> {
-    io::write(
-        output,
-        &contact_sheet_of(dataset, count, &Default::default())?,
-    )
+    io::write(output, &contact_sheet_of(dataset, count)?)
 }
 
 fn write_sheet(args: &SheetArgs, global: &GlobalArgs) -> anyhow::Result<()> {

@@ -78,47 +78,16 @@ fn print_rejected(provenance: &Provenance) {
     }
 }
 
+/// Prints path, distribution, value and the name of what a choice chose, in columns.
 fn print_draws(provenance: &Provenance) {
-    print_rows(&draw_rows(provenance));
-}
-
-fn draw_rows(provenance: &Provenance) -> Vec<DrawRow<'_>> {
-    let draws = provenance.draws.iter();
-    draws
-        .map(|draw| DrawRow::new(draw, &provenance.drawn))
-        .collect()
-}
-
-/// A draw as it is printed.
-struct DrawRow<'a> {
-    path: &'a str,
-    /// The distribution.
-    from: String,
-    /// The value, and the name of what a choice chose.
-    outcome: String,
-}
-
-impl<'a> DrawRow<'a> {
-    fn new(draw: &'a Drawn, scene: &Scene) -> Self {
-        Self {
-            path: &draw.path,
-            from: draw.from.to_string(),
-            outcome: format!("{}  {}", draw.value, chosen_name(draw, scene)),
-        }
-    }
-}
-
-/// Prints draws in columns.
-fn print_rows(rows: &[DrawRow]) {
-    let paths = rows.iter().map(|row| row.path.len()).max().unwrap_or(0);
-    let froms = rows.iter().map(|row| row.from.len()).max().unwrap_or(0);
-    for DrawRow {
-        path,
-        from,
-        outcome,
-    } in rows
-    {
-        let line = format!("{path:paths$}  {from:froms$}  {outcome}");
+    let draws = &provenance.draws;
+    let froms: Vec<String> = draws.iter().map(|draw| draw.from.to_string()).collect();
+    let path_width = draws.iter().map(|draw| draw.path.len()).max().unwrap_or(0);
+    let from_width = froms.iter().map(String::len).max().unwrap_or(0);
+    for (draw, from) in draws.iter().zip(&froms) {
+        let (path, value) = (&draw.path, draw.value);
+        let chosen = chosen_name(draw, &provenance.drawn);
+        let line = format!("{path:path_width$}  {from:from_width$}  {value}  {chosen}");
         print::line(line.trim_end());
     }
 }

@@ -153,18 +153,14 @@ impl MixedSets {
     }
 
     fn lines(&self, epochs: u64, options: &BatchOptions) -> petcomp::Result<Vec<String>> {
+        let (real, synthetic) = (self.real.train.len(), self.synthetic.train.len());
         let mut lines = Vec::new();
         for epoch in 0..epochs {
-            for batch in self.batches(epoch, options) {
+            for batch in train::batches(real, synthetic, epoch, options) {
                 lines.push(self.batch_line(epoch, &batch)?);
             }
         }
         Ok(lines)
-    }
-
-    fn batches(&self, epoch: u64, options: &BatchOptions) -> Vec<Batch> {
-        let (real, synthetic) = (self.real.train.len(), self.synthetic.train.len());
-        train::batches(real, synthetic, epoch, options)
     }
 
     /// A line of JSON: epoch, source, weight of the loss, images.

@@ -7,6 +7,9 @@ use std::process::{Command, Output, Stdio};
 /// The program's file.
 pub(crate) const PETCOMP: &str = env!("CARGO_BIN_EXE_petcomp");
 
+/// The folder of sample photos.
+pub(crate) const SAMPLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/samples");
+
 /// A folder of its own for one test, and the program run in it.
 pub(crate) struct Desk(tempfile::TempDir);
 
@@ -41,6 +44,11 @@ impl Desk {
     pub(crate) fn run<S: AsRef<OsStr>>(&self, args: &[S]) -> Output {
         self.command(args).output().expect("the program starts")
     }
+}
+
+/// The arguments of a command line without spaces in them.
+pub(crate) fn words(line: &str) -> Vec<&str> {
+    line.split(' ').collect()
 }
 
 /// What the program printed.

@@ -7,8 +7,8 @@ use petcomp::asset::{self, Library, List};
 use petcomp::camera::{self, CameraFile, ColmapModel, SolveOptions};
 use petcomp::dataset::page::DatasetReportOptions;
 use petcomp::dataset::{self, DatasetConfig, Partition, Pipeline, YoloSet};
+use petcomp::eval;
 use petcomp::eval::page::{EvalReportOptions, Metrics, Run};
-use petcomp::eval::{self, Tags};
 use petcomp::filter::Pyramid;
 use petcomp::io::{self, LimitOverride, Override};
 use petcomp::label::{self, Labels};
@@ -35,19 +35,13 @@ pub(crate) struct Door {
     file: &'static str,
     kind: Kind,
     /// Goes through the door. What comes of it is its own affair; it must come back.
-    enter: fn(&World),
+    enter: fn(&World) -> Option<()>,
     /// How many times as long as the others it takes.
     pub(crate) weight: u64,
 }
 
 pub(crate) fn doors() -> Vec<Door> {
-    let door = |name, file, kind, enter| Door {
-        name,
-        file,
-        kind,
-        enter,
-        weight: 1,
-    };
+    use Kind::{Json, JsonLines, Text, Toml};
     let slow = |name, file, kind, enter, weight| Door {
         name,
         file,
@@ -55,108 +49,85 @@ pub(crate) fn doors() -> Vec<Door> {
         enter,
         weight,
     };
+    let door = |name, file, kind, enter| slow(name, file, kind, enter, 1);
     vec![
-        slow("recipe", "recipe.toml", Kind::Toml, recipe, 4),
+        slow("recipe", "recipe.toml", Toml, recipe, 4),
         slow(
             "scene",
             "scene.toml",
-            Kind::Toml,
+            Toml,
             |world| scene(world, "scene.toml"),
             4,
         ),
         slow(
             "scene at rest",
             "rest.json",
-            Kind::Json,
+            Json,
             |world| scene(world, "rest.json"),
             2,
         ),
-        door("label", "backgrounds/a.label.json", Kind::Json, label_file),
-        door("camera file", "a.camera.json", Kind::Json, camera_file),
-        door("labelme", "labelme.json", Kind::Json, labelme),
-        slow("manifest", "assets/assets.toml", Kind::Toml, manifest, 2),
+        door("label", "backgrounds/a.label.json", Json, label_file),
+        door("camera file", "a.camera.json", Json, camera_file),
+        door("labelme", "labelme.json", Json, labelme),
+        slow("manifest", "assets/assets.toml", Toml, manifest, 2),
         slow(
             "asset list",
             "photos.toml",
-            Kind::Toml,
+            Toml,
             |world| asset_list(world, "photos.toml"),
             8,
         ),
         slow(
             "asset csv",
             "photos.csv",
-            Kind::Text,
+            Text,
             |world| asset_list(world, "photos.csv"),
             8,
         ),
-        door("settle options", "settle.toml", Kind::Toml, settle_options),
-        slow(
-            "cut-out options",
-            "cut_out.toml",
-            Kind::Toml,
-            cut_out_options,
-            8,
-        ),
-        slow(
-            "segment options",
-            "segment.toml",
-            Kind::Toml,
-            segment_options,
-            4,
-        ),
+        door("settle options", "settle.toml", Toml, settle_options),
+        slow("cut-out options", "cut_out.toml", Toml, cut_out_options, 8),
+        slow("segment options", "segment.toml", Toml, segment_options, 4),
         slow(
             "journal",
             "dataset/index.jsonl",
-            Kind::JsonLines,
+            JsonLines,
             dataset_folder,
             4,
         ),
-        slow(
-            "dataset",
-            "dataset/dataset.json",
-            Kind::Json,
-            dataset_folder,
-            4,
-        ),
+        slow("dataset", "dataset/dataset.json", Json, dataset_folder, 4),
         slow(
             "sidecar",
             "dataset/scenes/val/000000.json",
-            Kind::Json,
+            Json,
             dataset_folder,
             4,
         ),
-        slow("shard", "shard-1/dataset.json", Kind::Json, merge, 4),
-        slow(
-            "shard journal",
-            "shard-1/index.jsonl",
-            Kind::JsonLines,
-            merge,
-            4,
-        ),
-        door("data.yaml", "dataset/data.yaml", Kind::Text, yolo_set),
+        slow("shard", "shard-1/dataset.json", Json, merge, 4),
+        slow("shard journal", "shard-1/index.jsonl", JsonLines, merge, 4),
+        door("data.yaml", "dataset/data.yaml", Text, yolo_set),
         door(
             "yolo truth",
             "dataset/labels/val/000000.txt",
-            Kind::Text,
+            Text,
             yolo_eval,
         ),
-        door("yolo found", "found/000000.txt", Kind::Text, yolo_eval),
-        door("coco truth", "truth.json", Kind::Json, coco_eval),
-        door("coco found", "found.json", Kind::Json, coco_eval),
-        door("tags", "tags.csv", Kind::Text, tags),
+        door("yolo found", "found/000000.txt", Text, yolo_eval),
+        door("coco truth", "truth.json", Json, coco_eval),
+        door("coco found", "found.json", Json, coco_eval),
+        door("tags", "tags.csv", Text, tags),
         slow(
             "cycles scene",
             "cycles/scene.json",
-            Kind::Json,
+            Json,
             reference_scene,
             4,
         ),
-        door("overrides", "overrides.txt", Kind::Text, overrides),
+        door("overrides", "overrides.txt", Text, overrides),
     ]
 }
 
-/// What is valid where no other program has written it.
-fn given(door: &Door, world: &World) {
+/// Puts a valid document where no other program has written one.
+pub(crate) fn give(door: &Door, world: &World) {
     let text = match door.file {
         "recipe.toml" => full_recipe(),
         "a.camera.json" => {
@@ -207,11 +178,6 @@ impl Door {
     /// What is valid here, to be changed draw by draw.
     pub(crate) fn valid(&self, world: &World) -> String {
         world.read(self.file)
-    }
-
-    /// Puts a valid document there, where the world has none.
-    pub(crate) fn prepare(&self, world: &World) {
-        given(self, world);
     }
 
     /// One changed document, written in place of the valid one.
@@ -286,17 +252,11 @@ fn falls_soon(scene: &Scene, settle: &SettleOptions) -> bool {
     falling == 0 || (falling <= 4 && steps <= 6.0 * FEW_STEPS)
 }
 
-fn recipe(world: &World) {
-    let Some(setup) = ends(DatasetConfig::read(world.path("recipe.toml"), &[])) else {
-        return;
-    };
-    let Some(pipeline) = ends(Pipeline::open(setup)) else {
-        return;
-    };
+fn recipe(world: &World) -> Option<()> {
+    let setup = ends(DatasetConfig::read(world.path("recipe.toml"), &[]))?;
+    let pipeline = ends(Pipeline::open(setup))?;
     for k in [0, 1, u64::MAX] {
-        let Some(scene) = ends(pipeline.draw(k, k)) else {
-            return;
-        };
+        let scene = ends(pipeline.draw(k, k))?;
         let small = is_small(pipeline.config().scene.image, &pipeline.config().render);
         if k == 1
             && small
@@ -306,18 +266,15 @@ fn recipe(world: &World) {
             ends(pipeline.take(scene));
         }
     }
+    Some(())
 }
 
-fn scene(world: &World, file: &str) {
+fn scene(world: &World, file: &str) -> Option<()> {
     let path = world.path(file);
-    let Some(scene) = ends(io::read_document::<Scene>(&path)) else {
-        return;
-    };
-    if ends(scene.check()).is_none()
-        || !falls_soon(&scene, &SettleOptions::default())
-        || scene.lights.len() > 3
-    {
-        return;
+    let scene = ends(io::read_document::<Scene>(&path))?;
+    ends(scene.check())?;
+    if !falls_soon(&scene, &SettleOptions::default()) || scene.lights.len() > 3 {
+        return None;
     }
     let setup: DatasetConfig = toml::from_str("").unwrap();
     let folders = |folder: &str| world.path(folder);
@@ -327,25 +284,18 @@ fn scene(world: &World, file: &str) {
         ..setup
     };
     setup.scene.image = scene.image;
-    let Some(pipeline) = ends(Pipeline::open_for(setup, &scene)) else {
-        return;
-    };
+    let pipeline = ends(Pipeline::open_for(setup, &scene))?;
     if is_small(scene.image, &RenderOptions::default()) && scene.objects.len() <= 4 {
-        let Some(sample) = ends(pipeline.take(scene)) else {
-            return;
-        };
+        let sample = ends(pipeline.take(scene))?;
         label::overlay(&sample.frame, &sample.labels, &pipeline.library().classes);
     }
+    Some(())
 }
 
-fn label_file(world: &World) {
-    let Some(label) = ends(camera::read_label(world.path("backgrounds/a.label.json"))) else {
-        return;
-    };
+fn label_file(world: &World) -> Option<()> {
+    let label = ends(camera::read_label(world.path("backgrounds/a.label.json")))?;
     let options = SolveOptions::default();
-    let Some(solution) = ends(camera::solve(&label, &options).map_err(Into::into)) else {
-        return;
-    };
+    let solution = ends(camera::solve(&label, &options).map_err(Into::into))?;
     camera::doctor(&label, &solution, &options);
     ends(camera::check_distance(&solution));
     let _ = camera::solve_joint(&[label.clone(), label.clone()], &options);
@@ -365,7 +315,7 @@ fn label_file(world: &World) {
             solution.fit.px_per_metre,
         ));
     }
-    ends(Pipeline::open(world_setup(world)));
+    ends(Pipeline::open(world_setup(world))).map(drop)
 }
 
 fn world_setup(world: &World) -> DatasetConfig {
@@ -376,43 +326,36 @@ fn world_setup(world: &World) -> DatasetConfig {
     }
 }
 
-fn camera_file(world: &World) {
-    let Some(file) = ends(io::read_json::<CameraFile>(world.path("a.camera.json"))) else {
-        return;
-    };
+fn camera_file(world: &World) -> Option<()> {
+    let file = ends(io::read_json::<CameraFile>(world.path("a.camera.json")))?;
     let camera = file.camera();
     camera.to_blender_script();
     serde_json::to_string(&camera.to_opencv()).unwrap();
     ColmapModel::new([("a.png", &camera, file.k1())]);
+    Some(())
 }
 
-fn labelme(world: &World) {
+fn labelme(world: &World) -> Option<()> {
     let path = world.path("labelme.json");
-    let Some(labels) = ends(camera::read_labels(path, Some([0.56, 0.37]))) else {
-        return;
-    };
+    let labels = ends(camera::read_labels(path, Some([0.56, 0.37])))?;
     for labelled in labels {
         let _ = camera::solve(&labelled.label, &SolveOptions::default());
     }
+    Some(())
 }
 
-fn manifest(world: &World) {
-    let Some(library) = ends(Library::open(world.path("assets"))) else {
-        return;
-    };
+fn manifest(world: &World) -> Option<()> {
+    let library = ends(Library::open(world.path("assets")))?;
     let photos: usize = library.assets.iter().map(|asset| asset.photos.len()).sum();
     if photos < 10 {
         asset::contact_sheets(&library).for_each(|page| drop(ends(page)));
     }
-    if let Some(pipeline) = ends(Pipeline::open(world_setup(world))) {
-        ends(pipeline.draw(0, 0));
-    }
+    let pipeline = ends(Pipeline::open(world_setup(world)))?;
+    ends(pipeline.draw(0, 0)).map(drop)
 }
 
-fn asset_list(world: &World, file: &str) {
-    let Some(list) = ends(List::read(world.path(file))) else {
-        return;
-    };
+fn asset_list(world: &World, file: &str) -> Option<()> {
+    let list = ends(List::read(world.path(file)))?;
     if list.photos.len() < 5 {
         ends(asset::build(
             world.path(file),
@@ -422,51 +365,43 @@ fn asset_list(world: &World, file: &str) {
         ));
         let _ = std::fs::remove_dir_all(world.path("built"));
     }
+    Some(())
 }
 
-fn settle_options(world: &World) {
-    let Some(options) = ends(io::read_toml::<SettleOptions>(world.path("settle.toml"))) else {
-        return;
-    };
+fn settle_options(world: &World) -> Option<()> {
+    let options = ends(io::read_toml::<SettleOptions>(world.path("settle.toml")))?;
     let scene: Scene = io::read_toml(world.path("scene.toml")).unwrap();
-    if ends(options.check()).is_some() && falls_soon(&scene, &options) {
+    ends(options.check())?;
+    if falls_soon(&scene, &options) {
         ends(petcomp::settle::settle(scene, &options));
     }
+    Some(())
 }
 
 fn slab(world: &World) -> Image<LinearRgb> {
     io::read(world.path("slab.png")).unwrap()
 }
 
-fn cut_out_options(world: &World) {
-    let Some(options) = ends(io::read_toml::<CutOutOptions>(world.path("cut_out.toml"))) else {
-        return;
-    };
-    ends(cut_out(&slab(world), &options));
+fn cut_out_options(world: &World) -> Option<()> {
+    let options = ends(io::read_toml::<CutOutOptions>(world.path("cut_out.toml")))?;
+    ends(cut_out(&slab(world), &options)).map(drop)
 }
 
-fn segment_options(world: &World) {
-    let Some(options) = ends(io::read_toml::<SegmentOptions>(world.path("segment.toml"))) else {
-        return;
-    };
-    if let Some(found) = ends(segment(&slab(world), &options)) {
-        found.steps.iter().for_each(|step| drop(step.shown()));
-    }
+fn segment_options(world: &World) -> Option<()> {
+    let options = ends(io::read_toml::<SegmentOptions>(world.path("segment.toml")))?;
+    let found = ends(segment(&slab(world), &options))?;
+    found.steps.iter().for_each(|step| drop(step.shown()));
+    Some(())
 }
 
-fn dataset_folder(world: &World) {
+fn dataset_folder(world: &World) -> Option<()> {
     let folder = world.path("dataset");
-    ends(dataset::contact_sheet_of(&folder, 24, &Default::default()));
-    ends(
-        dataset::page::page(
-            &folder,
-            &DatasetReportOptions {
-                most: 4,
-                ..Default::default()
-            },
-        )
-        .map(|page| page.document()),
-    );
+    ends(dataset::contact_sheet_of(&folder, 24));
+    let options = DatasetReportOptions {
+        most: 4,
+        ..Default::default()
+    };
+    ends(dataset::page::page(&folder, &options).map(|page| page.document()));
     ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.notes())));
     ends(
         YoloSet::read(&folder)
@@ -480,6 +415,7 @@ fn dataset_folder(world: &World) {
     let journal = world.read("dataset/index.jsonl");
     ends(dataset::repair(&folder));
     world.write("dataset/index.jsonl", &journal);
+    Some(())
 }
 
 fn sound_labels(labels: &Labels) {
@@ -489,32 +425,25 @@ fn sound_labels(labels: &Labels) {
     }
 }
 
-fn merge(world: &World) {
+fn merge(world: &World) -> Option<()> {
     let shards = [1, 2].map(|index| world.path(&format!("shard-{index}")));
     let out = world.path("merged");
-    ends(dataset::merge(
-        &shards,
-        &out,
-        &|_| {},
-        &AtomicBool::new(false),
-    ));
-    ends(dataset::merge(
-        &shards[..1],
-        &out,
-        &|_| {},
-        &AtomicBool::new(false),
-    ));
+    for shards in [&shards[..], &shards[..1]] {
+        let merged = dataset::merge(shards, &out, &|_| {}, &AtomicBool::new(false));
+        ends(merged);
+    }
     let _ = std::fs::remove_dir_all(out);
+    Some(())
 }
 
-fn yolo_set(world: &World) {
+fn yolo_set(world: &World) -> Option<()> {
     let folder = world.path("dataset");
     ends(YoloSet::open(&folder));
     ends(
         YoloSet::read(&folder)
             .and_then(|all| all.partitioned(Partition::Consecutive { guard: 1 }, 0.5, 1)),
     );
-    ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.notes())));
+    ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.notes()))).map(drop)
 }
 
 fn evaluated(world: &World, sheets: Vec<eval::EvalImage>) {
@@ -530,35 +459,28 @@ fn evaluated(world: &World, sheets: Vec<eval::EvalImage>) {
     ends(eval::page::write(&world.path("eval"), &[run], &options));
 }
 
-fn yolo_eval(world: &World) {
+fn yolo_eval(world: &World) -> Option<()> {
     let truth = eval::read_yolo_truth(&world.path("dataset/labels/val"), None, None);
-    let Some(mut truth) = ends(truth) else { return };
-    if ends(eval::read_yolo_detections(&world.path("found"), &mut truth)).is_some() {
-        evaluated(world, truth.sheets);
-    }
+    let mut truth = ends(truth)?;
+    let found = eval::read_yolo_detections(&world.path("found"), &mut truth);
+    ends(found)?;
+    evaluated(world, truth.sheets);
+    Some(())
 }
 
-fn coco_eval(world: &World) {
-    let Some(mut truth) = ends(eval::read_coco_truth(&world.path("truth.json"))) else {
-        return;
-    };
-    if ends(eval::read_coco_results(
-        &world.path("found.json"),
-        &mut truth,
-    ))
-    .is_some()
-    {
-        evaluated(world, truth.sheets);
-    }
+fn coco_eval(world: &World) -> Option<()> {
+    let mut truth = ends(eval::read_coco_truth(&world.path("truth.json")))?;
+    let found = eval::read_coco_results(&world.path("found.json"), &mut truth);
+    ends(found)?;
+    evaluated(world, truth.sheets);
+    Some(())
 }
 
-fn tags(world: &World) {
+fn tags(world: &World) -> Option<()> {
     let sheets: Vec<_> = ["000000", "000001"]
         .map(|image| eval::EvalImage::new(image, Vec::new()))
         .into();
-    let Some(tags) = ends(eval::read_tags(&world.path("tags.csv"), &sheets)) else {
-        return;
-    };
+    let tags = ends(eval::read_tags(&world.path("tags.csv"), &sheets))?;
     let run = Run {
         name: "run".into(),
         sheets,
@@ -571,22 +493,20 @@ fn tags(world: &World) {
             ..Default::default()
         },
     );
-    let _ = Tags::default();
+    Some(())
 }
 
-fn reference_scene(world: &World) {
-    let Some(shot) = ends(cycles::import(
-        world.path("cycles/scene.json"),
-        Some([32, 24]),
-    )) else {
-        return;
-    };
-    if ends(render::check(&shot)).is_some() && shot.cards.len() < 5 && shot.lights.len() < 5 {
+fn reference_scene(world: &World) -> Option<()> {
+    let path = world.path("cycles/scene.json");
+    let shot = ends(cycles::import(path, Some([32, 24])))?;
+    ends(render::check(&shot))?;
+    if shot.cards.len() < 5 && shot.lights.len() < 5 {
         render::render(&shot, &RenderOptions::default());
     }
+    Some(())
 }
 
-fn overrides(world: &World) {
+fn overrides(world: &World) -> Option<()> {
     let text = world.read("overrides.txt");
     let (limits, rest): (Vec<&str>, Vec<&str>) =
         text.lines().partition(|line| line.starts_with("limit."));
@@ -608,5 +528,5 @@ fn overrides(world: &World) {
                 .map(|k| k.cutout);
     }
     ends(io::from_overrides::<FilmOptions>("film", &of("film.")));
-    ends(DatasetConfig::read(world.path("recipe.toml"), &given));
+    ends(DatasetConfig::read(world.path("recipe.toml"), &given)).map(drop)
 }

@@ -75,9 +75,9 @@ fn every_document_ends_in_a_result_or_an_error() {
 /// A world with every valid document in it.
 fn whole_world() -> World {
     let world = World::new();
-    documents::doors()
-        .iter()
-        .for_each(|door| door.prepare(&world));
+    for door in documents::doors() {
+        documents::give(&door, &world);
+    }
     world
 }
 

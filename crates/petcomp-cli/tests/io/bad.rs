@@ -1,9 +1,10 @@
 //! Bad files: one clear line each, quickly, and nothing half-written.
 
-use crate::build::crc32;
-use crate::make::{Folder, behind, codes, light, opaque_codes, tiff};
+use crate::build::{attribute, find, ihdr, png, stored, tags, with};
+use crate::make::{Folder, codes, opaque_codes, tiff, with_bits};
 use crate::promptness::quickly;
-use petcomp::io::{self, Bits, Limits, ReadOptions, WriteOptions};
+use crate::valid;
+use petcomp::io::{self, Bits, Limits, ReadOptions};
 use petcomp::{Coverage, LinearRgb, PremulRgba};
 use std::path::Path;
 
@@ -20,30 +21,6 @@ fn refusal(path: &Path) -> String {
         .strip_prefix(&front)
         .unwrap_or_else(|| panic!("{message} does not start with {front}"))
         .to_string()
-}
-
-/// A whole small file of each format.
-fn valid(folder: &Folder) -> Vec<(&'static str, Vec<u8>)> {
-    let float = WriteOptions {
-        bits: Some(Bits::Float),
-        ..Default::default()
-    };
-    io::write(folder.file("a.png"), &codes(20, 14)).unwrap();
-    io::write(folder.file("a.jpg"), &opaque_codes(20, 14)).unwrap();
-    io::write(folder.file("a.exr"), &light(20, 14)).unwrap();
-    io::write(folder.file("a.tif"), &codes(20, 14)).unwrap();
-    io::write_with(folder.file("b.tif"), &light(20, 14), &float).unwrap();
-    let mut files: Vec<_> = ["a.png", "a.jpg", "a.exr", "a.tif", "b.tif"]
-        .into_iter()
-        .map(|name| (name, std::fs::read(folder.file(name)).unwrap()))
-        .collect();
-    let pixels: Vec<_> = (0..280).map(|i| image::Rgb([i as f32, 0.5, 2.0])).collect();
-    let mut hdr = Vec::new();
-    image::codecs::hdr::HdrEncoder::new(&mut hdr)
-        .encode(&pixels, 20, 14)
-        .unwrap();
-    files.push(("a.hdr", hdr));
-    files
 }
 
 #[test]
@@ -84,7 +61,18 @@ fn a_pipe_is_refused_without_waiting() {
 #[test]
 fn truncated_files_are_errors() {
     let folder = Folder::new();
-    for (name, bytes) in valid(&folder) {
+    let formats = [
+        "rgba8.png",
+        "rgb.jpg",
+        "half.exr",
+        "rgba8.tif",
+        "float.tif",
+        "rgb.hdr",
+    ];
+    let mut files = valid::of_size(20, 14);
+    files.retain(|(name, _)| formats.contains(name));
+    assert_eq!(files.len(), formats.len());
+    for (name, bytes) in files {
         let step = bytes.len().div_ceil(40);
         for length in (1..bytes.len()).step_by(step) {
             refusal(&folder.with(name, &bytes[..length]));
@@ -95,11 +83,7 @@ fn truncated_files_are_errors() {
 #[test]
 fn a_truncated_jpeg_says_so() {
     let folder = Folder::new();
-    let jpeg = valid(&folder)
-        .into_iter()
-        .find(|(name, _)| *name == "a.jpg")
-        .unwrap()
-        .1;
+    let jpeg = valid::named("rgb.jpg");
     let path = folder.with("cut.jpg", &jpeg[..jpeg.len() - 2]);
     assert_eq!(refusal(&path), "truncated JPEG (no end marker)");
     assert!(
@@ -110,50 +94,26 @@ fn a_truncated_jpeg_says_so() {
 #[test]
 fn headers_that_ask_for_too_much_are_refused_by_name() {
     let folder = Folder::new();
-    let files = valid(&folder);
-    let bytes = |name: &str| files.iter().find(|(n, _)| *n == name).unwrap().1.clone();
-
-    let mut png = bytes("a.png");
-    png[16..24].copy_from_slice(&[0, 0, 0x7f, 0xff, 0, 0, 0x7f, 0xff]);
-    let crc = crc32(&png[12..29]);
-    png[29..33].copy_from_slice(&crc.to_be_bytes());
+    let header = ihdr(0x7fff, 0x7fff, 8, 6, 0);
+    let png = png(&[header, (b"IDAT", stored(&[0])), (b"IEND", Vec::new())]);
     assert!(refusal(&folder.with("bomb.png", &png)).contains("Limits::pixels"));
 
-    let mut exr = bytes("a.exr");
+    let mut exr = valid::named("half.exr");
     for window in ["dataWindow\0box2i\0", "displayWindow\0box2i\0"] {
-        let at = exr
-            .windows(window.len())
-            .position(|w| w == window.as_bytes())
-            .unwrap()
-            + window.len()
-            + 4;
-        exr[at + 8..at + 16].copy_from_slice(&[0x3f, 0x0d, 3, 0, 0x3f, 0x0d, 3, 0]);
+        exr = attribute(&exr, window, 8, &199_999_u32.to_le_bytes().repeat(2));
     }
     assert!(
         refusal(&folder.with("bomb.exr", &exr)).contains("Limits::side"),
         "200,000 x 200,000"
     );
 
-    let grey = |width: u32, height: u32| {
-        let tags = [
-            (256, 4, 1, width),
-            (257, 4, 1, height),
-            (258, 3, 1, 8),
-            (259, 3, 1, 1),
-            (262, 3, 1, 1),
-            (273, 4, 1, behind(8)),
-            (278, 4, 1, height),
-            (279, 4, 1, 16),
-        ];
-        tiff(&tags, &[7; 16])
-    };
+    let grey = |width: u32, height: u32| tiff(&tags(width, height, &[]), &[7; 16]);
     assert!(io::read::<Coverage>(folder.with("good.tif", &grey(4, 4))).is_ok());
     assert!(refusal(&folder.with("bomb.tif", &grey(30_000, 30_000))).contains("Limits::pixels"));
     refusal(&folder.with("none.tif", &grey(0, 4)));
 
-    let mut jpeg = bytes("a.jpg");
-    let frame = jpeg.windows(2).position(|w| w == [0xff, 0xc0]).unwrap();
-    jpeg[frame + 5..frame + 9].copy_from_slice(&[0xff, 0xff, 0xff, 0xff]);
+    let jpeg = valid::named("rgb.jpg");
+    let jpeg = with(&jpeg, find(&jpeg, &[0xff, 0xc0]) + 5, &[0xff; 4]);
     assert!(refusal(&folder.with("bomb.jpg", &jpeg)).contains("Limits::side"));
 
     let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 99999 +X 99999\n";
@@ -223,10 +183,7 @@ fn nothing_half_written_is_left() {
         e.ends_with("a.png: 0 x 2 pixels, expected at least 1 x 1"),
         "{e}"
     );
-    let half = WriteOptions {
-        bits: Some(Bits::Half),
-        ..Default::default()
-    };
+    let half = with_bits(Bits::Half);
     assert!(io::write_with(folder.file("a.png"), &codes(2, 2), &half).is_err());
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

@@ -1,72 +1,52 @@
 //! Files byte by byte: what no writer would write.
 
+use crate::make::{Tag, behind};
+use flate2::{Compression, write::ZlibEncoder};
 use std::io::Write;
 
-/// The checksum of PNG chunks (ISO 3309), bit by bit.
-pub(crate) fn crc32(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(!0_u32, |crc, &b| {
-        (0..8).fold(crc ^ u32::from(b), |c, _| {
-            if c & 1 == 1 {
-                0xedb8_8320 ^ (c >> 1)
-            } else {
-                c >> 1
-            }
-        })
-    })
-}
+/// A chunk of a PNG: kind and data.
+pub(crate) type Chunk = (&'static [u8; 4], Vec<u8>);
 
 /// A PNG of these chunks.
-pub(crate) fn png(chunks: &[(&[u8; 4], Vec<u8>)]) -> Vec<u8> {
+pub(crate) fn png(chunks: &[Chunk]) -> Vec<u8> {
     let mut out = b"\x89PNG\r\n\x1a\n".to_vec();
     for (kind, data) in chunks {
         out.extend((data.len() as u32).to_be_bytes());
         let start = out.len();
         out.extend(*kind);
         out.extend(data);
-        let crc = crc32(&out[start..]);
+        let crc = crc32fast::hash(&out[start..]);
         out.extend(crc.to_be_bytes());
     }
     out
 }
 
 /// `IHDR`: size, bits, colour kind, interlacing.
-pub(crate) fn ihdr(
-    width: u32,
-    height: u32,
-    bits: u8,
-    color: u8,
-    interlace: u8,
-) -> (&'static [u8; 4], Vec<u8>) {
+pub(crate) fn ihdr(width: u32, height: u32, bits: u8, color: u8, interlace: u8) -> Chunk {
     let mut data = [width.to_be_bytes(), height.to_be_bytes()].concat();
     data.extend([bits, color, 0, 0, interlace]);
     (b"IHDR", data)
 }
 
-/// Zlib data out of stored (uncompressed) blocks.
-pub(crate) fn stored(data: &[u8]) -> Vec<u8> {
-    let mut out = vec![0x78, 0x01];
-    let blocks = data.chunks(60_000).count().max(1);
-    for (i, block) in data.chunks(60_000).enumerate() {
-        out.push(u8::from(i + 1 == blocks));
-        out.extend((block.len() as u16).to_le_bytes());
-        out.extend((!(block.len() as u16)).to_le_bytes());
-        out.extend(block);
-    }
-    let (a, b) = data.iter().fold((1_u32, 0_u32), |(a, b), &x| {
-        let a = (a + u32::from(x)) % 65_521;
-        (a, (b + a) % 65_521)
-    });
-    out.extend((b << 16 | a).to_be_bytes());
-    out
+/// So many times these bytes as zlib data.
+fn zlib(bytes: &[u8], times: usize, level: Compression) -> Vec<u8> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), level);
+    (0..times).for_each(|_| encoder.write_all(bytes).unwrap());
+    encoder.finish().unwrap()
 }
 
-/// A megabyte of zeros a thousand times over, compressed: gzip inside the system's own tool would
-/// do the same.
+/// Zlib data out of stored (uncompressed) blocks.
+pub(crate) fn stored(data: &[u8]) -> Vec<u8> {
+    zlib(data, 1, Compression::none())
+}
+
+pub(crate) fn deflated(data: &[u8]) -> Vec<u8> {
+    zlib(data, 1, Compression::best())
+}
+
+/// Megabytes of zeros, compressed.
 pub(crate) fn zeros(megabytes: usize) -> Vec<u8> {
-    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
-    let block = vec![0; 1 << 20];
-    (0..megabytes).for_each(|_| encoder.write_all(&block).unwrap());
-    encoder.finish().unwrap()
+    zlib(&[0; 1 << 20], megabytes, Compression::best())
 }
 
 /// A file with the bytes at a place replaced.
@@ -113,9 +93,6 @@ pub(crate) fn inserted(file: &[u8], at: usize, bytes: &[u8]) -> Vec<u8> {
     [&file[..at], bytes, &file[at..]].concat()
 }
 
-/// A TIFF tag: number, kind, count, value.
-pub(crate) type Tag = (u16, u16, u32, u32);
-
 /// Tags of a grey 8-bit picture of one strip, some of them replaced or added.
 pub(crate) fn tags(width: u32, height: u32, others: &[Tag]) -> Vec<Tag> {
     let mut all: Vec<Tag> = vec![
@@ -134,7 +111,7 @@ pub(crate) fn tags(width: u32, height: u32, others: &[Tag]) -> Vec<Tag> {
         all.push(*other);
     }
     all.sort_unstable();
-    let strip = super::make::behind(all.len());
+    let strip = behind(all.len());
     all.iter_mut()
         .filter(|tag| tag.0 == 273 && tag.3 == 0)
         .for_each(|tag| tag.3 = strip);

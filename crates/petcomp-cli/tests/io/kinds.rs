@@ -30,7 +30,7 @@ const FILES: [(&str, u8); 15] = [
 ];
 
 /// Display codes, alpha with them.
-fn codes(image: &Image<StraightRgba>) -> Vec<[u8; 4]> {
+fn codes(image: Image<StraightRgba>) -> Vec<[u8; 4]> {
     let code = |p: &StraightRgba| {
         let Srgb8 { r, g, b } = color::encode_srgb8([p.r, p.g, p.b].into());
         [r, g, b, (p.a * 255.0).round() as u8]
@@ -38,14 +38,16 @@ fn codes(image: &Image<StraightRgba>) -> Vec<[u8; 4]> {
     image.pixels().iter().map(code).collect()
 }
 
+fn codes_of(name: &str) -> Vec<[u8; 4]> {
+    codes(io::read(file(name)).unwrap())
+}
+
 #[test]
 fn both_ways_of_reading_agree_on_every_kind() {
     let mut wrong = Vec::new();
     for (name, tolerance) in FILES {
-        let ours = codes(&io::read::<StraightRgba>(file(name)).unwrap());
-        let theirs = codes(
-            &io::read_in_worker::<StraightRgba>(file(name), &ReadOptions::default()).unwrap(),
-        );
+        let ours = codes_of(name);
+        let theirs = codes(io::read_in_worker(file(name), &ReadOptions::default()).unwrap());
         let worst = ours
             .iter()
             .flatten()
@@ -65,28 +67,18 @@ fn both_ways_of_reading_agree_on_every_kind() {
 /// Pillow writes the codes of a palette times 256 into a TIFF.
 #[test]
 fn a_palette_has_the_same_colours_in_every_file() {
-    let codes = |name| codes(&io::read::<StraightRgba>(file(name)).unwrap());
-    assert_eq!(codes("palette.tif"), codes("palette.png"));
+    assert_eq!(codes_of("palette.tif"), codes_of("palette.png"));
 }
 
 /// The picture that was written, in those kinds that lose nothing.
 #[test]
 fn what_was_written_is_what_is_read() {
     for name in ["rgba.png", "lzw.tif", "deflate.tif", "packbits.tif"] {
-        let codes = codes(&io::read::<StraightRgba>(file(name)).unwrap());
-        for (i, code) in codes.iter().enumerate() {
+        for (i, code) in codes_of(name).into_iter().enumerate() {
             let (x, y) = (i % 24, i / 24);
             let (red, green) = (255 * x / 23, 255 * y / 15);
-            assert_eq!(
-                *code,
-                [
-                    red as u8,
-                    green as u8,
-                    ((x * 11 + y * 7) % 256) as u8,
-                    green as u8
-                ],
-                "{name} {x} {y}"
-            );
+            let expected = [red, green, (x * 11 + y * 7) % 256, green].map(|v| v as u8);
+            assert_eq!(code, expected, "{name} {x} {y}");
         }
     }
 }
@@ -94,17 +86,14 @@ fn what_was_written_is_what_is_read() {
 /// Pillow leaves the number of bits to the default, which OpenImageIO does not know.
 #[test]
 fn a_tiff_that_does_not_state_its_bits_has_one() {
-    let [png, tiff] = ["one_bit.png", "one_bit.tif"]
-        .map(|name| codes(&io::read::<StraightRgba>(file(name)).unwrap()));
-    assert_eq!(tiff, png);
+    assert_eq!(codes_of("one_bit.tif"), codes_of("one_bit.png"));
 }
 
 /// Inks multiply: a colour is what cyan and black leave of red, and so on.
 #[test]
 fn cmyk_is_what_the_inks_leave() {
     for name in ["cmyk.tif", "cmyk.jpg"] {
-        let codes = codes(&io::read::<StraightRgba>(file(name)).unwrap());
-        for (i, code) in codes.iter().enumerate() {
+        for (i, code) in codes_of(name).iter().enumerate() {
             let expected = [255 * (i % 24) / 23, 255 * (i / 24) / 15, 128].map(|v| v as u8);
             let apart = code.iter().zip(expected).map(|(a, b)| a.abs_diff(b)).max();
             assert!(

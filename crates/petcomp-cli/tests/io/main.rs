@@ -1,8 +1,6 @@
 //! Pictures in and out: what they mean, that both decoders agree, and that bad files are met with
 //! one clear line.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 mod bad;
 mod both_paths;
 mod build;

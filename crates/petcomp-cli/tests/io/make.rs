@@ -1,5 +1,6 @@
 //! Small pictures and files for the tests.
 
+use petcomp::io::{Bits, WriteOptions};
 use petcomp::{Image, PremulRgba, Srgb8, Srgba8};
 use std::path::{Path, PathBuf};
 
@@ -31,6 +32,13 @@ impl Folder {
         let path = self.file(name);
         std::fs::write(&path, bytes).unwrap();
         path
+    }
+}
+
+pub(crate) fn with_bits(bits: Bits) -> WriteOptions {
+    WriteOptions {
+        bits: Some(bits),
+        ..Default::default()
     }
 }
 
@@ -70,8 +78,11 @@ pub(crate) fn exif(orientation: u8, focal: u8) -> Vec<u8> {
     tiff
 }
 
+/// A TIFF tag: number, kind, count, value.
+pub(crate) type Tag = (u16, u16, u32, u32);
+
 /// A TIFF of one 8-bit grey row out of raw tags; the strip lies behind them.
-pub(crate) fn tiff(tags: &[(u16, u16, u32, u32)], strip: &[u8]) -> Vec<u8> {
+pub(crate) fn tiff(tags: &[Tag], strip: &[u8]) -> Vec<u8> {
     let mut out = b"II*\0\x08\0\0\0".to_vec();
     out.extend((tags.len() as u16).to_le_bytes());
     for &(tag, kind, count, value) in tags {

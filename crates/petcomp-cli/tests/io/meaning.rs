@@ -1,15 +1,10 @@
 //! What the samples of a file mean, and that they come back.
 
-use crate::make::{Folder, codes, exif, light, opaque_codes};
+use crate::build::{inserted, segment};
+use crate::make::{Folder, codes, exif, light, opaque_codes, with_bits};
 use petcomp::io::{self, Bits, Compression, WriteOptions};
 use petcomp::{Coverage, Depth, Image, LinearRgb, PremulRgba, Srgb8, Srgba8, StraightRgba, color};
-
-fn with_bits(bits: Bits) -> WriteOptions {
-    WriteOptions {
-        bits: Some(bits),
-        ..Default::default()
-    }
-}
+use std::path::PathBuf;
 
 /// 128/255 of the light of white is displayed as 188. Multiplying display values gives 128,
 /// decoding that again 55.
@@ -17,29 +12,12 @@ fn with_bits(bits: Bits) -> WriteOptions {
 fn half_alpha_white_over_black_is_displayed_as_188() {
     let folder = Folder::new();
     let path = folder.file("half.png");
-    io::write(
-        &path,
-        &Image::filled(
-            2,
-            2,
-            Srgba8 {
-                r: 255,
-                g: 255,
-                b: 255,
-                a: 128,
-            },
-        ),
-    )
-    .unwrap();
+    let [r, g, b] = [255; 3];
+    let white = Image::filled(2, 2, Srgba8 { r, g, b, a: 128 });
+    io::write(&path, &white).unwrap();
     let pixel = io::read::<PremulRgba>(&path).unwrap()[(0, 0)];
-    assert_eq!(
-        color::encode_srgb8(pixel.color()),
-        Srgb8 {
-            r: 188,
-            g: 188,
-            b: 188
-        }
-    );
+    let [r, g, b] = [188; 3];
+    assert_eq!(color::encode_srgb8(pixel.color()), Srgb8 { r, g, b });
     assert_eq!(pixel.a, 128.0 / 255.0);
 }
 
@@ -92,15 +70,11 @@ fn floats_come_back_bit_by_bit_and_halves_rounded() {
     }
     let path = folder.file("half.exr");
     for compression in [Compression::None, Compression::Zip, Compression::Piz] {
-        io::write_with(
-            &path,
-            &light(17, 5),
-            &WriteOptions {
-                compression,
-                ..Default::default()
-            },
-        )
-        .unwrap();
+        let options = WriteOptions {
+            compression,
+            ..Default::default()
+        };
+        io::write_with(&path, &light(17, 5), &options).unwrap();
         let back = io::read::<PremulRgba>(&path).unwrap();
         // A half float has 11 significant bits.
         let near = |p: f32, q: f32| (p - q).abs() <= q.abs() / 2048.0;
@@ -279,8 +253,7 @@ fn cameras_held_any_way_give_upright_pictures() {
     };
     let stored = Image::from_fn(48, 32, |x, y| corner(x / 24, y / 16));
     for orientation in 1..=8u8 {
-        let (jpeg, png, tiff) = oriented(&folder, &stored, orientation);
-        for path in [jpeg, png, tiff] {
+        for path in oriented(&folder, &stored, orientation) {
             let upright = io::read::<LinearRgb>(&path).unwrap();
             let header = io::read_header(&path).unwrap();
             assert_eq!(upright.size(), (header.width, header.height));
@@ -316,7 +289,7 @@ fn cameras_held_any_way_give_upright_pictures() {
 fn pictures_behind_the_first_of_a_jpeg_leave_its_orientation() {
     let folder = Folder::new();
     let stored = Image::filled(48, 32, Srgb8 { r: 9, g: 9, b: 9 });
-    let (jpeg, ..) = oriented(&folder, &stored, 6);
+    let [jpeg, ..] = oriented(&folder, &stored, 6);
     let burst = std::fs::read(&jpeg).unwrap().repeat(10);
     std::fs::write(&jpeg, burst).unwrap();
     let header = io::read_header(&jpeg).unwrap();
@@ -327,21 +300,12 @@ fn pictures_behind_the_first_of_a_jpeg_leave_its_orientation() {
 
 /// The same stored picture as JPEG, PNG and TIFF, with an orientation noted in each format's own
 /// way.
-fn oriented(
-    folder: &Folder,
-    stored: &Image<Srgb8>,
-    orientation: u8,
-) -> (std::path::PathBuf, std::path::PathBuf, std::path::PathBuf) {
+fn oriented(folder: &Folder, stored: &Image<Srgb8>, orientation: u8) -> [PathBuf; 3] {
     let notes = exif(orientation, 28);
     io::write(folder.file("a.jpg"), stored).unwrap();
-    let mut jpeg = std::fs::read(folder.file("a.jpg")).unwrap();
-    let length = (notes.len() + 8) as u16;
-    let segment = [0xff, 0xe1]
-        .into_iter()
-        .chain(length.to_be_bytes())
-        .chain(*b"Exif\0\0")
-        .chain(notes.iter().copied());
-    jpeg.splice(2..2, segment);
+    let jpeg = std::fs::read(folder.file("a.jpg")).unwrap();
+    let exif = segment(0xe1, &[&b"Exif\0\0"[..], &notes].concat());
+    let jpeg = inserted(&jpeg, 2, &exif);
 
     let mut png = Vec::new();
     let mut info = png::Info::with_size(stored.width() as u32, stored.height() as u32);
@@ -367,11 +331,11 @@ fn oriented(
     image
         .write_data(bytemuck::cast_slice(stored.pixels()))
         .unwrap();
-    (
+    [
         folder.with("b.jpg", &jpeg),
         folder.with("b.png", &png),
         folder.with("b.tif", tiff.get_ref()),
-    )
+    ]
 }
 
 #[test]
@@ -389,24 +353,12 @@ fn grey_and_palette_pngs_are_colour_too() {
         .unwrap();
     let path = folder.with("palette.png", &bytes);
     let read = io::read::<StraightRgba>(&path).unwrap();
-    assert_eq!(
-        read[(0, 0)],
-        StraightRgba {
-            r: 1.0,
-            g: 0.0,
-            b: 0.0,
-            a: 1.0
-        }
-    );
-    assert_eq!(
-        read[(1, 0)],
-        StraightRgba {
-            r: 0.0,
-            g: 0.0,
-            b: 1.0,
-            a: 128.0 / 255.0
-        }
-    );
+    let rgba = |x: usize| {
+        let StraightRgba { r, g, b, a } = read[(x, 0)];
+        [r, g, b, a]
+    };
+    assert_eq!(rgba(0), [1.0, 0.0, 0.0, 1.0]);
+    assert_eq!(rgba(1), [0.0, 0.0, 1.0, 128.0 / 255.0]);
     io::write(folder.file("grey.png"), &Image::filled(1, 1, Coverage(1.0))).unwrap();
     assert_eq!(
         io::read::<LinearRgb>(folder.file("grey.png")).unwrap()[(0, 0)],

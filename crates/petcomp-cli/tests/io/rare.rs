@@ -1,23 +1,26 @@
 //! Kinds of valid file that few programs write: they are read, and read right, or named for what
 //! they are.
 
-use crate::build::{ihdr, png, stored};
-use crate::make::{Folder, behind, tiff};
+use crate::build::{Chunk, deflated, ihdr, png, stored};
+use crate::make::{Folder, Tag, behind, file, tiff};
 use petcomp::io::exr::{ChannelSamples, Part, write_parts};
 use petcomp::io::{self, exr::write_channels};
 use petcomp::{Coverage, Depth, Image, LinearRgb, PremulRgba, Srgb8, color};
-use std::io::Write;
-use std::path::{Path, PathBuf};
-
-type Tag = (u16, u16, u32, u32);
+use std::path::Path;
 
 /// Tags of strips, and of tiles: where they lie and how long they are.
 const STRIPS: [u16; 2] = [273, 279];
 const TILES: [u16; 2] = [324, 325];
 
-/// A TIFF out of tags and several strips or tiles.
-fn in_pieces(tags: &[Tag], [offsets, counts]: [u16; 2], pieces: &[Vec<u8>]) -> Vec<u8> {
-    let (n, start) = (pieces.len() as u32, behind(tags.len() + 2));
+/// A TIFF out of what it says of its size and samples, other tags, and several strips or tiles.
+fn in_pieces(
+    about: &[Tag],
+    others: &[Tag],
+    [offsets, counts]: [u16; 2],
+    pieces: &[Vec<u8>],
+) -> Vec<u8> {
+    let mut all = [about, others].concat();
+    let (n, start) = (pieces.len() as u32, behind(all.len() + 2));
     let lists = if n > 1 { 8 * n } else { 0 };
     let ends: Vec<u32> = pieces
         .iter()
@@ -26,7 +29,6 @@ fn in_pieces(tags: &[Tag], [offsets, counts]: [u16; 2], pieces: &[Vec<u8>]) -> V
         })
         .collect();
     let lengths: Vec<u32> = pieces.iter().map(|p| p.len() as u32).collect();
-    let mut all = tags.to_vec();
     let inline = |list: &[u32], at: u32| if n > 1 { at } else { list[0] };
     all.extend([
         (offsets, 4, n, inline(&ends, start)),
@@ -43,7 +45,7 @@ fn in_pieces(tags: &[Tag], [offsets, counts]: [u16; 2], pieces: &[Vec<u8>]) -> V
 
 /// What every TIFF says of its size and samples.
 fn about(width: u32, height: u32, bits: u32, channels: u32) -> Vec<Tag> {
-    let kind = if channels == 1 { 1 } else { 2 };
+    let kind = if channels < 3 { 1 } else { 2 };
     vec![
         (256, 4, 1, width),
         (257, 4, 1, height),
@@ -51,12 +53,6 @@ fn about(width: u32, height: u32, bits: u32, channels: u32) -> Vec<Tag> {
         (262, 3, 1, kind),
         (277, 3, 1, channels),
     ]
-}
-
-fn deflated(bytes: &[u8]) -> Vec<u8> {
-    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
-    encoder.write_all(bytes).unwrap();
-    encoder.finish().unwrap()
 }
 
 /// A code for a place and a channel.
@@ -92,65 +88,47 @@ fn compressed_planes_of_a_tiff_are_read() {
     let strips = (0..3)
         .flat_map(|c| [0..4, 4..6].map(|rows| deflated(&strip(c, rows).collect::<Vec<_>>())))
         .collect::<Vec<_>>();
-    let tags = [
-        about(5, 6, 8, 3),
-        vec![(259, 3, 1, 8), (278, 3, 1, 4), (284, 3, 1, 2)],
-    ]
-    .concat();
-    assert_codes(
-        &folder.with("planes.tif", &in_pieces(&tags, STRIPS, &strips)),
-        (5, 6),
-    );
+    let planes = [(259, 3, 1, 8), (278, 3, 1, 4), (284, 3, 1, 2)];
+    let made = in_pieces(&about(5, 6, 8, 3), &planes, STRIPS, &strips);
+    assert_codes(&folder.with("planes.tif", &made), (5, 6));
 
     let doubles = |c: usize| {
         (0..30)
             .flat_map(move |i| (f64::from(i) + 0.25 * c as f64).to_le_bytes())
             .collect::<Vec<u8>>()
     };
-    let tags = [
-        about(5, 6, 64, 3),
-        vec![
-            (259, 3, 1, 8),
-            (278, 3, 1, 6),
-            (284, 3, 1, 2),
-            (339, 3, 1, 3),
-        ],
-    ]
-    .concat();
+    let more = [
+        (259, 3, 1, 8),
+        (278, 3, 1, 6),
+        (284, 3, 1, 2),
+        (339, 3, 1, 3),
+    ];
     let strips = [0, 1, 2].map(|c| deflated(&doubles(c)));
-    let read =
-        io::read::<LinearRgb>(folder.with("doubles.tif", &in_pieces(&tags, STRIPS, &strips)))
-            .unwrap();
+    let made = in_pieces(&about(5, 6, 64, 3), &more, STRIPS, &strips);
+    let read = io::read::<LinearRgb>(folder.with("doubles.tif", &made)).unwrap();
     assert_eq!(read[(3, 2)], LinearRgb::new(13.0, 13.25, 13.5));
+}
+
+/// No compression, tiles of 16 x 16.
+const TILED: [Tag; 3] = [(259, 3, 1, 1), (322, 3, 1, 16), (323, 3, 1, 16)];
+
+/// The codes of a tile.
+fn tile(left: usize, channels: usize) -> Vec<u8> {
+    let places = (0..16 * 16).map(|i| (left + i % 16, i / 16));
+    places
+        .flat_map(|(x, y)| (0..channels).map(move |c| code(x, y, c)))
+        .collect()
 }
 
 /// Tiles of 16 x 16 for a picture of 5 x 6: what reaches over is cut, and no column stays black.
 #[test]
 fn tiles_larger_than_the_picture_are_cut() {
     let folder = Folder::new();
-    let tile = |left: usize| {
-        (0..16)
-            .flat_map(move |y| (0..16).flat_map(move |x| (0..3).map(move |c| code(left + x, y, c))))
-            .collect::<Vec<u8>>()
-    };
-    let tags = |width| {
-        [
-            about(width, 6, 8, 3),
-            vec![(259, 3, 1, 1), (322, 3, 1, 16), (323, 3, 1, 16)],
-        ]
-        .concat()
-    };
-    assert_codes(
-        &folder.with("one.tif", &in_pieces(&tags(5), TILES, &[tile(0)])),
-        (5, 6),
-    );
-    assert_codes(
-        &folder.with(
-            "two.tif",
-            &in_pieces(&tags(19), TILES, &[tile(0), tile(16)]),
-        ),
-        (19, 6),
-    );
+    for (width, tiles) in [(5, vec![tile(0, 3)]), (19, vec![tile(0, 3), tile(16, 3)])] {
+        let made = in_pieces(&about(width, 6, 8, 3), &TILED, TILES, &tiles);
+        let path = folder.with(&format!("{width}.tif"), &made);
+        assert_codes(&path, (width as usize, 6));
+    }
 }
 
 /// As quad-tile.tif and cramps-tile.tif of libtiff's sample pictures: what is in tiles stands under
@@ -158,21 +136,10 @@ fn tiles_larger_than_the_picture_are_cut() {
 #[test]
 fn tiles_under_the_tags_of_strips_are_read() {
     let folder = Folder::new();
-    let tile = |left: usize| {
-        (0..16)
-            .flat_map(move |y| (0..16).map(move |x| code(left + x, y, 0)))
-            .collect::<Vec<u8>>()
-    };
-    let tags = |width| {
-        [
-            about(width, 6, 8, 1),
-            vec![(259, 3, 1, 1), (322, 3, 1, 16), (323, 3, 1, 16)],
-        ]
-        .concat()
-    };
     // The number of tiles is that of strips, too, in the second one.
-    for (width, tiles) in [(19, vec![tile(0), tile(16)]), (5, vec![tile(0)])] {
-        let read = codes_of(&folder.with("tiles.tif", &in_pieces(&tags(width), STRIPS, &tiles)));
+    for (width, tiles) in [(19, vec![tile(0, 1), tile(16, 1)]), (5, vec![tile(0, 1)])] {
+        let made = in_pieces(&about(width, 6, 8, 1), &TILED, STRIPS, &tiles);
+        let read = codes_of(&folder.with("tiles.tif", &made));
         for (i, code) in read.pixels().iter().enumerate() {
             assert_eq!(
                 code.g,
@@ -195,13 +162,9 @@ fn signed_and_long_integers_of_a_tiff_are_display_codes() {
         ("uint32.tif", 32, 1, (1_u32 << 31).to_le_bytes().to_vec()),
     ];
     for (name, bits, format, value) in values {
-        let tags = [
-            about(1, 1, bits, 1),
-            vec![(259, 3, 1, 1), (278, 3, 1, 1), (339, 3, 1, format)],
-        ]
-        .concat();
-        let read =
-            io::read::<LinearRgb>(folder.with(name, &in_pieces(&tags, STRIPS, &[value]))).unwrap();
+        let more = [(259, 3, 1, 1), (278, 3, 1, 1), (339, 3, 1, format)];
+        let made = in_pieces(&about(1, 1, bits, 1), &more, STRIPS, &[value]);
+        let read = io::read::<LinearRgb>(folder.with(name, &made)).unwrap();
         assert!(
             (read[(0, 0)].g - expected).abs() < 0.005,
             "{name}: {read:?}, expected {expected}"
@@ -212,36 +175,25 @@ fn signed_and_long_integers_of_a_tiff_are_display_codes() {
 #[test]
 fn old_lzw_and_bits_from_the_lowest_up_are_left_to_openimageio() {
     let folder = Folder::new();
-    let one = |more: &[Tag], strip: &[u8]| {
-        in_pieces(
-            &[about(1, 1, 8, 1), more.to_vec()].concat(),
-            STRIPS,
-            &[strip.to_vec()],
-        )
+    let read = |name: &str, more: &[Tag], strip: &[u8]| {
+        let made = in_pieces(&about(1, 1, 8, 1), more, STRIPS, &[strip.to_vec()]);
+        codes_of(&folder.with(name, &made))[(0, 0)].g
     };
     // The codes 256 (begin), 200 and 257 (end), nine bits each, from the lowest bit up.
     let codes = 256_u32 | 200 << 9 | 257 << 18;
-    let old = codes_of(&folder.with(
-        "old.tif",
-        &one(&[(259, 3, 1, 5), (278, 3, 1, 1)], &codes.to_le_bytes()),
-    ));
-    assert_eq!(old[(0, 0)].g, 200);
-    let turned = one(
-        &[(259, 3, 1, 1), (266, 3, 1, 2), (278, 3, 1, 1)],
-        &[0b0000_0011],
-    );
-    assert_eq!(
-        codes_of(&folder.with("turned.tif", &turned))[(0, 0)].g,
-        0b1100_0000
-    );
+    let old = [(259, 3, 1, 5), (278, 3, 1, 1)];
+    assert_eq!(read("old.tif", &old, &codes.to_le_bytes()), 200);
+    let turned = [(259, 3, 1, 1), (266, 3, 1, 2), (278, 3, 1, 1)];
+    assert_eq!(read("turned.tif", &turned, &[0b0000_0011]), 0b1100_0000);
 }
 
 #[test]
 fn a_fax_that_does_not_state_its_bits_is_no_noise() {
     let folder = Folder::new();
-    let mut tags = [about(8, 1, 1, 1), vec![(259, 3, 1, 3), (278, 3, 1, 1)]].concat();
+    let mut tags = about(8, 1, 1, 1);
     tags.retain(|tag| tag.0 != 258);
-    let fax = folder.with("fax.tif", &in_pieces(&tags, STRIPS, &[vec![0; 8]]));
+    let fax = [(259, 3, 1, 3), (278, 3, 1, 1)];
+    let fax = folder.with("fax.tif", &in_pieces(&tags, &fax, STRIPS, &[vec![0; 8]]));
     let e = io::read::<LinearRgb>(fax).unwrap_err().to_string();
     assert!(
         e.contains("fax.tif: unsupported TIFF") && !e.contains("OpenImageIO"),
@@ -252,37 +204,19 @@ fn a_fax_that_does_not_state_its_bits_is_no_noise() {
 #[test]
 fn grey_tiffs_have_alpha() {
     let folder = Folder::new();
-    let tags = [
-        about(2, 1, 8, 2),
-        vec![(259, 3, 1, 1), (278, 3, 1, 1), (338, 3, 1, 2)],
-    ]
-    .concat();
-    let grey: Vec<Tag> = tags
-        .into_iter()
-        .map(|tag| if tag.0 == 262 { (262, 3, 1, 1) } else { tag })
-        .collect();
-    let read = io::read::<PremulRgba>(folder.with(
-        "a.tif",
-        &in_pieces(&grey, STRIPS, &[vec![255, 51, 255, 255]]),
-    ))
-    .unwrap();
+    let alpha = [(259, 3, 1, 1), (278, 3, 1, 1), (338, 3, 1, 2)];
+    let strip = vec![255, 51, 255, 255];
+    let made = in_pieces(&about(2, 1, 8, 2), &alpha, STRIPS, &[strip]);
+    let read = io::read::<PremulRgba>(folder.with("a.tif", &made)).unwrap();
     assert_eq!(read[(0, 0)], PremulRgba::new(0.2, 0.2, 0.2, 0.2));
     assert_eq!(read[(1, 0)], PremulRgba::new(1.0, 1.0, 1.0, 1.0));
-}
-
-fn sample(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/io/files")
-        .join(name)
 }
 
 /// Arithmetic coding is read by OpenImageIO; 12 bits by neither, which is not the file's fault.
 #[test]
 fn other_kinds_of_jpeg_are_read_or_named() {
-    let (arithmetic, other) = (
-        codes_of(&sample("arithmetic.jpg")),
-        codes_of(&sample("progressive.jpg")),
-    );
+    let [arithmetic, other] =
+        ["arithmetic.jpg", "progressive.jpg"].map(|name| codes_of(&file(name)));
     let apart = |(p, q): (&Srgb8, &Srgb8)| {
         p.r.abs_diff(q.r)
             .max(p.g.abs_diff(q.g))
@@ -299,10 +233,10 @@ fn other_kinds_of_jpeg_are_read_or_named() {
         "{worst:?}"
     );
     assert_eq!(
-        io::read_header(sample("arithmetic.jpg")).unwrap().channels,
+        io::read_header(file("arithmetic.jpg")).unwrap().channels,
         ["R", "G", "B"]
     );
-    let e = io::read::<LinearRgb>(sample("twelve_bits.jpg"))
+    let e = io::read::<LinearRgb>(file("twelve_bits.jpg"))
         .unwrap_err()
         .to_string();
     assert!(
@@ -314,7 +248,7 @@ fn other_kinds_of_jpeg_are_read_or_named() {
 }
 
 /// A grey pixel of code 128, with chunks before it.
-fn grey_png(chunks: &[(&'static [u8; 4], Vec<u8>)]) -> Vec<u8> {
+fn grey_png(chunks: &[Chunk]) -> Vec<u8> {
     let data = [(b"IDAT", stored(&[0, 128])), (b"IEND", vec![])];
     png(&[&[ihdr(1, 1, 8, 0, 0)], chunks, &data].concat())
 }

@@ -5,6 +5,7 @@ use crate::make::{Folder, palette_tiff};
 use petcomp::io::{self, WriteOptions};
 use petcomp::{Image, LinearRgb, Srgb8, color};
 use std::io::{BufRead, BufReader, Read, Write};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 #[test]
@@ -22,12 +23,17 @@ fn a_palette_tiff_is_read_by_the_worker() {
     );
 }
 
+fn write_ramp(path: &Path) -> Image<LinearRgb> {
+    let ramp = Image::from_fn(32, 4, |x, _| LinearRgb::grey(x as f32 / 31.0));
+    io::oiio::write_with(path, &ramp, &WriteOptions::default()).unwrap();
+    ramp
+}
+
 #[test]
 fn film_scans_are_read_by_the_worker() {
     let folder = Folder::new();
     let path = folder.file("scan.dpx");
-    let ramp = Image::from_fn(32, 4, |x, _| LinearRgb::grey(x as f32 / 31.0));
-    io::oiio::write_with(&path, &ramp, &WriteOptions::default()).unwrap();
+    let ramp = write_ramp(&path);
     let read = io::read::<LinearRgb>(&path).unwrap();
     let worst = read
         .pixels()
@@ -50,8 +56,7 @@ fn film_scans_are_read_by_the_worker() {
 /// A film scan with this code of its transfer (SMPTE 268M) in the header.
 fn scan_of_transfer(folder: &Folder, code: u8) -> Result<Image<LinearRgb>, String> {
     let path = folder.file("transfer.dpx");
-    let ramp = Image::from_fn(32, 4, |x, _| LinearRgb::grey(x as f32 / 31.0));
-    io::oiio::write_with(&path, &ramp, &WriteOptions::default()).unwrap();
+    write_ramp(&path);
     let mut bytes = std::fs::read(&path).unwrap();
     bytes[801] = code;
     std::fs::write(&path, bytes).unwrap();

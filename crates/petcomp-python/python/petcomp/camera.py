@@ -198,7 +198,7 @@ class Camera:
         return hash((self.image, self.focal_px, self.principal_px))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _camera, (self.to_dict(),)
+        return Camera.from_dict, (self.to_dict(),)
 
     def __repr__(self) -> str:
         (w, h), (fx, _), (x, y, z) = self.image, self.focal_px, self.center
@@ -216,10 +216,6 @@ class Camera:
             ("tilt", f"{np.degrees(self.tilt):.2f} degrees"),
         ]
         return table(("camera", ""), rows)
-
-
-def _camera(document: dict[str, Any]) -> Camera:
-    return Camera.from_dict(document)
 
 
 @dataclass(frozen=True)
@@ -253,13 +249,5 @@ def solve(label: Mapping[str, Any], force: bool = False) -> Solution:
     """
     camera, text = _petcomp.solve_camera(dumped("label", label), force)
     record = loaded(text)
-    return Solution(
-        camera=Camera(camera),
-        size=tuple(record["size"]),
-        rms_px=record["rms_px"],
-        p_value=record["p_value"],
-        focal_sigma=record["focal_sigma"],
-        tilt_sigma=record["tilt_sigma"],
-        warnings=record["warnings"],
-        file=record["file"],
-    )
+    record["size"] = tuple(record["size"])
+    return Solution(Camera(camera), **record)

@@ -93,14 +93,6 @@ def cut_out(image: npt.NDArray[Any], *, empty: npt.NDArray[Any] | None = None, *
     """
     rgba, transmittance, text = _petcomp.cut_out(image, empty, dumped("options", options))
     record = loaded(text)
-    return CutOut(
-        rgba=rgba,
-        transmittance=transmittance,
-        hull=np.array(record["hull"], dtype=np.float64).reshape(-1, 2),
-        roi=tuple(record["roi"]),
-        scale=record["scale"],
-        screen=tuple(record["screen"]),
-        method=record["method"],
-        residual_matte=record["residual_matte"],
-        diagnostics=record["diagnostics"],
-    )
+    record["hull"] = np.array(record["hull"], dtype=np.float64).reshape(-1, 2)
+    record["roi"], record["screen"] = tuple(record["roi"]), tuple(record["screen"])
+    return CutOut(rgba, transmittance, **record)

@@ -80,12 +80,8 @@ class Scene:
         return hash(json.dumps(self._fields, sort_keys=True))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _scene, (self.to_dict(),)
+        return Scene.from_dict, (self.to_dict(),)
 
     def __repr__(self) -> str:
         (w, h), objects = self._fields["image"], len(self._fields.get("objects", []))
         return f"Scene({w} x {h}, {objects} objects)"
-
-
-def _scene(document: dict[str, Any]) -> Scene:
-    return Scene.from_dict(document)

@@ -3,7 +3,7 @@
 
 use super::show::three;
 use super::{focal_percent, height_error_px};
-use crate::columns::{Column, table_of};
+use crate::columns::{Column, four, table_of};
 use crate::statistics::quantile;
 use petcomp::camera::simulate::{Scenario, View};
 use petcomp::camera::{Framing, Solution, SolveOptions, solve};
@@ -21,26 +21,25 @@ const VIEW_SEED: u64 = 7;
 const FRAMINGS: [Framing; 3] = [Framing::Whole, Framing::Unknown, Framing::Cropped];
 
 /// Errors of one kind of view, and what was stated of them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StatedErrors {
+#[derive(Debug)]
+pub(super) struct StatedErrors {
     /// Distance of the principal point from the picture's middle, in longer sides.
-    pub off_center: f64,
+    off_center: f64,
     /// Noise of the corners, pixels.
-    pub noise_px: f64,
+    noise_px: f64,
     /// What the label states about the picture.
-    pub framing: Framing,
-    /// Number of views.
-    pub views: usize,
+    framing: Framing,
+    views: usize,
     /// How many of them no camera fits; they are left out of all other numbers.
-    pub refused: usize,
+    refused: usize,
     /// Median error of the focal length and median of its stated standard deviation, percent.
-    pub focal_percent: [f64; 2],
+    focal_percent: [f64; 2],
     /// The same of where points above the surface are seen, pixels.
-    pub height_px: [f64; 2],
+    height_px: [f64; 2],
     /// Parts of the focal lengths within one, two and three standard deviations of the truth.
-    pub within: [f64; 3],
+    within: [f64; 3],
     /// The largest error of a focal length, in standard deviations.
-    pub worst: f64,
+    worst: f64,
 }
 
 /// Measures whole pictures with every framing, and cropped ones with those that are true of them.
@@ -151,10 +150,6 @@ const CSV_COLUMNS: [Column<StatedErrors>; 13] = [
     ("within_3", |r| four(r.within[2])),
     ("worst_sigmas", |r| format!("{:.3}", r.worst)),
 ];
-
-fn four(value: f64) -> String {
-    format!("{value:.4}")
-}
 
 pub(super) fn csv(rows: &[StatedErrors]) -> String {
     table_of(&CSV_COLUMNS, rows).csv()

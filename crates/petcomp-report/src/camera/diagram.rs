@@ -10,7 +10,7 @@ const DRAWN_TILTS_DEG: [f64; 2] = [20.0, 5.0];
 
 /// Error of the focal length against time, a diagram per tilt and a point per method; `views` of
 /// each.
-pub fn diagrams(views: u64) -> Vec<Diagram> {
+pub(crate) fn diagrams(views: u64) -> Vec<Diagram> {
     DRAWN_TILTS_DEG
         .map(|tilt_deg| tilt_diagram(tilt_deg, views))
         .into()

@@ -8,7 +8,7 @@ pub(super) const PHOTOS_TOGETHER: usize = 8;
 
 /// What the camera is really like, and what the solver assumes of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lens {
+pub(super) enum Lens {
     /// A perfect pinhole over a perfect rectangle, and the solver knows; nothing is known of the
     /// focal length.
     Ideal,
@@ -19,7 +19,7 @@ pub enum Lens {
 
 /// How a camera is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SolveMethod {
+pub(super) enum SolveMethod {
     /// The closed form and this many steps of refinement.
     Steps(usize),
     /// Every start, to the end, with covariance.
@@ -30,10 +30,10 @@ pub enum SolveMethod {
 
 impl Lens {
     /// Both of them.
-    pub const ALL: [Self; 2] = [Self::Ideal, Self::Realistic];
+    pub(super) const ALL: [Self; 2] = [Self::Ideal, Self::Realistic];
 
     /// Its name in tables.
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Ideal => "ideal",
             Self::Realistic => "realistic",
@@ -61,7 +61,7 @@ impl Lens {
 
 impl SolveMethod {
     /// All of them, the quickest first.
-    pub const ALL: [Self; 8] = [
+    pub(super) const ALL: [Self; 8] = [
         Self::Steps(0),
         Self::Steps(1),
         Self::Steps(2),
@@ -73,7 +73,7 @@ impl SolveMethod {
     ];
 
     /// Its name in tables.
-    pub fn name(self) -> String {
+    pub(super) fn name(self) -> String {
         match self {
             Self::Steps(0) => "closed form".into(),
             Self::Steps(1) => "closed form + 1 step".into(),

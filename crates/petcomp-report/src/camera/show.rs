@@ -2,7 +2,7 @@
 
 use super::{CameraRow, NOISES_PX, SolveMethod};
 use crate::statistics::quantile;
-use petcomp::plot::{Axis, Chart, Curve};
+use petcomp::plot::{Axis, Chart, Curve, Table};
 
 /// Tilts that run time is plotted for, degrees.
 const TIMED_TILTS_DEG: [f64; 3] = [5.0, 20.0, 45.0];
@@ -32,19 +32,11 @@ impl CameraRow {
 
     fn focal_cell(&self) -> String {
         let [median, most] = self.focal_percent.map(three);
-        format!(" {median} / {most} |")
+        format!("{median} / {most}")
     }
 
     fn median_focal_percent(&self) -> f64 {
         self.focal_percent[0]
-    }
-
-    fn median_height_px(&self) -> f64 {
-        self.height_px[0]
-    }
-
-    fn time_and_focal_error(&self) -> [f64; 2] {
-        [self.time_us, self.median_focal_percent()]
     }
 }
 
@@ -57,31 +49,22 @@ pub(super) fn markdown(rows: &[CameraRow]) -> String {
 }
 
 fn markdown_table(rows: &[CameraRow]) -> String {
-    let lines: String = rows
-        .chunk_by(|a, b| a.tilt_deg == b.tilt_deg)
-        .map(markdown_line)
-        .collect();
-    let times = SolveMethod::ALL.map(|method| format!(" {} |", three(median_time(rows, method))));
-    format!(
-        "{}{lines}| us |{}\n",
-        markdown_head(&rows[0]),
-        times.concat()
-    )
+    let (lens, noise_px) = (rows[0].lens.name(), rows[0].noise_px);
+    let head = format!("\n## {lens} camera, corners to {noise_px} px\n\n");
+    head + &method_table(rows).markdown()
 }
 
-fn markdown_head(row: &CameraRow) -> String {
-    let names = SolveMethod::ALL
-        .map(|m| format!(" {} |", m.name()))
-        .concat();
-    let rule = " --- |".repeat(SolveMethod::ALL.len() + 1);
-    let (lens, noise_px) = (row.lens.name(), row.noise_px);
-    format!("\n## {lens} camera, corners to {noise_px} px\n\n| tilt |{names}\n|{rule}\n")
-}
-
-/// All methods at one tilt.
-fn markdown_line(rows: &[CameraRow]) -> String {
-    let cells: String = rows.iter().map(CameraRow::focal_cell).collect();
-    format!("| {} |{cells}\n", rows[0].tilt_deg)
+fn method_table(rows: &[CameraRow]) -> Table {
+    let names = SolveMethod::ALL.map(SolveMethod::name);
+    let titles = names.iter().map(String::as_str);
+    let mut table = Table::new(std::iter::once("tilt").chain(titles));
+    for row in rows.chunk_by(|a, b| a.tilt_deg == b.tilt_deg) {
+        let cells = row.iter().map(CameraRow::focal_cell);
+        table.push(std::iter::once(row[0].tilt_deg.to_string()).chain(cells));
+    }
+    let times = SolveMethod::ALL.map(|method| three(median_time(rows, method)));
+    table.push(std::iter::once("us".to_owned()).chain(times));
+    table
 }
 
 fn median_time(rows: &[CameraRow], method: SolveMethod) -> f64 {
@@ -106,20 +89,23 @@ pub(super) fn three(value: f64) -> String {
 pub(super) fn charts(rows: &[CameraRow]) -> [(&'static str, String); 3] {
     let focal = TiltChart {
         rows,
-        title: "focal length, median error, %",
+        title: FOCAL_ERROR,
         error: CameraRow::median_focal_percent,
     };
     let height = TiltChart {
         rows,
         title: "50 mm up, median error, px",
-        error: CameraRow::median_height_px,
+        error: |row| row.height_px[0],
     };
+    let time = TIMED_TILTS_DEG.map(|tilt_deg| time_chart(rows, tilt_deg));
     [
         ("tilt", focal.svg()),
         ("height", height.svg()),
-        ("time", time_charts(rows)),
+        ("time", Chart::row(&time)),
     ]
 }
+
+const FOCAL_ERROR: &str = "focal length, median error, %";
 
 /// An error against tilt: a chart per noise, a curve per method.
 struct TiltChart<'a> {
@@ -138,7 +124,11 @@ impl TiltChart<'_> {
         Chart {
             title: format!("corners to {noise_px} px"),
             names: SolveMethod::ALL.map(SolveMethod::name).into(),
-            across: tilt_axis(),
+            across: Axis {
+                title: "tilt, degrees".into(),
+                range: [0.0, 80.0],
+                logarithmic: false,
+            },
             up: Axis::over_decades(self.title, errors),
             curves: SolveMethod::ALL
                 .map(|method| self.curve(noise_px, method))
@@ -156,28 +146,18 @@ impl TiltChart<'_> {
     }
 }
 
-fn tilt_axis() -> Axis {
-    Axis {
-        title: "tilt, degrees".into(),
-        range: [0.0, 80.0],
-        logarithmic: false,
-    }
-}
-
-/// A chart per tilt, a curve per noise along the methods.
-fn time_charts(rows: &[CameraRow]) -> String {
-    Chart::row(&TIMED_TILTS_DEG.map(|tilt_deg| time_chart(rows, tilt_deg)))
-}
-
+/// A curve per noise along the methods.
 fn time_chart(rows: &[CameraRow], tilt_deg: f64) -> Chart {
     let seen: Vec<&CameraRow> = rows.iter().filter(|r| r.tilt_deg == tilt_deg).collect();
+    let times = rows.iter().map(|row| row.time_us);
+    let errors = rows.iter().map(CameraRow::median_focal_percent);
     Chart {
         title: format!("tilt {tilt_deg} degrees: closed form, 1 to 5 steps, full, joint"),
         names: NOISES_PX
             .map(|noise| format!("corners to {noise} px"))
             .into(),
-        across: time_axis(rows),
-        up: focal_axis(rows),
+        across: Axis::over_decades("run time per photo, microseconds", times),
+        up: Axis::over_decades(FOCAL_ERROR, errors),
         curves: NOISES_PX
             .map(|noise| time_curve(&seen, |row| row.noise_px == noise))
             .into(),
@@ -185,17 +165,9 @@ fn time_chart(rows: &[CameraRow], tilt_deg: f64) -> Chart {
     }
 }
 
-fn time_axis(rows: &[CameraRow]) -> Axis {
-    let times = rows.iter().map(|row| row.time_us);
-    Axis::over_decades("run time per photo, microseconds", times)
-}
-
-fn focal_axis(rows: &[CameraRow]) -> Axis {
-    let errors = rows.iter().map(CameraRow::median_focal_percent);
-    Axis::over_decades("focal length, median error, %", errors)
-}
-
 fn time_curve(rows: &[&CameraRow], is_shown: impl Fn(&CameraRow) -> bool) -> Curve {
     let shown = rows.iter().filter(|row| is_shown(row));
-    shown.map(|row| row.time_and_focal_error()).collect()
+    shown
+        .map(|row| [row.time_us, row.median_focal_percent()])
+        .collect()
 }

@@ -1,7 +1,7 @@
 //! `petcomp-report camera`: the camera solver on simulated views.
 
 use crate::ReportFlags;
-use petcomp_report::camera::{self, CameraReportOptions};
+use petcomp_report::camera;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -13,21 +13,19 @@ pub(crate) struct Args {
     #[arg(
         long,
         value_name = "N",
-        default_value_t = CameraReportOptions::default().views,
+        default_value_t = 200,
         value_parser = clap::value_parser!(u64).range(1..=100_000)
     )]
     views: u64,
 }
 
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
-    let options = CameraReportOptions { views: args.views };
-    let rows = common.with_progress("measuring", |progress| {
-        camera::write(&args.output, &options, progress)
+    let lines = common.with_progress("measuring", |progress| {
+        camera::write(&args.output, args.views, progress)
     })?;
     common.print_line(format_args!(
-        "{}: camera.csv ({} lines), camera_coverage.csv, camera.md and six plots",
-        args.output.display(),
-        rows.len()
+        "{}: camera.csv ({lines} lines), camera_coverage.csv, camera.md and six plots",
+        args.output.display()
     ));
     Ok(())
 }

@@ -1,4 +1,5 @@
-//! `petcomp-report matte`: the matting methods on photos with known mattes, and over new backgrounds.
+//! `petcomp-report matte`: the matting methods on photos with known mattes, and over new
+//! backgrounds.
 
 use crate::ReportFlags;
 use petcomp_report::{display, matte};
@@ -22,10 +23,10 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     if let Some(truth) = &args.truth {
-        let summaries = common.with_progress("measuring", |progress| {
+        let table = common.with_progress("measuring", |progress| {
             matte::write(truth, &args.output, progress)
         })?;
-        println!("{}", matte::table(&summaries).markdown().trim_end());
+        println!("{}", table.markdown().trim_end());
     }
     if let Some(set) = &args.display {
         let strips = args.strip.iter().filter_map(|strip| strip.split_once(' '));
@@ -33,10 +34,10 @@ pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
         if !strips.is_empty() {
             return Ok(display::write_strips(set, &args.output, &strips)?);
         }
-        let summaries = common.with_progress("measuring", |progress| {
+        let table = common.with_progress("measuring", |progress| {
             display::write(set, &args.output, progress)
         })?;
-        println!("{}", display::table(&summaries).markdown().trim_end());
+        println!("{}", table.markdown().trim_end());
     }
     common.print_line(format_args!("written to {}", args.output.display()));
     Ok(())

@@ -11,8 +11,8 @@ mod stability;
 mod work;
 
 use crate::ReportFlags;
-use clap::builder::RangedU64ValueParser;
-use std::ops::RangeInclusive;
+use petcomp_report::all::AllOptions;
+use petcomp_report::render::RenderReportOptions;
 use std::path::PathBuf;
 
 /// What a report of photos with known mattes needs.
@@ -30,7 +30,7 @@ pub(crate) struct TruthArgs {
 pub(crate) enum Command {
     /// Everything that is measured on one page, in about three minutes: report.html, report.md and
     /// the data as CSV
-    All(all::Args),
+    All(AllOptions),
     /// Error of the camera solver against run time and against tilt: camera.csv, camera.md and
     /// plots (SVG)
     Camera(camera::Args),
@@ -47,7 +47,7 @@ pub(crate) enum Command {
     Flags(TruthArgs),
     /// Error of the renderer against run time, beside Cycles: render.csv, render.md, a plot and the
     /// golden scenes
-    Render(render::Args),
+    Render(RenderReportOptions),
     /// What scenes pay for, counted: work.csv and work.md
     Work(work::Args),
     /// Memory and rate by threads, pixels and cards, and a million pictures: scale.csv, scale.md
@@ -68,9 +68,4 @@ pub(crate) fn run(command: &Command, common: &ReportFlags) -> anyhow::Result<()>
         Work(args) => work::run(args, common),
         Scale(args) => scale::run(args, common),
     }
-}
-
-/// A number of things within a range: more of them would take days, or all of the memory.
-fn count(range: RangeInclusive<u64>) -> RangedU64ValueParser<usize> {
-    RangedU64ValueParser::new().range(range)
 }

@@ -2,7 +2,7 @@
 
 use crate::ReportFlags;
 use petcomp::io;
-use petcomp_report::settle::{self, SettleReportOptions};
+use petcomp_report::settle;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -14,7 +14,7 @@ pub(crate) struct Args {
     #[arg(
         long,
         value_name = "N",
-        default_value_t = SettleReportOptions::default().heaps,
+        default_value_t = 20,
         value_parser = clap::value_parser!(u64).range(1..=10_000)
     )]
     heaps: u64,
@@ -28,14 +28,12 @@ pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     if let Some(path) = &args.peers {
         return Ok(io::write_document(path, &settle::peer_cases()?)?);
     }
-    let options = SettleReportOptions { heaps: args.heaps };
-    let rows = common.with_progress("measuring", |progress| {
-        settle::write(&args.output, &options, progress)
+    let lines = common.with_progress("measuring", |progress| {
+        settle::write(&args.output, args.heaps, progress)
     })?;
     common.print_line(format_args!(
-        "{}: settle.csv ({} lines), settle.md and a plot",
-        args.output.display(),
-        rows.len()
+        "{}: settle.csv ({lines} lines), settle.md and a plot",
+        args.output.display()
     ));
     Ok(())
 }

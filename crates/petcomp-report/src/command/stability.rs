@@ -39,5 +39,5 @@ fn print_failures(rows: &[CaseResult]) -> usize {
 
 fn print_failure(row: &CaseResult) {
     let measured = &row.outcome.measured;
-    println!("FAIL {}: {}: {measured}", row.stage, row.name);
+    println!("FAIL {}: {}: {measured}", row.stage, row.case.name);
 }

@@ -9,7 +9,7 @@ use petcomp::{Film, Image, Result};
 
 /// A way to photograph and cut out a bottle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DisplayMethod {
+pub(super) enum DisplayMethod {
     /// The paper's keyer on one painted screen.
     Paper,
     /// One photo on a painted screen.
@@ -24,7 +24,7 @@ pub enum DisplayMethod {
 
 impl DisplayMethod {
     /// All of them, the paper's first.
-    pub const ALL: [Self; 5] = [
+    pub(super) const ALL: [Self; 5] = [
         Self::Paper,
         Self::OnePhoto,
         Self::TwoScreens,
@@ -33,7 +33,7 @@ impl DisplayMethod {
     ];
 
     /// Its name in tables.
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Paper => "paper",
             Self::OnePhoto => "one photo",

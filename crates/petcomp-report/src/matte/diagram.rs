@@ -1,8 +1,6 @@
 //! The matting methods: error against run time.
 
-use super::{
-    MatteRow, MattingMethod, MethodSummary, Score, made, measure, measure_known, summaries,
-};
+use super::{MattingMethod, MethodSummary, Score, made, measure, measure_known, summaries};
 use crate::diagram::invisible_error;
 use crate::{Diagram, Point};
 use petcomp::Result;
@@ -12,28 +10,22 @@ use std::path::Path;
 const SECONDS_PER_MS: f64 = 1e-3;
 
 /// Error over new backgrounds and overlap of the outline, each against time: on photos with truth
-/// of a folder, or on made ones where that is empty.
-///
-/// # Errors
-/// A folder without truth, or files of it that cannot be read.
-pub fn diagrams(truth: &Path) -> Result<Vec<Diagram>> {
-    let (rows, input, source) = if truth.as_os_str().is_empty() {
-        let rows = measure_known(made::PHOTO_COUNT, |i| Ok(made::photo(i)), |_, _| ())?;
-        (rows, MADE_INPUT, "the formula that the photos are made by")
-    } else {
+/// of a folder, or on made ones without one.
+pub(crate) fn diagrams(truth: Option<&Path>) -> Result<Vec<Diagram>> {
+    let (rows, input, source) = if let Some(truth) = truth {
         let rows = measure(truth, |_, _| ())?;
         (rows, KNOWN_INPUT, "what the photos' renderer knows")
+    } else {
+        let rows = measure_known(made::PHOTO_COUNT, |i| Ok(made::photo(i)), |_, _| ())?;
+        (rows, MADE_INPUT, "the formula that the photos are made by")
     };
-    let input = format!("{} {input}", count_photos(&rows));
+    let photos = rows.len() / MattingMethod::ALL.len();
+    let input = format!("{photos} {input}");
     Ok(summary_diagrams(&summaries(&rows), &input, source))
 }
 
 const MADE_INPUT: &str = "photos of see-through bottles made in code, 600 x 320";
 const KNOWN_INPUT: &str = "photos with known mattes";
-
-fn count_photos(rows: &[MatteRow]) -> usize {
-    rows.len() / MattingMethod::ALL.len()
-}
 
 fn summary_diagrams(summaries: &[MethodSummary], input: &str, source: &str) -> Vec<Diagram> {
     let lit = error_diagram(summaries, |s| s.mae_lit);

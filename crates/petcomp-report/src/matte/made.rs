@@ -8,8 +8,7 @@
 //! sight meets more plastic, while the light, which comes from all around, does not.
 
 use super::truth::{Known, PhotoNoise};
-use petcomp::Image;
-use petcomp::{Coverage, LinearRgb};
+use petcomp::{Coverage, Image, LinearRgb};
 
 /// How many there are.
 pub(super) const PHOTO_COUNT: usize = TINTS.len();

@@ -1,17 +1,14 @@
 //! The matting methods that are compared.
 
-use petcomp::Image;
-use petcomp::Result;
-use petcomp::filter;
 use petcomp::matte::{
     CutOutOptions, FilmOptions, KeyOptions, Keying, Screen, ScreenPlate, SegmentOptions,
     Segmentation, film, screen_color, segment, triangulate,
 };
-use petcomp::{Coverage, Film, LinearRgb, PremulRgba};
+use petcomp::{Coverage, Film, Image, LinearRgb, PremulRgba, Result, filter};
 
 /// A matting method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum MattingMethod {
+pub(crate) enum MattingMethod {
     /// Blender's keyer with the mean colour of the background, masked by the convex hull.
     Paper,
     /// Blender's keyer with a key of its own for every pixel, masked by the tight outline.
@@ -37,7 +34,7 @@ pub(super) struct MethodCutOut {
 
 impl MattingMethod {
     /// All of them, the paper's first.
-    pub const ALL: [Self; 5] = [
+    pub(crate) const ALL: [Self; 5] = [
         Self::Paper,
         Self::KeyPlate,
         Self::Difference,
@@ -46,7 +43,7 @@ impl MattingMethod {
     ];
 
     /// Its name in tables.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Paper => "paper",
             Self::KeyPlate => "Blender keyer + plate",
@@ -101,7 +98,7 @@ fn key_by_color(photo: &Image<LinearRgb>, found: Segmentation) -> Result<MethodC
 }
 
 fn fitted_plate(photo: &Image<LinearRgb>, found: &Segmentation) -> Result<ScreenPlate> {
-    ScreenPlate::fit(photo, &found.background(), &CutOutOptions::default().plate)
+    ScreenPlate::fit_outside(photo, &found.mask, &CutOutOptions::default().plate)
 }
 
 /// A photo, where the object is in it, and its screen.
@@ -167,15 +164,6 @@ impl MethodCutOut {
             found,
         }
     }
-
-    /// Why it needs review.
-    pub(super) fn warnings(&self) -> Vec<String> {
-        let diagnostics = self.found.diagnostics.iter();
-        diagnostics
-            .filter(|d| d.needs_review())
-            .map(ToString::to_string)
-            .collect()
-    }
 }
 
 /// Colour difference against the screen's own colour, and what the screen does not explain of the
@@ -192,13 +180,18 @@ fn color_difference(pixel: LinearRgb, screen: LinearRgb) -> PremulRgba {
 }
 
 fn share_of_screen(pixel: [f32; 3], screen: [f32; 3]) -> f32 {
-    let strongest = (1..3).fold(0, |best, c| if screen[c] > screen[best] { c } else { best });
+    let strongest = largest_channel(screen);
     let [seen, full] = [pixel, screen].map(|color| excess(color, strongest));
     if full > 0.0 {
         (seen / full).clamp(0.0, 1.0)
     } else {
         0.0
     }
+}
+
+/// The first of the largest channels.
+pub(crate) fn largest_channel(color: [f32; 3]) -> usize {
+    (1..3).fold(0, |best, c| if color[c] > color[best] { c } else { best })
 }
 
 /// How much a channel is above both others.

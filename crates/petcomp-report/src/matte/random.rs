@@ -1,7 +1,6 @@
 //! Random numbers and pictures from seeds.
 
-use petcomp::Image;
-use petcomp::LinearRgb;
+use petcomp::{Image, LinearRgb};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -15,28 +14,29 @@ const BACKGROUND_GREY: f32 = 0.2;
 const UNIFORM_NUMBERS: usize = 12;
 
 /// Uniform numbers from 0 to 1.
-fn uniform(rng: &mut ChaCha8Rng) -> f64 {
-    f64::from(rng.next_u32()) / f64::from(u32::MAX)
+pub(crate) fn uniform(seed: u64) -> impl FnMut() -> f64 {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    move || f64::from(rng.next_u32()) / f64::from(u32::MAX)
 }
 
 /// Normal numbers: sums of twelve uniform ones.
 pub(crate) fn normal(seed: u64) -> impl FnMut() -> f64 {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut draw = uniform(seed);
     move || {
-        let sum: f64 = (0..UNIFORM_NUMBERS).map(|_| uniform(&mut rng)).sum();
+        let sum: f64 = (0..UNIFORM_NUMBERS).map(|_| draw()).sum();
         sum - UNIFORM_NUMBERS as f64 / 2.0
     }
 }
 
 /// A background that no method has seen: patches of random colours and sizes.
 pub(super) fn patched_background((w, h): (usize, usize), seed: u64) -> Image<LinearRgb> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut draw = uniform(seed);
     let mut image = Image::filled(w, h, LinearRgb::grey(BACKGROUND_GREY));
     for _ in 0..w * h * PATCH_LAYERS / (MAX_PATCH_PX * MAX_PATCH_PX) {
-        let color = random_color(&mut rng);
+        let color: [f32; 3] = std::array::from_fn(|_| draw() as f32);
         let [x, y, across, down] =
-            [w, h, MAX_PATCH_PX, MAX_PATCH_PX].map(|below| random_length(&mut rng, below));
-        fill_patch(&mut image, [x, y], [1 + across, 1 + down], color);
+            [w, h, MAX_PATCH_PX, MAX_PATCH_PX].map(|below| (draw() as f32 * below as f32) as usize);
+        fill_patch(&mut image, [x, y], [1 + across, 1 + down], color.into());
     }
     image
 }
@@ -52,13 +52,4 @@ fn fill_patch(
     for row in y..(y + height).min(h) {
         image.row_mut(row)[x..(x + width).min(w)].fill(color);
     }
-}
-
-fn random_color(rng: &mut ChaCha8Rng) -> LinearRgb {
-    let channels: [f32; 3] = std::array::from_fn(|_| uniform(rng) as f32);
-    channels.into()
-}
-
-fn random_length(rng: &mut ChaCha8Rng, below: usize) -> usize {
-    (uniform(rng) as f32 * below as f32) as usize
 }

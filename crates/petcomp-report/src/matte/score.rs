@@ -3,10 +3,8 @@
 use super::method::MethodCutOut;
 use super::truth::Known;
 use crate::statistics::mean_of;
-use petcomp::Image;
-use petcomp::filter;
 use petcomp::geom::Point2;
-use petcomp::{Coverage, LinearRgb};
+use petcomp::{Coverage, Image, LinearRgb, filter};
 
 /// Sums of errors over a picture are given in thousands.
 const SUM_UNIT: f64 = 1000.0;
@@ -17,29 +15,29 @@ const GRADIENT_SIGMA_PX: f32 = 1.4;
 
 /// Errors of one cut-out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Score {
+pub(super) struct Score {
     /// Sum of absolute differences of alpha, thousands of pixels.
-    pub sad: f64,
+    pub(super) sad: f64,
     /// Mean squared difference of alpha.
-    pub mse: f64,
+    pub(super) mse: f64,
     /// Sum of squared differences of the gradient's length of alpha, thousands.
-    pub gradient: f64,
+    pub(super) gradient: f64,
     /// Mean absolute error over new backgrounds that are lit by themselves (F + V B), linear
     /// light.
-    pub mae_lit: f64,
+    pub(super) mae_lit: f64,
     /// The same as a peak signal-to-noise ratio, decibels for a peak of 1.
-    pub psnr_lit: f64,
+    pub(super) psnr_lit: f64,
     /// Mean absolute error over new backgrounds in the object's own shadow (F + T B), linear
     /// light.
-    pub mae_shaded: f64,
+    pub(super) mae_shaded: f64,
     /// The same as a peak signal-to-noise ratio.
-    pub psnr_shaded: f64,
+    pub(super) psnr_shaded: f64,
     /// Mean alpha where there is no object.
-    pub residue: f64,
+    pub(super) residue: f64,
     /// Intersection over union of the outline.
-    pub iou: f64,
+    pub(super) iou: f64,
     /// Largest error of a side of the hull's box, pixels.
-    pub box_px: f64,
+    pub(super) box_px: f64,
 }
 
 impl Score {
@@ -203,7 +201,7 @@ pub(crate) fn overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
 }
 
 /// The error of the side of a hull's box that is farthest from left, top, right or bottom.
-pub(super) fn box_error(hull: &[Point2<f64>], truth: [f64; 4]) -> f64 {
+pub(crate) fn box_error(hull: &[Point2<f64>], truth: [f64; 4]) -> f64 {
     let [left, right] = extent(hull.iter().map(|p| p.x));
     let [top, bottom] = extent(hull.iter().map(|p| p.y));
     let sides = [left, top, right, bottom].into_iter().zip(truth);

@@ -10,11 +10,8 @@ use super::truth::Known;
 use crate::clock::timed;
 use crate::statistics::mean_of;
 use crate::{Diagram, Point};
-use petcomp::Coverage;
-use petcomp::Image;
-use petcomp::Quality;
-use petcomp::Result;
 use petcomp::matte::{CutOutOptions, SegmentOptions, segment};
+use petcomp::{Coverage, Image, Quality, Result};
 
 /// Longer sides of the picture that is searched, pixels: those of the qualities, half of the least
 /// and double the most.
@@ -46,10 +43,7 @@ struct MeasuredSearch {
 
 /// Overlap of the outline, and the box, each against time, of four bottles, or fewer for a quick
 /// report.
-///
-/// # Errors
-/// As [`segment`]; a thread that cannot be started.
-pub fn searches(bottles: usize) -> Result<Vec<Diagram>> {
+pub(crate) fn searches(bottles: usize) -> Result<Vec<Diagram>> {
     let mut found = Vec::new();
     for scale in PHOTO_SCALES {
         found.extend(measure_photos(bottles.min(made::PHOTO_COUNT), scale)?);

@@ -1,7 +1,7 @@
 //! Errors of the methods as tables and as a chart.
 
 use super::{MatteRow, MattingMethod, MethodSummary, Score};
-use crate::columns::{Column, table_of};
+use crate::columns::{Column, number_or_empty, table_of};
 use petcomp::plot::{Axis, Chart, Table};
 
 const SUMMARY_COLUMNS: [Column<MethodSummary>; 15] = [
@@ -27,7 +27,7 @@ const SUMMARY_COLUMNS: [Column<MethodSummary>; 15] = [
 ];
 
 /// The table method x error x time.
-pub fn table(summaries: &[MethodSummary]) -> Table {
+pub(super) fn table(summaries: &[MethodSummary]) -> Table {
     table_of(&SUMMARY_COLUMNS, summaries)
 }
 
@@ -51,19 +51,18 @@ const DETAIL_COLUMNS: [Column<MatteRow>; 14] = [
 impl MatteRow {
     /// One of its errors; empty where there is no cut-out.
     fn error_cell(&self, error: fn(&Score) -> f64) -> String {
-        self.score
-            .map_or(String::new(), |score| format!("{:.6}", error(&score)))
+        number_or_empty(self.score.as_ref().map(error), 6)
     }
 }
 
 /// Every photo with every method.
-pub fn details(rows: &[MatteRow]) -> Table {
+pub(super) fn details(rows: &[MatteRow]) -> Table {
     table_of(&DETAIL_COLUMNS, rows)
 }
 
 /// Error against run time, a point per method: over backgrounds lit by themselves, and in the
 /// object's own shadow.
-pub fn chart(summaries: &[MethodSummary]) -> String {
+pub(super) fn chart(summaries: &[MethodSummary]) -> String {
     let lit = error_chart(summaries, "new background, lit by itself", |s| s.mae_lit);
     let shaded = error_chart(summaries, "new background, shaded by the object", |s| {
         s.mae_shaded

@@ -4,25 +4,23 @@ use super::{GOOD_BOX_PX, GOOD_IOU, MatteRow, MattingMethod, Score};
 use crate::statistics::{mean_of, quantile};
 
 /// Errors of a method over all photos.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MethodSummary {
-    /// The method.
-    pub method: MattingMethod,
+pub(super) struct MethodSummary {
+    pub(super) method: MattingMethod,
     /// Means; of the outline's overlap and of the time the median, of the box the 95 % quantile.
-    pub score: Score,
+    pub(super) score: Score,
     /// Photos without a cut-out.
-    pub failed: usize,
+    pub(super) failed: usize,
     /// Share of the photos whose box is right to 2 pixels.
-    pub box_within_2_px: f64,
+    pub(super) box_within_2_px: f64,
     /// Photos with a box more than 2 pixels off or an outline overlapping by less than 0.95, and
     /// no warning.
-    pub silently_wrong: usize,
+    pub(super) silently_wrong: usize,
     /// Median run time, milliseconds.
-    pub time_ms: f64,
+    pub(super) time_ms: f64,
 }
 
 /// Errors over all photos, a line per method.
-pub fn summaries(rows: &[MatteRow]) -> Vec<MethodSummary> {
+pub(super) fn summaries(rows: &[MatteRow]) -> Vec<MethodSummary> {
     MattingMethod::ALL
         .into_iter()
         .map(|method| MethodSummary::new(rows, method))

@@ -1,10 +1,8 @@
 //! Photos with known mattes, as the sample world has them.
 
-use petcomp::Image;
+use crate::files::json_files;
 use petcomp::color::{linear_to_srgb, srgb_to_linear};
-use petcomp::io;
-use petcomp::{Coverage, LinearRgb};
-use petcomp::{Error, Result};
+use petcomp::{Coverage, Error, Image, LinearRgb, Result, io};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -79,12 +77,13 @@ impl PhotoNoise {
     /// A value as a sensor records it, in 8 bits; `normal` is a normal number.
     fn recorded(&self, value: f32, normal: f64) -> f32 {
         let noisy = value + (self.deviation(value) * normal) as f32;
-        in_eight_bits(noisy.clamp(0.0, 1.0))
+        in_eight_bits(noisy)
     }
 }
 
-fn in_eight_bits(value: f32) -> f32 {
-    let code = MAX_CODE * linear_to_srgb(value);
+/// A value as a camera of 8 bits stores it.
+pub(crate) fn in_eight_bits(value: f32) -> f32 {
+    let code = MAX_CODE * linear_to_srgb(value.clamp(0.0, 1.0));
     srgb_to_linear(code.round() / MAX_CODE)
 }
 
@@ -146,18 +145,6 @@ impl Truths {
     fn read_color(&self, name: &Path) -> Result<Image<LinearRgb>> {
         io::read(io::inside(&self.folder, name)?)
     }
-}
-
-/// Sorted.
-fn json_files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    let mut paths = Vec::new();
-    for entry in entries {
-        paths.push(entry.map_err(|e| Error::file(folder, e))?.path());
-    }
-    paths.retain(|path| path.extension().is_some_and(|e| e == "json"));
-    paths.sort();
-    Ok(paths)
 }
 
 /// Transmittance, blended with 1 where the object does not cover the pixel.

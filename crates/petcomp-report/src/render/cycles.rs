@@ -1,10 +1,7 @@
 //! The pictures of Blender's Cycles, as `tests/benches/peers/render.py` writes them.
 
 use super::finished;
-use petcomp::Image;
-use petcomp::LinearRgb;
-use petcomp::Result;
-use petcomp::io;
+use petcomp::{Image, LinearRgb, Result, io};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 

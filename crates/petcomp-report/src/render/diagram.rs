@@ -4,13 +4,10 @@ use super::golden::GoldenScene;
 use crate::clock::timed;
 use crate::diagram::invisible_error;
 use crate::{Diagram, Point};
-use petcomp::Image;
-use petcomp::Quality;
-use petcomp::Result;
 use petcomp::composite::{frame, picture};
 use petcomp::render::{RenderOptions, render_reference};
 use petcomp::scene::Shot;
-use petcomp::{LinearRgb, PremulRgba};
+use petcomp::{Image, LinearRgb, PremulRgba, Quality, Result};
 use std::path::Path;
 
 /// The curve that the qualities lie on.
@@ -35,10 +32,7 @@ struct SceneCost {
 
 /// The golden scenes at many settings, `runs` times each, and filtered samples beside plain ones;
 /// none without scenes.
-///
-/// # Errors
-/// A scene or a picture that cannot be read.
-pub fn diagrams(golden: &Path, runs: usize) -> Result<Vec<Diagram>> {
+pub(crate) fn diagrams(golden: &Path, runs: usize) -> Result<Vec<Diagram>> {
     let scenes = GoldenScene::all_in(golden)?;
     if scenes.is_empty() {
         return Ok(Vec::new());
@@ -149,6 +143,13 @@ impl RenderSetting {
         }
     }
 
+    /// The default but for one number.
+    fn changed(curve: &'static str, name: String, change: impl FnOnce(&mut RenderOptions)) -> Self {
+        let mut options = RenderOptions::default();
+        change(&mut options);
+        Self::new(curve, name, options)
+    }
+
     fn is_preset(&self) -> bool {
         self.curve == PRESETS
     }
@@ -165,47 +166,23 @@ fn render_settings() -> Vec<RenderSetting> {
         .map(|(name, options)| RenderSetting::new(PRESETS, name.to_owned(), options));
     presets
         .into_iter()
-        .chain(PIXEL_SAMPLES.map(pixel_setting))
-        .chain(LIGHT_SAMPLES.map(light_setting))
-        .chain(SKY_SAMPLES.map(sky_setting))
-        .chain(CELLS_PX.map(cell_setting))
+        .chain(PIXEL_SAMPLES.map(|n| {
+            RenderSetting::changed("samples of a pixel", square_name(n), |o| o.subsamples = n)
+        }))
+        .chain(LIGHT_SAMPLES.map(|n| {
+            RenderSetting::changed("samples of a light", square_name(n), |o| {
+                o.light_samples = n
+            })
+        }))
+        .chain(SKY_SAMPLES.map(|n| {
+            RenderSetting::changed("directions of the sky", n.to_string(), |o| {
+                o.ambient_samples = n
+            })
+        }))
+        .chain(CELLS_PX.map(|px| {
+            RenderSetting::changed("irradiance cells", format!("{px} px"), |o| o.cell_px = px)
+        }))
         .collect()
-}
-
-fn pixel_setting(subsamples: usize) -> RenderSetting {
-    let options = RenderOptions {
-        subsamples,
-        ..RenderOptions::default()
-    };
-    RenderSetting::new("samples of a pixel", square_name(subsamples), options)
-}
-
-fn light_setting(light_samples: usize) -> RenderSetting {
-    let options = RenderOptions {
-        light_samples,
-        ..RenderOptions::default()
-    };
-    RenderSetting::new("samples of a light", square_name(light_samples), options)
-}
-
-fn sky_setting(ambient_samples: usize) -> RenderSetting {
-    let options = RenderOptions {
-        ambient_samples,
-        ..RenderOptions::default()
-    };
-    RenderSetting::new(
-        "directions of the sky",
-        ambient_samples.to_string(),
-        options,
-    )
-}
-
-fn cell_setting(cell_px: f64) -> RenderSetting {
-    let options = RenderOptions {
-        cell_px,
-        ..RenderOptions::default()
-    };
-    RenderSetting::new("irradiance cells", format!("{cell_px} px"), options)
 }
 
 fn square_name(side: usize) -> String {

@@ -1,12 +1,9 @@
 //! The golden scenes: pictures of Cycles that ours should equal.
 
 use super::{picture_of, settings};
-use petcomp::Image;
-use petcomp::LinearRgb;
 use petcomp::diff::{Likeness, triple};
-use petcomp::io;
 use petcomp::scene::{Shot, cycles};
-use petcomp::{Error, Result};
+use petcomp::{Error, Image, LinearRgb, Result, io};
 use std::path::{Path, PathBuf};
 
 /// Columns of the sheet, and pixels between its strips.
@@ -14,14 +11,11 @@ const SHEET_COLUMNS: usize = 2;
 const STRIP_GAP_PX: usize = 4;
 
 /// A golden scene at one setting.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GoldenRow {
-    /// Name of the case.
-    pub case: String,
-    /// Name of the setting.
-    pub quality: &'static str,
+pub(super) struct GoldenRow {
+    pub(super) case: String,
+    pub(super) quality: &'static str,
     /// Against the reference.
-    pub likeness: Likeness,
+    pub(super) likeness: Likeness,
 }
 
 /// A golden scene and its reference.
@@ -75,10 +69,10 @@ impl GoldenScene {
 
 /// Every golden scene at every setting, and a sheet of all of them at one of them; no sheet where
 /// there are no scenes.
-///
-/// # Errors
-/// A scene or a reference that cannot be read.
-pub fn golden(folder: &Path, shown: &str) -> Result<(Vec<GoldenRow>, Option<Image<LinearRgb>>)> {
+pub(super) fn golden(
+    folder: &Path,
+    shown: &str,
+) -> Result<(Vec<GoldenRow>, Option<Image<LinearRgb>>)> {
     let (mut rows, mut strips) = (Vec::new(), Vec::new());
     for scene in GoldenScene::all_in(folder)? {
         for (setting, options) in settings() {

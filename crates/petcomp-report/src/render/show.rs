@@ -1,7 +1,7 @@
 //! The measurements as tables, charts and Markdown.
 
 use super::{GoldenRow, RenderReportOptions, RenderRow};
-use crate::columns::{Column, table_from, table_of};
+use crate::columns::{Column, number_or_empty, table_from, table_of};
 use petcomp::Quality;
 use petcomp::diff::Likeness;
 use petcomp::plot::{Axis, Chart, Curve, Table};
@@ -19,7 +19,7 @@ const TITLES: [&str; 9] = [
 ];
 
 /// The measurements as a table.
-pub fn table(rows: &[RenderRow]) -> Table {
+pub(super) fn table(rows: &[RenderRow]) -> Table {
     let lines = rows.iter().map(|row| row.table_line(speed_up(row, rows)));
     table_from(TITLES, lines)
 }
@@ -45,13 +45,9 @@ impl RenderRow {
     }
 }
 
-fn number_or_empty(value: Option<f64>, digits: usize) -> String {
-    value.map_or(String::new(), |v| format!("{v:.digits$}"))
-}
-
 /// How many times as long the other program takes for the same error, on a straight line between
 /// its pictures in a plot of logarithms; none beyond its last one.
-pub fn speed_up(row: &RenderRow, rows: &[RenderRow]) -> Option<f64> {
+pub(super) fn speed_up(row: &RenderRow, rows: &[RenderRow]) -> Option<f64> {
     let error = row.cycles?.rmse;
     if !row.is_petcomp() {
         return None;
@@ -81,7 +77,7 @@ const ERROR_MEASURES: [(&str, ErrorMeasure); 3] = [
 ];
 
 /// RMSE, FLIP and 1 - SSIM against CPU seconds, both programs' curves in each.
-pub fn charts(rows: &[RenderRow]) -> Vec<Chart> {
+pub(super) fn charts(rows: &[RenderRow]) -> Vec<Chart> {
     ERROR_MEASURES
         .iter()
         .map(|(title, measure)| error_chart(rows, title, *measure))
@@ -134,7 +130,7 @@ const GOLDEN_COLUMNS: [Column<GoldenRow>; 6] = [
 ];
 
 /// The golden scenes as a table: a row per scene and setting.
-pub fn golden_table(rows: &[GoldenRow]) -> Table {
+pub(super) fn golden_table(rows: &[GoldenRow]) -> Table {
     table_of(&GOLDEN_COLUMNS, rows)
 }
 
@@ -143,7 +139,7 @@ pub(super) fn markdown(
     golden: &[GoldenRow],
     options: &RenderReportOptions,
 ) -> String {
-    let ([w, h], scene) = (options.size, options.scene.display());
+    let ([w, h], scene) = (options.size(), options.scene.display());
     let mut text = format!("# Error of the renderer against run time\n\n{scene}, {w} x {h}\n\n");
     if rows.iter().all(RenderRow::is_petcomp) {
         text += "Cycles' own curve is not there: `tests/benches/peers/render.py` makes it.\n\n";

@@ -8,25 +8,23 @@ use petcomp::Result;
 const SINGULAR_EPSILON: f64 = 1e-12;
 
 /// What each thing costs, and how far measurements are from that.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CostFit {
+pub(super) struct CostFit {
     /// What is paid for.
-    pub terms: Vec<&'static str>,
+    pub(super) terms: Vec<&'static str>,
     /// The price of each; 0 for what does not show.
-    pub prices: Vec<f64>,
+    pub(super) prices: Vec<f64>,
     /// Measured over fitted, less 1, for each measurement.
-    pub residuals: Vec<f64>,
+    pub(super) residuals: Vec<f64>,
     /// The same with a fit that has not seen the measurement: what a forecast must expect.
-    pub unseen: Vec<f64>,
+    pub(super) unseen: Vec<f64>,
 }
 
 /// Time and memory of a picture.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CostModel {
+pub(super) struct CostModel {
     /// Seconds of a processor per picture, of points on one thread.
-    pub time: CostFit,
+    pub(super) time: CostFit,
     /// Most bytes of a process, of all points.
-    pub memory: CostFit,
+    pub(super) memory: CostFit,
 }
 
 /// What is paid for, and how much of it a point has.
@@ -85,10 +83,7 @@ fn amounts(terms: &[Term], point: &ScalePoint) -> Vec<f64> {
 
 impl CostModel {
     /// Fits both costs.
-    ///
-    /// # Errors
-    /// Without points, or none on one thread.
-    pub fn fit(measured: &ScaleMeasurements) -> Result<Self> {
+    pub(super) fn fit(measured: &ScaleMeasurements) -> Result<Self> {
         let all: Vec<_> = measured.points.iter().collect();
         let single = measured.single_threaded();
         Ok(Self {
@@ -98,12 +93,12 @@ impl CostModel {
     }
 
     /// Seconds of a processor for a picture like a point's.
-    pub fn seconds(&self, point: &ScalePoint) -> f64 {
+    pub(super) fn seconds(&self, point: &ScalePoint) -> f64 {
         self.time.cost_of(&amounts(&TIME_TERMS, point))
     }
 
     /// Most bytes of a process that makes pictures like a point's.
-    pub fn bytes(&self, point: &ScalePoint) -> f64 {
+    pub(super) fn bytes(&self, point: &ScalePoint) -> f64 {
         self.memory.cost_of(&amounts(&MEMORY_TERMS, point))
     }
 }
@@ -128,7 +123,7 @@ impl CostFit {
     /// some prices at 0 and the others free is looked for among all sets of prices, of which
     /// there are few; that it exists is a theorem of Lawson and Hanson ("Solving Least Squares
     /// Problems", 1974, chapter 23).
-    pub fn new(terms: &[&'static str], rows: &[Vec<f64>], costs: &[f64]) -> Option<Self> {
+    pub(super) fn new(terms: &[&'static str], rows: &[Vec<f64>], costs: &[f64]) -> Option<Self> {
         let data = Costs { rows, costs };
         let prices = data.fit_without(None)?;
         let all = 0..costs.len();
@@ -141,12 +136,12 @@ impl CostFit {
     }
 
     /// The cost of something with these amounts of each term.
-    pub fn cost_of(&self, amounts: &[f64]) -> f64 {
+    pub(super) fn cost_of(&self, amounts: &[f64]) -> f64 {
         dot(&self.prices, amounts)
     }
 
     /// The share by which nine in ten measurements that were not fitted are off, at most.
-    pub fn spread(&self) -> f64 {
+    pub(super) fn spread(&self) -> f64 {
         const NINE_IN_TEN: f64 = 0.9;
         let mut off: Vec<f64> = self.unseen.iter().map(|r| r.abs()).collect();
         off.sort_by(f64::total_cmp);

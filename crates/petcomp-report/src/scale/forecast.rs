@@ -1,37 +1,27 @@
 //! What many pictures take on many machines, from the model of one.
 
-use super::{
-    CostModel, SECONDS_PER_HOUR, ScaleCase, ScaleMeasurements, ScalePoint, grid, missing_error,
-};
+use super::{CostModel, SECONDS_PER_HOUR, ScaleMeasurements, ScalePoint, grid, missing_error};
 use petcomp::Result;
 
 /// What a dataset of default pictures is expected to take.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Forecast {
-    /// Pictures.
-    pub images: f64,
-    /// Kind of the pictures.
-    pub case: ScaleCase,
+pub(super) struct Forecast {
     /// Seconds of a processor per picture, its cards already lying: what the model says, and
     /// between what nine in ten lie.
-    pub picture_seconds: [f64; 3],
+    pub(super) picture_seconds: [f64; 3],
     /// Seconds of a processor until its cards lie.
-    pub fall_seconds: f64,
+    pub(super) fall_seconds: f64,
     /// Share of `cores` times the rate of one thread that all threads together have.
-    pub efficiency: f64,
+    pub(super) efficiency: f64,
     /// Cores of a machine: most threads that were measured.
-    pub cores: usize,
+    pub(super) cores: usize,
     /// Hours of one core for all: expected, least, most.
-    pub core_hours: [f64; 3],
+    pub(super) core_hours: [f64; 3],
     /// Most memory of a process on all cores: expected, least, most, bytes.
-    pub bytes: [f64; 3],
+    pub(super) bytes: [f64; 3],
 }
 
 /// Forecasts a dataset of the default pictures: 640 x 480 pixels, 12 cards that fall first.
-///
-/// # Errors
-/// As [`CostModel::fit`]; without a point of that kind.
-pub fn forecast(measured: &ScaleMeasurements, images: f64) -> Result<Forecast> {
+pub(super) fn forecast(measured: &ScaleMeasurements, images: f64) -> Result<Forecast> {
     let model = CostModel::fit(measured)?;
     let (one, all) = one_and_all_threads(measured)?;
     let cores = all.case.threads;
@@ -40,8 +30,6 @@ pub fn forecast(measured: &ScaleMeasurements, images: f64) -> Result<Forecast> {
     let picture_seconds = interval(model.seconds(one), model.time.spread());
     let core_hours = picture_seconds.map(|s| core_hours(images, s + fall_seconds, efficiency));
     Ok(Forecast {
-        images,
-        case: grid::DEFAULT_PICTURE,
         picture_seconds,
         fall_seconds,
         efficiency,
@@ -90,7 +78,7 @@ fn between((a, s): (usize, f64), (b, t): (usize, f64), cards: usize) -> f64 {
 
 impl Forecast {
     /// Hours on a number of machines of [`cores`](Self::cores) cores: expected, least, most.
-    pub fn hours_on(&self, machines: usize) -> [f64; 3] {
+    pub(super) fn hours_on(&self, machines: usize) -> [f64; 3] {
         let cores = (machines * self.cores) as f64;
         self.core_hours.map(|hours| hours / cores)
     }
@@ -98,6 +86,7 @@ impl Forecast {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::ScaleCase;
     use super::*;
 
     /// Measurements of a machine that is exactly as the model says, and half as good on two

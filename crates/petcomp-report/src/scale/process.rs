@@ -1,11 +1,10 @@
 //! Memory of a whole process, and points that are measured in one of their own.
 
 use super::{ScaleCase, ScalePoint};
+use crate::machine::bytes_in;
 use petcomp::{Error, Result};
 use std::path::Path;
 use std::process::{Command, Output};
-
-pub(super) const BYTES_PER_KIB: f64 = 1024.0;
 
 /// A point as another process prints it.
 pub(super) fn run_in_child(program: &Path, case: &ScaleCase, seconds: f64) -> Result<ScalePoint> {
@@ -29,15 +28,7 @@ fn printed_point(output: &Output) -> std::result::Result<ScalePoint, String> {
 pub(super) fn peak_bytes() -> Result<f64> {
     let path = Path::new("/proc/self/status");
     let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
-    kibibytes_of(&text, "VmHWM:")
-        .map(|kibibytes| kibibytes * BYTES_PER_KIB)
-        .ok_or_else(|| Error::file(path, "no VmHWM in it"))
-}
-
-/// A number of `/proc/PID/status`, by its name with the colon.
-pub(super) fn kibibytes_of(status: &str, name: &str) -> Option<f64> {
-    let mut values = status.lines().filter_map(|l| l.strip_prefix(name));
-    values.next()?.split_whitespace().next()?.parse().ok()
+    bytes_in(&text, "VmHWM").ok_or_else(|| Error::file(path, "no VmHWM in it"))
 }
 
 #[cfg(test)]
@@ -53,15 +44,6 @@ mod tests {
         };
         std::thread::spawn(work).join().unwrap();
         assert!(cpu_seconds() > before + 1e-4);
-    }
-
-    #[test]
-    fn the_peak_is_found_by_its_name() {
-        assert_eq!(
-            kibibytes_of("VmPeak:\t 9 kB\nVmHWM:\t  1234 kB\n", "VmHWM:"),
-            Some(1234.0)
-        );
-        assert_eq!(kibibytes_of("VmPeak:\t 9 kB\n", "VmHWM:"), None);
     }
 
     #[test]

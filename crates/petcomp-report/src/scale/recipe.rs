@@ -7,9 +7,10 @@
 //! the differences between blocks of equal length give, so that slow drifts count. Memory is a line
 //! through the means of the same blocks but for the first ones, while caches fill.
 
-use super::process::{BYTES_PER_KIB, kibibytes_of};
 use super::{FORECAST_PICTURES, MB_PER_BYTE, MS_PER_SECOND, SECONDS_PER_HOUR};
 use crate::columns::table_from;
+use crate::files::write_texts;
+use crate::machine::bytes_in;
 use petcomp::plot::{Axis, Chart, Curve, Table};
 use petcomp::{Error, Result, io};
 use std::io::{BufRead, BufReader};
@@ -27,7 +28,6 @@ const MANY_PICTURES: f64 = 1e5;
 const GB_PER_BYTE: f64 = 1e-9;
 
 /// A dataset to be made and watched.
-#[derive(Clone, Debug)]
 pub struct RecipeRun {
     /// The program `petcomp`.
     pub program: PathBuf,
@@ -42,44 +42,38 @@ pub struct RecipeRun {
 }
 
 /// A process after so many pictures.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RunSample {
+#[derive(Clone, Copy)]
+struct RunSample {
     /// Pictures done.
-    pub done: u64,
+    done: u64,
     /// Seconds of processors that it has taken, all threads together.
-    pub cpu_seconds: f64,
+    cpu_seconds: f64,
     /// Memory that is resident, bytes.
-    pub resident_bytes: f64,
+    resident_bytes: f64,
 }
 
 /// A value and the half width of its 95 % interval.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
-    /// The value.
-    pub value: f64,
-    /// Half of the interval.
-    pub half_width: f64,
+#[derive(Clone, Copy, Debug)]
+struct Estimate {
+    value: f64,
+    half_width: f64,
 }
 
 /// What a run took.
-#[derive(Clone, Debug)]
-pub struct RecipeRecord {
+struct RecipeRecord {
     /// By pictures done.
-    pub samples: Vec<RunSample>,
+    samples: Vec<RunSample>,
     /// Bytes of all files.
-    pub bytes: f64,
+    bytes: f64,
     /// Number of files.
-    pub files: u64,
+    files: u64,
     /// See [`RecipeRun::first`].
-    pub first: u64,
+    first: u64,
 }
 
 /// Makes the dataset in a temporary folder and watches; `progress` gets pictures done and to be
 /// done.
-///
-/// # Errors
-/// A program that cannot be run, or fails; a system without Linux's `/proc`.
-pub fn run_recipe(run: &RecipeRun, progress: impl Fn(u64, u64)) -> Result<RecipeRecord> {
+fn run_recipe(run: &RecipeRun, progress: impl Fn(u64, u64)) -> Result<RecipeRecord> {
     let folder = tempfile::tempdir().map_err(|e| Error::value("temporary folder", e))?;
     let output = folder.path().join("dataset");
     let mut child = start(run, &output)?;
@@ -145,7 +139,7 @@ fn sample_of(id: u32, done: u64) -> Option<RunSample> {
     Some(RunSample {
         done,
         cpu_seconds: cpu_seconds_in(&read("stat")?)?,
-        resident_bytes: kibibytes_of(&read("status")?, "VmRSS:")? * BYTES_PER_KIB,
+        resident_bytes: bytes_in(&read("status")?, "VmRSS")?,
     })
 }
 
@@ -176,10 +170,7 @@ fn file_sizes(folder: &Path) -> Result<Vec<f64>> {
 
 impl RecipeRecord {
     /// Processor seconds that a picture takes, of those between two numbers of pictures.
-    ///
-    /// # Errors
-    /// Fewer than two samples between them.
-    pub fn picture_seconds(&self, from: u64, to: u64) -> Result<Estimate> {
+    fn picture_seconds(&self, from: u64, to: u64) -> Result<Estimate> {
         let within = self
             .samples
             .iter()
@@ -221,10 +212,7 @@ impl RecipeRecord {
     }
 
     /// What was measured, and what is expected of a million pictures.
-    ///
-    /// # Errors
-    /// As [`picture_seconds`](Self::picture_seconds).
-    pub fn table(&self) -> Result<Table> {
+    fn table(&self) -> Result<Table> {
         let (first, last) = (self.first.min(self.last()), self.last());
         let beginning = self.picture_seconds(0, first)?;
         let all = self.picture_seconds(0, last)?;
@@ -278,7 +266,7 @@ impl RecipeRecord {
     }
 
     /// Memory and processor time by pictures done.
-    pub fn chart(&self) -> String {
+    fn chart(&self) -> String {
         let chart = |title: &str, up: &str, y: fn(&RunSample) -> f64| {
             let curve: Curve = self.samples.iter().map(|s| [s.done as f64, y(s)]).collect();
             Chart {
@@ -360,7 +348,8 @@ fn line_through(places: &[[f64; 2]], at: f64) -> [Estimate; 2] {
 /// Runs and writes `scale_recipe.csv`, `scale_recipe.md` and `scale_recipe.svg` into a folder.
 ///
 /// # Errors
-/// As [`run_recipe`]; files that cannot be written.
+/// A program that cannot be run, or fails; a system without Linux's `/proc`; files that cannot be
+/// written.
 pub fn write_recipe(folder: &Path, run: &RecipeRun, progress: impl Fn(u64, u64)) -> Result<Table> {
     io::create_folder(folder)?;
     let record = run_recipe(run, progress)?;
@@ -373,9 +362,12 @@ pub fn write_recipe(folder: &Path, run: &RecipeRun, progress: impl Fn(u64, u64))
         ]
     });
     let samples = table_from(["pictures", "cpu_s", "resident_bytes"], lines);
-    io::write_text(folder.join("scale_recipe.csv"), &samples.csv())?;
-    io::write_text(folder.join("scale_recipe.md"), &table.markdown())?;
-    io::write_text(folder.join("scale_recipe.svg"), &record.chart())?;
+    let files = [
+        ("scale_recipe.csv", &*samples.csv()),
+        ("scale_recipe.md", &table.markdown()),
+        ("scale_recipe.svg", &record.chart()),
+    ];
+    write_texts(folder, files)?;
     Ok(table)
 }
 
@@ -435,10 +427,6 @@ mod tests {
         let stat = "12 (a (b) c) S 1 1 1 0 -1 4 5 0 0 0 250 50 0 0 20 0 3 0 100 1000 20";
         let ticks = rustix::param::clock_ticks_per_second() as f64;
         assert_eq!(cpu_seconds_in(stat), Some(300.0 / ticks));
-        assert_eq!(
-            kibibytes_of("VmHWM:\t 9 kB\nVmRSS:\t  12 kB\n", "VmRSS:"),
-            Some(12.0)
-        );
         assert_eq!(
             pictures_done(r#"{"job":"pictures","done":7,"of":9}"#),
             Some(7)

@@ -13,10 +13,7 @@ const MACHINES: [usize; 3] = [1, 10, 100];
 
 /// Tables with their titles: all points and residuals first, then the model, threads, falls, and a
 /// million pictures.
-///
-/// # Errors
-/// As [`CostModel::fit`] and [`forecast()`].
-pub fn tables(measured: &ScaleMeasurements) -> Result<Vec<(String, Table)>> {
+pub(crate) fn tables(measured: &ScaleMeasurements) -> Result<Vec<(String, Table)>> {
     let model = CostModel::fit(measured)?;
     let forecast = forecast(measured, FORECAST_PICTURES)?;
     let tables = [
@@ -165,14 +162,12 @@ fn forecast_table(forecast: &Forecast) -> Table {
 }
 
 fn picture_lines(forecast: &Forecast) -> Vec<[String; 2]> {
-    let image = image_words(forecast.case.image);
+    let ScaleCase { image, cards, .. } = grid::DEFAULT_PICTURE;
+    let image = image_words(image);
     let ms = forecast.picture_seconds.map(|s| MS_PER_SECOND * s);
     let fall_ms = MS_PER_SECOND * forecast.fall_seconds;
     vec![
-        [
-            "picture".into(),
-            format!("{image}, {} cards", forecast.case.cards),
-        ],
+        ["picture".into(), format!("{image}, {cards} cards")],
         ["CPU ms a picture".into(), interval_words(ms, 1)],
         ["CPU ms until its cards lie".into(), format!("{fall_ms:.1}")],
     ]
@@ -208,10 +203,7 @@ fn interval_words([value, least, most]: [f64; 3], digits: usize) -> String {
 }
 
 /// Charts with what is to be seen in them: rate by threads and memory; time by pixels and by cards.
-///
-/// # Errors
-/// As [`CostModel::fit`].
-pub fn charts(measured: &ScaleMeasurements) -> Result<Vec<(String, String)>> {
+pub(crate) fn charts(measured: &ScaleMeasurements) -> Result<Vec<(String, String)>> {
     let model = CostModel::fit(measured)?;
     let sizes = by_sizes(measured);
     let machine = [rate_chart(measured), memory_chart(&sizes, &model)];

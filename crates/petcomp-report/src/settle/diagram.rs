@@ -1,12 +1,11 @@
 //! The physics' steps: errors of heaps at rest against run time.
 
 use super::closed_form::PLATE_COUNT;
-use super::{HEAP_CARDS, SettleReportOptions, SettleRow, measure};
+use super::{HEAP_CARDS, SettleRow, measure};
 use crate::{Diagram, Point};
-use petcomp::Quality;
-use petcomp::Result;
 use petcomp::plot::three;
 use petcomp::scene::SettleOptions;
+use petcomp::{Quality, Result};
 
 /// Length of the heap's typical card, of which limits are shares.
 const CARD_LENGTH_MM: f64 = 200.0;
@@ -16,12 +15,8 @@ const PLATE_GAP_MM: f64 = 0.4;
 
 /// Measures every setting with a number of heaps: worst overlap, worst energy rise and the error of
 /// a stack, each against the time of a heap.
-///
-/// # Errors
-/// None that a caller can cause.
-pub fn measured_diagrams(heaps: u64) -> Result<Vec<Diagram>> {
-    let rows = measure(&SettleReportOptions { heaps }, |_, _| ())?;
-    Ok(diagrams(&rows))
+pub(crate) fn measured_diagrams(heaps: u64) -> Result<Vec<Diagram>> {
+    Ok(diagrams(&measure(heaps, |_, _| ())?))
 }
 
 fn diagrams(rows: &[SettleRow]) -> Vec<Diagram> {

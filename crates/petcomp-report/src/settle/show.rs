@@ -1,7 +1,7 @@
 //! The sweep as a table and as charts.
 
 use super::{RATES, SettleRow};
-use crate::columns::{Column, table_of};
+use crate::columns::{Column, four, table_of};
 use petcomp::plot::{Axis, Chart, Curve, Table};
 
 const COLUMNS: [Column<SettleRow>; 11] = [
@@ -18,18 +18,14 @@ const COLUMNS: [Column<SettleRow>; 11] = [
     ("time ms", |r| format!("{:.1}", r.cpu_ms)),
 ];
 
-fn four(value: f64) -> String {
-    format!("{value:.4}")
-}
-
 /// The sweep as a table.
-pub fn table(rows: &[SettleRow]) -> Table {
+pub(super) fn table(rows: &[SettleRow]) -> Table {
     table_of(&COLUMNS, rows)
 }
 
 /// The sweep as charts against run time: worst overlap, energy rise, and error of the stack; a ring
 /// where the default is.
-pub fn charts(rows: &[SettleRow]) -> Vec<Chart> {
+pub(super) fn charts(rows: &[SettleRow]) -> Vec<Chart> {
     vec![
         error_chart(rows, "worst overlap, mm", |r| r.overlap_mm[1]),
         error_chart(rows, "worst energy rise, %", |r| r.energy_percent[1]),

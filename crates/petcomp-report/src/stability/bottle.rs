@@ -1,11 +1,12 @@
 //! Synthetic photos of a bottle whose outline is known: a waisted body of film with a rim, glints,
 //! a striped label and a cap, in its own soft shadow.
 
-use crate::flags::{bounding_sides, is_right, largest_difference};
-use crate::matte::normal;
-use petcomp::color::{linear_to_srgb, srgb_to_linear};
+use crate::flags::is_right;
+use crate::matte::score::{box_error, overlap};
+use crate::matte::truth::in_eight_bits;
+use crate::matte::{normal, review_messages};
 use petcomp::matte::{CutOut, CutOutOptions, cut_out};
-use petcomp::{Coverage, Diagnostic, Image, LinearRgb, Mask, Result};
+use petcomp::{Image, LinearRgb, Mask, Result};
 
 pub(super) const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
 pub(super) const BLUE: LinearRgb = LinearRgb::new(0.03, 0.06, 0.35);
@@ -124,12 +125,6 @@ fn soft_shadow((u, v): (f64, f64)) -> f32 {
     1.0 - 0.2 * libm::exp(-(along * along + across * across) / 0.02) as f32
 }
 
-/// A value with noise as an 8-bit sensor stores it.
-fn coded_to_8_bits(value: f32) -> f32 {
-    let code = 255.0 * linear_to_srgb(value.clamp(0.0, 1.0));
-    srgb_to_linear(code.round() / 255.0)
-}
-
 impl BottlePhoto {
     fn extent(&self) -> [f64; 2] {
         [self.size.0 as f64, self.size.1 as f64]
@@ -179,26 +174,18 @@ impl BottlePhoto {
         sum.scale(0.25)
     }
 
-    /// The photo in 8 bits, and which pixels show a bottle.
-    pub(super) fn photo_and_mask(&self) -> (Image<LinearRgb>, Mask) {
-        (self.photo(), self.mask())
-    }
-
     /// The photo in 8 bits.
     pub(super) fn photo(&self) -> Image<LinearRgb> {
         let (w, h) = self.size;
         let mut photo = Image::from_fn(w, h, |x, y| self.pixel_at(x, y));
-        self.expose_sensor(&mut photo);
+        let mut noise = normal(3);
+        for p in photo.pixels_mut() {
+            *p = p.map(|v| in_eight_bits(v + self.noise * noise() as f32));
+        }
         photo
     }
 
-    fn expose_sensor(&self, photo: &mut Image<LinearRgb>) {
-        let mut noise = normal(3);
-        for p in photo.pixels_mut() {
-            *p = p.map(|v| coded_to_8_bits(v + self.noise * noise() as f32));
-        }
-    }
-
+    /// Which pixels show a bottle.
     fn mask(&self) -> Mask {
         Image::from_fn(self.size.0, self.size.1, |x, y| {
             self.bottle_seen(x as f64 + 0.5, y as f64 + 0.5).is_some()
@@ -207,9 +194,8 @@ impl BottlePhoto {
 
     /// The cut-out, and how accurate it is.
     pub(super) fn cut(&self) -> Result<(CutOut, OutlineAccuracy)> {
-        let (photo, mask) = self.photo_and_mask();
-        let cut = cut_out(&photo, &CutOutOptions::default())?;
-        let accuracy = OutlineAccuracy::new(&cut, &mask);
+        let cut = cut_out(&self.photo(), &CutOutOptions::default())?;
+        let accuracy = OutlineAccuracy::new(&cut, &self.mask());
         Ok((cut, accuracy))
     }
 }
@@ -230,8 +216,8 @@ pub(super) struct OutlineAccuracy {
 impl OutlineAccuracy {
     fn new(cut: &CutOut, mask: &Mask) -> Self {
         let found = &cut.segmentation;
-        let iou = intersection_over_union(&found.tight, mask);
-        let box_px = largest_difference(bounding_sides(&found.hull), sides_of(mask));
+        let iou = overlap(&found.tight, &mask.to_coverage());
+        let box_px = box_error(&found.hull, sides_of(mask));
         Self {
             iou,
             box_px,
@@ -239,19 +225,6 @@ impl OutlineAccuracy {
             reasons: review_messages(&found.diagnostics),
         }
     }
-}
-
-/// The messages of the diagnostics that need review.
-pub(super) fn review_messages(diagnostics: &[Diagnostic]) -> Vec<String> {
-    let needing_review = diagnostics.iter().filter(|d| d.needs_review());
-    needing_review.map(ToString::to_string).collect()
-}
-
-fn intersection_over_union(tight: &Image<Coverage>, mask: &Mask) -> f64 {
-    let found = tight.pixels().iter().map(|c| c.0 >= 0.5);
-    let pairs: Vec<_> = found.zip(mask.pixels().iter().copied()).collect();
-    let shared = pairs.iter().filter(|(a, b)| *a && *b).count();
-    shared as f64 / pairs.iter().filter(|(a, b)| *a || *b).count() as f64
 }
 
 /// Left, top, right and bottom of a mask.
@@ -294,7 +267,7 @@ mod tests {
             size: (8, 8),
             ..BottlePhoto::default()
         };
-        let (photo, mask) = take.photo_and_mask();
+        let (photo, mask) = (take.photo(), take.mask());
         // Half a code of 8 bits at that brightness.
         assert!(photo.pixels().iter().all(|p| (p.g - GREEN.g).abs() < 0.003));
         assert!(mask.pixels().iter().all(|inside| !inside));

@@ -3,9 +3,7 @@
 
 use super::{HardCase, Outcome};
 use petcomp::camera::simulate::{Scenario, View};
-use petcomp::camera::{
-    Camera, FocalSource, Label, Priors, Solution, SolveError, SolveOptions, solve,
-};
+use petcomp::camera::{FocalSource, Label, Priors, Solution, SolveError, SolveOptions, solve};
 use petcomp::{Code, Result};
 
 /// Views of a kind; the worst of them counts.
@@ -16,11 +14,37 @@ pub(super) fn cases() -> Result<Vec<HardCase>> {
     cases.extend(extreme_geometry());
     cases.extend(extreme_cameras());
     cases.extend([
-        nearly_level(),
-        without_perspective(),
-        with_priors(),
-        inverse_perspective(),
-        any_order(),
+        HardCase::new(
+            "tilted by 0.01 degrees",
+            format!("exact corners of {VIEW_COUNT} views"),
+            "corners met to 1e-6 px, sound numbers",
+            solve_nearly_level_views,
+        ),
+        HardCase::new(
+            "no perspective, nothing known",
+            "a rectangle tilted by 30 degrees as seen from infinitely far",
+            "focal length at its bound of 100 widths and reported as such; tilt 30 degrees to 0.1",
+            solve_without_perspective,
+        ),
+        HardCase::new(
+            "no perspective, the default prior of the lens",
+            "the same corners",
+            "an answer that is not reported as unbounded, sound numbers",
+            solve_with_priors,
+        ),
+        HardCase::new(
+            "perspective the wrong way round",
+            "corners that no camera can have seen of a rectangle: the square of its focal length \
+             is negative",
+            "a camera with sound numbers that reports how far off it is, or an error",
+            solve_inverse_perspective,
+        ),
+        HardCase::new(
+            "corners in any order",
+            "the same four corners, criss-cross and the other way round",
+            "one camera: centres 1e-9 m apart",
+            solve_in_any_order,
+        ),
     ]);
     cases.extend(degenerate_corners());
     cases.extend(invalid_labels());
@@ -46,45 +70,31 @@ fn focal_error(view: &View, solution: &Solution) -> f64 {
     (solution.camera.focal_px.x / view.camera.focal_px.x - 1.0).abs()
 }
 
-/// No number of a solution is NaN, those of the camera are finite, and the camera is above the
-/// surface.
+/// No number of a solution is NaN, those of the camera and of the fit are finite, and the camera is
+/// above the surface.
 fn is_sound(solution: &Solution) -> bool {
-    is_camera_sound(&solution.camera) && is_fit_finite(solution) && !has_nan_sigma(solution)
+    let (center, sigma) = (solution.camera.center(), &solution.sigma);
+    let mut places = center.coords.iter().chain(&solution.size);
+    let sigmas = [sigma.ln_focal, sigma.tilt, sigma.height_px];
+    let mut sigmas = sigmas.iter().chain(sigma.center.iter());
+    finite_numbers(solution).iter().all(|v| v.is_finite())
+        && places.all(|v| v.is_finite())
+        && center.z > 0.0
+        && !sigmas.any(|v| v.is_nan())
 }
 
-fn has_nan_sigma(solution: &Solution) -> bool {
-    let sigma = &solution.sigma;
-    [sigma.ln_focal, sigma.tilt, sigma.height_px]
-        .iter()
-        .chain(sigma.center.iter())
-        .any(|v| v.is_nan())
-}
-
-fn is_camera_sound(camera: &Camera) -> bool {
-    camera_numbers(camera).iter().all(|v| v.is_finite()) && camera.center().z > 0.0
-}
-
-fn camera_numbers(camera: &Camera) -> [f64; 7] {
-    let center = camera.center();
+fn finite_numbers(solution: &Solution) -> [f64; 8] {
+    let (camera, fit) = (&solution.camera, &solution.fit);
     [
         camera.focal_px.x,
         camera.principal_px.x,
         camera.principal_px.y,
-        center.x,
-        center.y,
-        center.z,
         camera.tilt(),
-    ]
-}
-
-fn is_fit_finite(solution: &Solution) -> bool {
-    let fit = [
         solution.rms_px,
-        solution.fit.chi2,
-        solution.fit.depth_ratio,
-        solution.fit.px_per_metre,
-    ];
-    fit.iter().chain(&solution.size).all(|v| v.is_finite())
+        fit.chi2,
+        fit.depth_ratio,
+        fit.px_per_metre,
+    ]
 }
 
 fn has_warning(solution: &Solution, code: Code) -> bool {
@@ -188,26 +198,14 @@ fn recover_focal_length(view: &View) -> std::result::Result<f64, SolveError> {
     })
 }
 
-fn nearly_level() -> HardCase {
-    HardCase::new(
-        "tilted by 0.01 degrees",
-        format!("exact corners of {VIEW_COUNT} views"),
-        "corners met to 1e-6 px, sound numbers",
-        solve_nearly_level_views,
-    )
-}
-
 fn solve_nearly_level_views() -> Result<Outcome> {
+    let scenario = Scenario::default().tilted(0.01);
     let mut worst = 0.0_f64;
     for k in 0..VIEW_COUNT {
-        worst = worst.max(solve_nearly_level_view(k)?);
+        let view = exact_view(&scenario, k, 0.01);
+        worst = worst.max(residual_of_sound_solutions(&view.label)?);
     }
     Ok(Outcome::at_most(worst, 1e-6, "px"))
-}
-
-fn solve_nearly_level_view(k: u64) -> Result<f64> {
-    let view = exact_view(&Scenario::default().tilted(0.01), k, 0.01);
-    residual_of_sound_solutions(&view.label)
 }
 
 /// The residual without priors; infinite where a solution with or without them is unsound.
@@ -223,15 +221,6 @@ fn from_infinity() -> Label {
     let corners = [[-x, -y], [x, -y], [x, y], [-x, y]];
     let centered = corners.map(|[x, y]| [2000.0 + x, 1500.0 + y]);
     Label::new([4000, 3000], centered, [0.6, 0.4])
-}
-
-fn without_perspective() -> HardCase {
-    HardCase::new(
-        "no perspective, nothing known",
-        "a rectangle tilted by 30 degrees as seen from infinitely far",
-        "focal length at its bound of 100 widths and reported as such; tilt 30 degrees to 0.1",
-        solve_without_perspective,
-    )
 }
 
 fn solve_without_perspective() -> Result<Outcome> {
@@ -252,33 +241,12 @@ fn is_reported_at_bound(solution: &Solution) -> bool {
         && has_warning(solution, Code::FocalUnbounded)
 }
 
-fn with_priors() -> HardCase {
-    HardCase::new(
-        "no perspective, the default prior of the lens",
-        "the same corners",
-        "an answer that is not reported as unbounded, sound numbers",
-        solve_with_priors,
-    )
-}
-
 fn solve_with_priors() -> Result<Outcome> {
     let found = solve(&from_infinity(), &SolveOptions::default())?;
     let passed = found.focal_source != FocalSource::Unbounded && is_sound(&found);
-    Ok(Outcome::new(focal_and_source(&found), passed))
-}
-
-fn focal_and_source(solution: &Solution) -> String {
-    let focal_px = solution.camera.focal_px.x;
-    format!("{focal_px:.0} px, {:?}", solution.focal_source)
-}
-
-fn inverse_perspective() -> HardCase {
-    HardCase::new(
-        "perspective the wrong way round",
-        "corners that no camera can have seen of a rectangle: the square of its focal length is negative",
-        "a camera with sound numbers that reports how far off it is, or an error",
-        solve_inverse_perspective,
-    )
+    let focal_px = found.camera.focal_px.x;
+    let measured = format!("{focal_px:.0} px, {:?}", found.focal_source);
+    Ok(Outcome::new(measured, passed))
 }
 
 fn solve_inverse_perspective() -> Result<Outcome> {
@@ -312,15 +280,6 @@ const CORNER_ORDERS: [[usize; 4]; 6] = [
     [0, 3, 1, 2],
     [0, 3, 2, 1],
 ];
-
-fn any_order() -> HardCase {
-    HardCase::new(
-        "corners in any order",
-        "the same four corners, criss-cross and the other way round",
-        "one camera: centres 1e-9 m apart",
-        solve_in_any_order,
-    )
-}
 
 fn solve_in_any_order() -> Result<Outcome> {
     let label = Scenario::realistic().tilted(25.0).view(1, 4).label;

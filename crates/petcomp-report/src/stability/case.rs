@@ -76,14 +76,12 @@ impl HardCase {
         }
     }
 
-    pub(super) fn run_timed(&self, stage: &'static str) -> CaseResult {
+    pub(super) fn run_timed(self, stage: &'static str) -> CaseResult {
         let start = Instant::now();
         let outcome = self.outcome();
         CaseResult {
             stage,
-            name: self.name.clone(),
-            input: self.input.clone(),
-            expectation: self.expectation.clone(),
+            case: self,
             outcome,
             wall_ms: start.elapsed().as_secs_f64() * 1e3,
         }

@@ -1,29 +1,79 @@
 //! Pictures that are hard to put together: very many layers, everything off, values at the ends of
 //! their range.
 
-use super::staged::{camera_above, rendered};
+use super::staged::{camera_above, count_drawn, rendered};
 use super::{HardCase, Outcome};
 use petcomp::composite::{finish, frame};
 use petcomp::label::{LabelOptions, label};
-
 use petcomp::scene::{PostProcess, Shot};
 use petcomp::{DeepImage, DeepSample, Depth, Film, Image, LinearRgb, ObjectId, PremulRgba, Result};
 use std::sync::Arc;
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
-    Ok(vec![
+    let cases = layers_and_shares().into_iter().chain(finishes());
+    Ok(cases.collect())
+}
+
+fn layers_and_shares() -> Vec<HardCase> {
+    vec![
         stacked_films(),
-        stacked_pixels(),
-        everything_off(),
-        empty_without_plate(),
-        rounded_up(),
-        bright_beside_dim(),
-        broken_plate(),
+        HardCase::new(
+            "10 000 pixels of alpha 1/255 over each other",
+            "white",
+            "alpha 1 and light 1, to 1e-4, never above 1",
+            || Ok(stack_pixels()),
+        ),
+        HardCase::new(
+            "scene with everything off",
+            "a plate; no card, light, ambient, environment, finish",
+            "the plate's bits in every pixel, no shadow, no label: 0 differ",
+            composite_with_everything_off,
+        ),
+        HardCase::new(
+            "empty scene",
+            "no card, no plate",
+            "transparent black everywhere: 0 pixels differ",
+            composite_empty_shot,
+        ),
+        HardCase::new(
+            "shares that add up to a little over 1",
+            "300 objects that hide 1/300 of a pixel each, each rounded up, over a plate of 1e5",
+            "nothing of the plate passes: 0, not below",
+            composite_shares_rounded_up,
+        ),
+        HardCase::new(
+            "1e5 beside 1e-4",
+            "two opaque cards in neighbouring pixels, over a plate of 1e5",
+            "1e-4 keeps its bits",
+            composite_bright_beside_dim,
+        ),
+        HardCase::new(
+            "plate with one pixel of NaN",
+            "64 x 48 pixels, no card",
+            "no more than that pixel is NaN: 1",
+            composite_broken_plate,
+        ),
+    ]
+}
+
+fn finishes() -> [HardCase; 4] {
+    [
         exposed(200.0),
         exposed(-200.0),
-        sharpened_spot(),
-        one_pixel(),
-    ])
+        HardCase::new(
+            "finish: sharpening a pixel of 1e5 among 1e-4",
+            "an amount of 2",
+            "every value in 0..3e5, and 1e-4 kept (to 1e-6) where the window of 4 pixels does not \
+             reach",
+            || Ok(sharpen_spot()),
+        ),
+        HardCase::new(
+            "one-pixel image",
+            "a film of transmittance 1/2 and light 0.25 over a plate of 1",
+            "0.75 exactly",
+            composite_one_pixel,
+        ),
+    ]
 }
 
 fn default_shot() -> Shot {
@@ -49,15 +99,6 @@ fn stack_films(expected: f64) -> Outcome {
     Outcome::at_most(off, 200.0 * f64::from(f32::EPSILON), "off")
 }
 
-fn stacked_pixels() -> HardCase {
-    HardCase::new(
-        "10 000 pixels of alpha 1/255 over each other",
-        "white",
-        "alpha 1 and light 1, to 1e-4, never above 1",
-        || Ok(stack_pixels()),
-    )
-}
-
 fn stack_pixels() -> Outcome {
     let a = 1.0 / 255.0;
     let all = (0..10_000).fold(PremulRgba::TRANSPARENT, |behind, _| {
@@ -68,23 +109,14 @@ fn stack_pixels() -> Outcome {
 }
 
 /// A gradient in which no two pixels are alike.
-fn gradient_plate(width: usize, height: usize) -> Image<LinearRgb> {
-    Image::from_fn(width, height, |x, y| {
+fn gradient_plate() -> Image<LinearRgb> {
+    Image::from_fn(64, 48, |x, y| {
         LinearRgb::new(0.1 + 0.01 * x as f32, f32::MIN_POSITIVE, 1e5 + y as f32)
     })
 }
 
-fn everything_off() -> HardCase {
-    HardCase::new(
-        "scene with everything off",
-        "a plate; no card, light, ambient, environment, finish",
-        "the plate's bits in every pixel, no shadow, no label: 0 differ",
-        composite_with_everything_off,
-    )
-}
-
 fn composite_with_everything_off() -> Result<Outcome> {
-    let plate = Arc::new(gradient_plate(64, 48));
+    let plate = Arc::new(gradient_plate());
     let shot = default_shot().with_plate(plate.clone());
     let deep = rendered(&shot);
     let framed = frame(&deep, Some(&plate));
@@ -104,23 +136,10 @@ fn count_shadowed(deep: &DeepImage) -> usize {
     shadow.filter(|s| **s != LinearRgb::WHITE).count()
 }
 
-fn empty_without_plate() -> HardCase {
-    HardCase::new(
-        "empty scene",
-        "no card, no plate",
-        "transparent black everywhere: 0 pixels differ",
-        composite_empty_shot,
-    )
-}
-
 fn composite_empty_shot() -> Result<Outcome> {
     let deep = rendered(&default_shot().with_ambient(LinearRgb::WHITE));
     let out = frame(&deep, None);
-    let drawn = out
-        .pixels()
-        .iter()
-        .filter(|p| **p != PremulRgba::TRANSPARENT);
-    Ok(Outcome::none(drawn.count(), "px"))
+    Ok(Outcome::none(count_drawn(&out), "px"))
 }
 
 /// A picture of one row from the samples of its pixels.
@@ -142,15 +161,6 @@ fn even_plate(pixels: usize, value: f32) -> Image<LinearRgb> {
     Image::filled(pixels, 1, LinearRgb::grey(value))
 }
 
-fn rounded_up() -> HardCase {
-    HardCase::new(
-        "shares that add up to a little over 1",
-        "300 objects that hide 1/300 of a pixel each, each rounded up, over a plate of 1e5",
-        "nothing of the plate passes: 0, not below",
-        composite_shares_rounded_up,
-    )
-}
-
 fn composite_shares_rounded_up() -> Result<Outcome> {
     let share = (1.0 / 300.0_f32).next_up();
     let samples = (1..=300).map(|id| deep_sample(id, 0.0, share)).collect();
@@ -162,15 +172,6 @@ fn composite_shares_rounded_up() -> Result<Outcome> {
     Ok(Outcome::new(format!("{value:e}"), passed))
 }
 
-fn bright_beside_dim() -> HardCase {
-    HardCase::new(
-        "1e5 beside 1e-4",
-        "two opaque cards in neighbouring pixels, over a plate of 1e5",
-        "1e-4 keeps its bits",
-        composite_bright_beside_dim,
-    )
-}
-
 fn composite_bright_beside_dim() -> Result<Outcome> {
     let [bright, dim] = [deep_sample(1, 1e5, 1.0), deep_sample(2, 1e-4, 1.0)];
     let deep = deep_row(vec![vec![bright], vec![dim]]);
@@ -178,17 +179,8 @@ fn composite_bright_beside_dim() -> Result<Outcome> {
     Ok(Outcome::near(dimmed.into(), 1e-4_f32.into(), 0.0, ""))
 }
 
-fn broken_plate() -> HardCase {
-    HardCase::new(
-        "plate with one pixel of NaN",
-        "64 x 48 pixels, no card",
-        "no more than that pixel is NaN: 1",
-        composite_broken_plate,
-    )
-}
-
 fn composite_broken_plate() -> Result<Outcome> {
-    let mut plate = gradient_plate(64, 48);
+    let mut plate = gradient_plate();
     plate[(20, 30)].g = f32::NAN;
     let out = frame(&rendered(&default_shot()), Some(&plate));
     let broken = out.pixels().iter().filter(|p| !p.color().is_finite());
@@ -209,29 +201,12 @@ fn expose(exposure_ev: f64) -> Outcome {
         exposure_ev,
         ..PostProcess::default()
     };
-    let out = finish(
-        black_dim_and_bright(),
-        &deep_row(vec![vec![]; 3]),
-        None,
-        &change,
-    );
+    let pixels = [0.0, 1e-4, 1.0].map(|v| LinearRgb::grey(v).opaque());
+    let picture = Image::from_vec(3, 1, pixels.to_vec());
+    let out = finish(picture, &deep_row(vec![vec![]; 3]), None, &change);
     let [black, dim, bright] = [0, 1, 2].map(|x| out[(x, 0)].g);
     let passed = black == 0.0 && black <= dim && dim <= bright;
     Outcome::new(format!("{black:e}, {dim:e}, {bright:e}"), passed)
-}
-
-fn black_dim_and_bright() -> Image<PremulRgba> {
-    let pixels = [0.0, 1e-4, 1.0].map(|v| LinearRgb::grey(v).opaque());
-    Image::from_vec(3, 1, pixels.to_vec())
-}
-
-fn sharpened_spot() -> HardCase {
-    HardCase::new(
-        "finish: sharpening a pixel of 1e5 among 1e-4",
-        "an amount of 2",
-        "every value in 0..3e5, and 1e-4 kept (to 1e-6) where the window of 4 pixels does not reach",
-        || Ok(sharpen_spot()),
-    )
 }
 
 fn sharpen_spot() -> Outcome {
@@ -240,7 +215,8 @@ fn sharpen_spot() -> Outcome {
         ..PostProcess::default()
     };
     let out = finish(bright_spot(), &deep_row(vec![]), None, &change);
-    let [least, most] = [f32::min, f32::max].map(|pick| extreme_green(&out, pick));
+    let greens = out.pixels().iter().map(|p| p.g);
+    let [least, most] = [f32::min, f32::max].map(|pick| greens.clone().fold(out[(0, 0)].g, pick));
     let far = f64::from(out[(2, 2)].g);
     let passed = least >= 0.0 && most <= 3e5 && (far / 1e-4 - 1.0).abs() < 1e-6;
     Outcome::new(format!("{least:e} to {most:e}; far away {far:e}"), passed)
@@ -250,19 +226,6 @@ fn bright_spot() -> Image<PremulRgba> {
     let mut picture = Image::filled(33, 33, LinearRgb::grey(1e-4).opaque());
     picture[(16, 16)] = LinearRgb::grey(1e5).opaque();
     picture
-}
-
-fn extreme_green(out: &Image<PremulRgba>, pick: fn(f32, f32) -> f32) -> f32 {
-    out.pixels().iter().map(|p| p.g).fold(out[(0, 0)].g, pick)
-}
-
-fn one_pixel() -> HardCase {
-    HardCase::new(
-        "one-pixel image",
-        "a film of transmittance 1/2 and light 0.25 over a plate of 1",
-        "0.75 exactly",
-        composite_one_pixel,
-    )
 }
 
 fn composite_one_pixel() -> Result<Outcome> {

@@ -23,34 +23,117 @@ const CROWD_SIZE: u32 = 300;
 const IMAGE: [u32; 2] = [64, 48];
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
-    let mut cases = vec![
-        empty_pictures(),
-        crowded_pixel(),
-        row_of_one_pixel(),
-        too_small(),
-        cut_journal(),
-        lost_picture(),
-        missing_class(),
+    let groups = [
+        written_pictures(),
+        runs(),
+        splits(),
+        draws(),
+        invalid_recipes(),
+    ];
+    Ok(groups.into_iter().flatten().collect())
+}
+
+fn written_pictures() -> Vec<HardCase> {
+    vec![
+        HardCase::new(
+            "dataset of empty scenes",
+            "5 pictures without an object, as YOLO, COCO and VOC",
+            "no label, no fault: 0",
+            generate_empty_pictures,
+        ),
+        HardCase::new(
+            "300 objects in one pixel",
+            "equal boxes of equal class, all labelled",
+            "YOLO's equal rows are one; no fault",
+            generate_crowded_pictures,
+        ),
+        HardCase::new(
+            "YOLO row of one pixel",
+            "pixel (3, 2) of 64 x 48",
+            format!("3.5/64 2.5/48 1/64 1/48: {}", ONE_PIXEL_ROW.trim_end()),
+            write_row_of_one_pixel,
+        ),
+        HardCase::refused(
+            "one-pixel pictures",
+            "1 x 1 pixel, for YOLO",
+            "expected at least 10 a side",
+            || {
+                let shot = Shot::new(camera_above([1, 1], 100.0));
+                TestDataset::new(1, |_| rendered_sample(&shot))
+            },
+        ),
+    ]
+}
+
+fn runs() -> Vec<HardCase> {
+    vec![
+        HardCase::new(
+            "journal cut off in the middle of a line",
+            "10 pictures; the run continues",
+            "only the picture of that line is made again: 1; then no fault",
+            resume_with_cut_journal,
+        ),
+        HardCase::new(
+            "a picture lost, another cut off",
+            "10 pictures; the folder is repaired, and the run continues",
+            "8 are good, 2 are made again; then no fault",
+            resume_after_repair,
+        ),
+        HardCase::refused(
+            "object of a class that does not exist",
+            "class 7 of 1",
+            "but there are 1 classes",
+            || TestDataset::new(1, |_| sample_of_class_7()),
+        ),
+    ]
+}
+
+fn splits() -> Vec<HardCase> {
+    vec![
         split_counts(0),
         split_counts(100),
         split_counts(20),
-        last_index(),
-        many_shards(),
-        invalid_shards(),
-        empty_scenes(),
-        extreme_seeds(),
-    ];
-    cases.extend(invalid_recipes());
-    Ok(cases)
+        HardCase::new(
+            "the largest index",
+            "picture 2^64 - 1 of 2^64 - 1",
+            "a part, without overflow",
+            split_last_index,
+        ),
+        HardCase::new(
+            "more shards than pictures",
+            "10 pictures on 1000 machines",
+            "each picture on exactly one: 10",
+            contain_in_shards,
+        ),
+        HardCase::new(
+            "shard 0, shard 5 of 4, shard 1 of 0",
+            "as --shard",
+            "refused: 3",
+            make_invalid_shards,
+        ),
+    ]
+}
+
+fn draws() -> Vec<HardCase> {
+    vec![
+        HardCase::new(
+            "recipe of empty scenes alone",
+            "negatives = 1, and objects = 0, 20 scenes of each, without a catalog",
+            "no object in any: 0",
+            draw_empty_scenes,
+        ),
+        HardCase::new(
+            "seeds and numbers at their ends",
+            "seeds 0, 1 and 2^64 - 1, scenes 0, 1 and 2^64 - 1",
+            "nine different scenes, each the same when it is drawn again",
+            compare_draws,
+        ),
+    ]
 }
 
 /// A picture of a shot, its labels, and what it was made from.
 fn rendered_sample(shot: &Shot) -> Sample {
     sample(shot, rendered(shot))
-}
-
-fn empty_sample() -> Sample {
-    rendered_sample(&empty_shot())
 }
 
 fn empty_shot() -> Shot {
@@ -135,14 +218,6 @@ impl TestDataset {
         self.path().join(format!("images/train/{k:06}.png"))
     }
 
-    fn cut_off_picture(&self, k: u64) -> Result<()> {
-        cut_off_file(&self.picture(k), |whole| whole / 2)
-    }
-
-    fn cut_off_journal(&self) -> Result<()> {
-        cut_off_file(&self.path().join(JOURNAL), |whole| whole - 20)
-    }
-
     fn label(&self, name: &str) -> Result<String> {
         io::read_text(self.path().join("labels").join(name))
     }
@@ -175,32 +250,14 @@ fn is_about_similarity(message: &str) -> bool {
     message.contains("looks like") || message.contains("same bytes")
 }
 
-fn empty_pictures() -> HardCase {
-    HardCase::new(
-        "dataset of empty scenes",
-        "5 pictures without an object, as YOLO, COCO and VOC",
-        "no label, no fault: 0",
-        generate_empty_pictures,
-    )
-}
-
 fn generate_empty_pictures() -> Result<Outcome> {
-    let dataset = TestDataset::new(5, |_| empty_sample())?;
+    let dataset = TestDataset::new(5, |_| rendered_sample(&empty_shot()))?;
     let (images, rows) = dataset.counts()?;
     let faults = dataset.faults()?;
     Ok(Outcome::new(
         format!("{images} images, {rows} rows, {}", listed(&faults)),
         (images, rows) == (5, 0) && faults.is_empty(),
     ))
-}
-
-fn crowded_pixel() -> HardCase {
-    HardCase::new(
-        "300 objects in one pixel",
-        "equal boxes of equal class, all labelled",
-        "YOLO's equal rows are one; no fault",
-        generate_crowded_pictures,
-    )
 }
 
 fn generate_crowded_pictures() -> Result<Outcome> {
@@ -233,30 +290,9 @@ fn opaque_sample(id: u32) -> DeepSample {
 /// A row of class 0 whose box is pixel (3, 2) of 64 x 48.
 const ONE_PIXEL_ROW: &str = "0 0.054688 0.052083 0.015625 0.020833\n";
 
-fn row_of_one_pixel() -> HardCase {
-    HardCase::new(
-        "YOLO row of one pixel",
-        "pixel (3, 2) of 64 x 48",
-        format!("3.5/64 2.5/48 1/64 1/48: {}", ONE_PIXEL_ROW.trim_end()),
-        write_row_of_one_pixel,
-    )
-}
-
 fn write_row_of_one_pixel() -> Result<Outcome> {
     let row = TestDataset::new(2, |_| crowded_sample())?.label("train/000001.txt")?;
     Ok(Outcome::new(row.trim_end(), row == ONE_PIXEL_ROW))
-}
-
-fn too_small() -> HardCase {
-    HardCase::refused(
-        "one-pixel pictures",
-        "1 x 1 pixel, for YOLO",
-        "expected at least 10 a side",
-        || {
-            let shot = Shot::new(camera_above([1, 1], 100.0));
-            TestDataset::new(1, |_| rendered_sample(&shot))
-        },
-    )
 }
 
 /// Ten pictures of a card.
@@ -264,18 +300,9 @@ fn dataset_of_cards() -> Result<TestDataset> {
     TestDataset::new(10, with_a_card)
 }
 
-fn cut_journal() -> HardCase {
-    HardCase::new(
-        "journal cut off in the middle of a line",
-        "10 pictures; the run continues",
-        "only the picture of that line is made again: 1; then no fault",
-        resume_with_cut_journal,
-    )
-}
-
 fn resume_with_cut_journal() -> Result<Outcome> {
     let dataset = dataset_of_cards()?;
-    dataset.cut_off_journal()?;
+    cut_off_file(&dataset.path().join(JOURNAL), |whole| whole - 20)?;
     let again = dataset.generate_missing(with_a_card)?;
     let faults = dataset.faults()?.len();
     Ok(Outcome::new(
@@ -284,17 +311,11 @@ fn resume_with_cut_journal() -> Result<Outcome> {
     ))
 }
 
-fn lost_picture() -> HardCase {
-    HardCase::new(
-        "a picture lost, another cut off",
-        "10 pictures; the folder is repaired, and the run continues",
-        "8 are good, 2 are made again; then no fault",
-        resume_after_repair,
-    )
-}
-
 fn resume_after_repair() -> Result<Outcome> {
-    let dataset = damaged_dataset()?;
+    let dataset = dataset_of_cards()?;
+    let lost = dataset.picture(1);
+    std::fs::remove_file(&lost).map_err(|e| Error::file(lost, e))?;
+    cut_off_file(&dataset.picture(2), |whole| whole / 2)?;
     let (good, lost) = repair(dataset.path())?;
     let again = dataset.generate_missing(with_a_card)?;
     let faults = dataset.faults()?.len();
@@ -302,24 +323,6 @@ fn resume_after_repair() -> Result<Outcome> {
         format!("{good} good, {lost} lost, {again} made, {faults} faults"),
         (good, lost, again, faults) == (8, 2, 2, 0),
     ))
-}
-
-/// Picture 1 is lost, picture 2 is cut off.
-fn damaged_dataset() -> Result<TestDataset> {
-    let dataset = dataset_of_cards()?;
-    let lost = dataset.picture(1);
-    std::fs::remove_file(&lost).map_err(|e| Error::file(lost, e))?;
-    dataset.cut_off_picture(2)?;
-    Ok(dataset)
-}
-
-fn missing_class() -> HardCase {
-    HardCase::refused(
-        "object of a class that does not exist",
-        "class 7 of 1",
-        "but there are 1 classes",
-        || TestDataset::new(1, |_| sample_of_class_7()),
-    )
 }
 
 fn sample_of_class_7() -> Sample {
@@ -340,9 +343,10 @@ fn split_counts(percent: u8) -> HardCase {
     )
 }
 
+const ORDERS: [SplitOrder; 2] = [SplitOrder::Interleaved, SplitOrder::Consecutive];
+
 fn count_splits(percent: u8, expected: usize) -> Result<Outcome> {
-    let found = [SplitOrder::Interleaved, SplitOrder::Consecutive]
-        .map(|order| count_validation(percent, order));
+    let found = ORDERS.map(|order| count_validation(percent, order));
     Ok(Outcome::new(
         format!("{} and {}", found[0], found[1]),
         found == [expected; 2],
@@ -360,58 +364,26 @@ fn count_validation(val_percent: u8, order: SplitOrder) -> usize {
     parts.filter(|part| *part == Part::Val).count()
 }
 
-fn last_index() -> HardCase {
-    HardCase::new(
-        "the largest index",
-        "picture 2^64 - 1 of 2^64 - 1",
-        "a part, without overflow",
-        split_last_index,
-    )
-}
-
 fn split_last_index() -> Result<Outcome> {
-    let parts = [SplitOrder::Interleaved, SplitOrder::Consecutive].map(part_of_last_index);
+    let parts = ORDERS.map(|order| {
+        let split = Split {
+            order,
+            ..Split::default()
+        };
+        split.part(u64::MAX, u64::MAX)
+    });
     Ok(Outcome::new(format!("{parts:?}"), parts[1] == Part::Val))
 }
 
-fn part_of_last_index(order: SplitOrder) -> Part {
-    let split = Split {
-        order,
-        ..Split::default()
-    };
-    split.part(u64::MAX, u64::MAX)
-}
-
-fn many_shards() -> HardCase {
-    HardCase::new(
-        "more shards than pictures",
-        "10 pictures on 1000 machines",
-        "each picture on exactly one: 10",
-        contain_in_shards,
-    )
-}
-
 fn contain_in_shards() -> Result<Outcome> {
-    let shards = all_shards(1000)?;
+    let shards: Result<Vec<_>> = (1..=1000).map(|index| Shard::new(index, 1000)).collect();
+    let shards = shards?;
     let on_one = (0..10).filter(|&k| count_containing(&shards, k) == 1);
     Ok(Outcome::count(on_one.count(), 10, ""))
 }
 
-fn all_shards(count: u64) -> Result<Vec<Shard>> {
-    (1..=count).map(|index| Shard::new(index, count)).collect()
-}
-
 fn count_containing(shards: &[Shard], k: u64) -> usize {
     shards.iter().filter(|shard| shard.contains(k)).count()
-}
-
-fn invalid_shards() -> HardCase {
-    HardCase::new(
-        "shard 0, shard 5 of 4, shard 1 of 0",
-        "as --shard",
-        "refused: 3",
-        make_invalid_shards,
-    )
 }
 
 fn make_invalid_shards() -> Result<Outcome> {
@@ -436,15 +408,6 @@ fn tray() -> Background {
     }
 }
 
-fn empty_scenes() -> HardCase {
-    HardCase::new(
-        "recipe of empty scenes alone",
-        "negatives = 1, and objects = 0, 20 scenes of each, without a catalog",
-        "no object in any: 0",
-        draw_empty_scenes,
-    )
-}
-
 fn draw_empty_scenes() -> Result<Outcome> {
     let negative = Recipe {
         negatives: 1.0,
@@ -467,41 +430,24 @@ fn count_objects(recipe: &Recipe) -> Result<usize> {
     scenes.map(|scene| Ok(scene?.objects.len())).sum()
 }
 
-fn extreme_seeds() -> HardCase {
-    HardCase::new(
-        "seeds and numbers at their ends",
-        "seeds 0, 1 and 2^64 - 1, scenes 0, 1 and 2^64 - 1",
-        "nine different scenes, each the same when it is drawn again",
-        || {
-            Ok(compare_draws(
-                &draw_extreme_seeds()?,
-                &draw_extreme_seeds()?,
-            ))
-        },
-    )
-}
-
 fn draw_extreme_seeds() -> Result<Vec<Scene>> {
     let recipe = without_objects();
-    extreme_seeds_and_indices()
+    let ends = [0, 1, u64::MAX];
+    let pairs = ends.into_iter().flat_map(|seed| ends.map(|k| (seed, k)));
+    pairs
         .map(|(seed, k)| recipe.scene(seed, k, &[tray()], &[]))
         .collect()
 }
 
-fn extreme_seeds_and_indices() -> impl Iterator<Item = (u64, u64)> {
-    let ends = [0, 1, u64::MAX];
-    ends.into_iter()
-        .flat_map(move |seed| ends.map(|k| (seed, k)))
-}
-
-fn compare_draws(once: &[Scene], again: &[Scene]) -> Outcome {
-    let different = count_distinct(once);
-    let is_same = once == again;
+fn compare_draws() -> Result<Outcome> {
+    let once = draw_extreme_seeds()?;
+    let different = count_distinct(&once);
+    let is_same = once == draw_extreme_seeds()?;
     let same = if is_same { "the same" } else { "not the same" };
-    Outcome::new(
+    Ok(Outcome::new(
         format!("{different} different, {same} again"),
         different == 9 && is_same,
-    )
+    ))
 }
 
 fn count_distinct(scenes: &[Scene]) -> usize {

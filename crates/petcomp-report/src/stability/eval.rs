@@ -17,16 +17,46 @@ const PERFECT_YOLO: f64 = 0.995;
 pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = Vec::new();
     for scores in [YOLO_SCORES, COCO_SCORES] {
-        cases.extend(scores.cases_without_matches());
-        cases.extend(scores.cases_with_all_found());
+        cases.extend(scores.cases());
     }
     cases.extend([
-        crowded_image(),
-        one_image(),
-        half_right(),
-        no_images(),
-        confusion(),
-        huge_boxes(),
+        HardCase::new(
+            "coco: 100 000 boxes in one image",
+            "all found; COCO looks at 100 detections",
+            "recall 0.001, so that 1 of 101 readings (at recall 0) finds precision 1: 1/101, to \
+             1e-9",
+            score_crowded_image,
+        ),
+        HardCase::new(
+            "yolov5: 2000 boxes in one image",
+            "all found, all of one confidence",
+            format!("mAP {PERFECT_YOLO}, to 1e-9"),
+            score_one_image,
+        ),
+        HardCase::new(
+            "coco: equal confidences, half of them wrong",
+            "100 found rightly, then 100 where nothing is, all of 0.5",
+            "equal ones keep their order, the right ones first: mAP 1, to 1e-9",
+            score_half_right,
+        ),
+        HardCase::new(
+            "interval of no images",
+            "a bootstrap of 100 rounds over nothing",
+            "0 from 0 to 0; no curve",
+            score_no_images,
+        ),
+        HardCase::new(
+            "confusion: 300 boxes in one place",
+            "300 equal true boxes and 300 equal detections of one class",
+            "300 pairs, nothing missed, no false alarm",
+            count_confusion,
+        ),
+        HardCase::new(
+            "overlap of boxes of 1e150 pixels",
+            "one half of the other; areas of 1e300",
+            "intersection over union 1/2, to 1e-12; of infinite ones a number, not NaN",
+            overlap_huge_boxes,
+        ),
     ]);
     Ok(cases)
 }
@@ -51,63 +81,13 @@ const COCO_SCORES: ScoreCases = ScoreCases {
 };
 
 impl ScoreCases {
-    fn cases_without_matches(self) -> Vec<HardCase> {
-        vec![
-            self.zero("nothing at all", "no image", Vec::new),
-            self.zero("no predictions", "10 boxes to find", || {
-                vec![grid_image(10, 0, equal_confidence)]
-            }),
-            self.zero("no truth", "10 detections, nothing to find", || {
-                vec![grid_image(0, 10, equal_confidence)]
-            }),
-            self.zero(
-                "boxes without area",
-                "points found where points are",
-                image_of_points,
-            ),
-        ]
+    fn cases(self) -> impl Iterator<Item = HardCase> {
+        let none = WITHOUT_MATCHES.map(|input| self.scored(input, 0.0));
+        let all = ALL_FOUND.map(|input| self.scored(input, self.perfect));
+        none.into_iter().chain(all)
     }
 
-    fn cases_with_all_found(self) -> Vec<HardCase> {
-        vec![
-            self.perfect(
-                "equal confidences",
-                "100 boxes, all found, all of 0.5",
-                || vec![grid_image(100, 100, equal_confidence)],
-            ),
-            self.perfect("confidences of 0", "100 boxes, all found, all of 0", || {
-                vec![grid_image(100, 100, |_| 0.0)]
-            }),
-            self.perfect("confidences of 1e-300", "100 boxes, all found", || {
-                vec![grid_image(100, 100, |i| 1e-300 * (i + 1) as f64)]
-            }),
-            self.perfect("one box", "found", || {
-                vec![grid_image(1, 1, equal_confidence)]
-            }),
-            self.perfect(
-                "a detection twice",
-                "1 box, named twice",
-                image_with_duplicate,
-            ),
-            self.perfect("100 000 boxes in 1000 images", "all found", many_images),
-        ]
-    }
-
-    fn zero(self, what: &str, input: &str, images: fn() -> Vec<EvalImage>) -> HardCase {
-        self.scored(what, input, 0.0, images)
-    }
-
-    fn perfect(self, what: &str, input: &str, images: fn() -> Vec<EvalImage>) -> HardCase {
-        self.scored(what, input, self.perfect, images)
-    }
-
-    fn scored(
-        self,
-        what: &str,
-        input: &str,
-        expected: f64,
-        images: fn() -> Vec<EvalImage>,
-    ) -> HardCase {
+    fn scored(self, (what, input, images): Input, expected: f64) -> HardCase {
         let name = format!("{}: {what}", self.name);
         let expectation = format!("mAP {expected}, to 1e-9");
         HardCase::new(name, input, expectation, move || {
@@ -115,6 +95,49 @@ impl ScoreCases {
         })
     }
 }
+
+/// What is special about some images, what they show, and how they are made.
+type Input = (&'static str, &'static str, fn() -> Vec<EvalImage>);
+
+const WITHOUT_MATCHES: [Input; 4] = [
+    ("nothing at all", "no image", Vec::new),
+    ("no predictions", "10 boxes to find", || {
+        vec![grid_image(10, 0, equal_confidence)]
+    }),
+    ("no truth", "10 detections, nothing to find", || {
+        vec![grid_image(0, 10, equal_confidence)]
+    }),
+    (
+        "boxes without area",
+        "points found where points are",
+        image_of_points,
+    ),
+];
+
+const ALL_FOUND: [Input; 6] = [
+    (
+        "equal confidences",
+        "100 boxes, all found, all of 0.5",
+        || vec![grid_image(100, 100, equal_confidence)],
+    ),
+    ("confidences of 0", "100 boxes, all found, all of 0", || {
+        vec![grid_image(100, 100, |_| 0.0)]
+    }),
+    ("confidences of 1e-300", "100 boxes, all found", || {
+        vec![grid_image(100, 100, |i| 1e-300 * (i + 1) as f64)]
+    }),
+    ("one box", "found", || {
+        vec![grid_image(1, 1, equal_confidence)]
+    }),
+    (
+        "a detection twice",
+        "1 box, named twice",
+        image_with_duplicate,
+    ),
+    ("100 000 boxes in 1000 images", "all found", || {
+        vec![grid_image(100, 100, falling_confidence); MOST_BOXES / 100]
+    }),
+];
 
 fn compare_map(images: &[EvalImage], definition: Definition, expected: f64) -> Outcome {
     let map = evaluate(images, definition, &[]).map();
@@ -128,10 +151,6 @@ fn image_with_duplicate() -> Vec<EvalImage> {
         ..one.found[0]
     });
     vec![one]
-}
-
-fn many_images() -> Vec<EvalImage> {
-    vec![grid_image(100, 100, falling_confidence); MOST_BOXES / 100]
 }
 
 fn equal_confidence(_: usize) -> f64 {
@@ -182,28 +201,10 @@ fn corner_of(bbox: BBox) -> BBox {
     }
 }
 
-fn crowded_image() -> HardCase {
-    HardCase::new(
-        "coco: 100 000 boxes in one image",
-        "all found; COCO looks at 100 detections",
-        "recall 0.001, so that 1 of 101 readings (at recall 0) finds precision 1: 1/101, to 1e-9",
-        score_crowded_image,
-    )
-}
-
 fn score_crowded_image() -> Result<Outcome> {
     let image = grid_image(MOST_BOXES, 200, falling_confidence);
     let map = coco(&[image], &[]).scores.map();
     Ok(Outcome::near(map, 1.0 / 101.0, 1e-9, ""))
-}
-
-fn one_image() -> HardCase {
-    HardCase::new(
-        "yolov5: 2000 boxes in one image",
-        "all found, all of one confidence",
-        format!("mAP {PERFECT_YOLO}, to 1e-9"),
-        score_one_image,
-    )
 }
 
 fn score_one_image() -> Result<Outcome> {
@@ -211,24 +212,11 @@ fn score_one_image() -> Result<Outcome> {
     Ok(compare_map(&[image], Definition::Yolov5, PERFECT_YOLO))
 }
 
-fn half_right() -> HardCase {
-    HardCase::new(
-        "coco: equal confidences, half of them wrong",
-        "100 found rightly, then 100 where nothing is, all of 0.5",
-        "equal ones keep their order, the right ones first: mAP 1, to 1e-9",
-        score_half_right,
-    )
-}
-
 fn score_half_right() -> Result<Outcome> {
-    Ok(compare_map(&[half_right_image()], Definition::Coco, 1.0))
-}
-
-fn half_right_image() -> EvalImage {
     let mut image = grid_image(50, 50, equal_confidence);
     let wrong: Vec<Detection> = image.found.iter().map(moved_away).collect();
     image.found.extend(wrong);
-    image
+    Ok(compare_map(&[image], Definition::Coco, 1.0))
 }
 
 fn moved_away(found: &Detection) -> Detection {
@@ -236,15 +224,6 @@ fn moved_away(found: &Detection) -> Detection {
     moved.bbox.x0 += 1e4;
     moved.bbox.x1 += 1e4;
     moved
-}
-
-fn no_images() -> HardCase {
-    HardCase::new(
-        "interval of no images",
-        "a bootstrap of 100 rounds over nothing",
-        "0 from 0 to 0; no curve",
-        score_no_images,
-    )
 }
 
 fn score_no_images() -> Result<Outcome> {
@@ -257,38 +236,15 @@ fn score_no_images() -> Result<Outcome> {
     ))
 }
 
-fn confusion() -> HardCase {
-    HardCase::new(
-        "confusion: 300 boxes in one place",
-        "300 equal true boxes and 300 equal detections of one class",
-        "300 pairs, nothing missed, no false alarm",
-        count_confusion,
-    )
-}
-
 fn count_confusion() -> Result<Outcome> {
-    let images = [image_of_equal_boxes(300)];
-    let counts = Confusion::new(&images, &ConfusionOptions::default()).counts;
+    let mut image = grid_image(300, 300, equal_confidence);
+    image.truth.iter_mut().for_each(|t| t.bbox = grid_box(0));
+    image.found.iter_mut().for_each(|f| f.bbox = grid_box(0));
+    let counts = Confusion::new(&[image], &ConfusionOptions::default()).counts;
     Ok(Outcome::new(
         format!("{counts:?}"),
         counts.into_iter().eq([([Some(0), Some(0)], 300)]),
     ))
-}
-
-fn image_of_equal_boxes(count: usize) -> EvalImage {
-    let mut image = grid_image(count, count, equal_confidence);
-    image.truth.iter_mut().for_each(|t| t.bbox = grid_box(0));
-    image.found.iter_mut().for_each(|f| f.bbox = grid_box(0));
-    image
-}
-
-fn huge_boxes() -> HardCase {
-    HardCase::new(
-        "overlap of boxes of 1e150 pixels",
-        "one half of the other; areas of 1e300",
-        "intersection over union 1/2, to 1e-12; of infinite ones a number, not NaN",
-        overlap_huge_boxes,
-    )
 }
 
 fn overlap_huge_boxes() -> Result<Outcome> {

@@ -1,13 +1,12 @@
-//! Files that are hard to write or to read: values beyond a half float, the smallest ones, documents
-//! without an end, 16k.
+//! Files that are hard to write or to read: values beyond a half float, the smallest ones,
+//! documents without an end, 16k.
 
 use super::staged::temporary_folder;
 use super::{HardCase, Outcome, memory};
 use petcomp::io::{self, Bits, ReadOptions, WriteOptions, exr};
-use petcomp::{Coverage, Error, Image, LinearRgb, Result};
+use petcomp::{Coverage, Image, LinearRgb, Result};
 use serde::de::DeserializeOwned;
-use std::path::{Path, PathBuf};
-use tempfile::TempDir;
+use std::path::Path;
 
 /// Largest half float.
 const HALF_MAX: f32 = 65504.0;
@@ -18,17 +17,68 @@ const FORMATS: [&str; 4] = ["exr", "png", "tif", "jpg"];
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases: Vec<HardCase> = half_floats().into();
-    cases.extend([
-        half_channels(),
-        exact_floats(),
-        clamped_codes(),
-        sixteen_k_png(),
-        nested_document(),
-        overlong_number(),
-    ]);
+    cases.extend(values_at_the_ends());
+    cases.extend(large_and_endless());
     cases.extend(FORMATS.map(one_pixel));
     cases.extend(FORMATS.map(no_pixel));
     Ok(cases)
+}
+
+fn values_at_the_ends() -> [HardCase; 3] {
+    [
+        HardCase::new(
+            "half-float channels above 65504",
+            "1e5 and -1e5 in a channel of its own, as cut-outs have",
+            "65504 and -65504",
+            write_half_channels,
+        ),
+        HardCase::new(
+            "float samples at the ends of their range",
+            "the smallest denormal, the smallest normal, 1e-4 beside 1e5, the largest, in EXR and \
+             TIFF",
+            "every bit comes back: 0 differ",
+            || {
+                let differ = count_changed_floats("a.exr")? + count_changed_floats("a.tif")?;
+                Ok(Outcome::none(differ, "differ"))
+            },
+        ),
+        HardCase::new(
+            "NaN, infinities and negative light in a PNG",
+            "NaN, -inf, -1, 1e38, inf in 8 bits",
+            "0, 0, 0, 1, 1",
+            write_clamped_codes,
+        ),
+    ]
+}
+
+fn large_and_endless() -> [HardCase; 3] {
+    [
+        HardCase::new(
+            "16k image",
+            "a matte of 16384 x 16384 pixels to an 8-bit PNG and back",
+            format!(
+                "refused by Limits::pixels (128 Mi) until that is raised, then the same; at most \
+                 {SIXTEEN_K_GIB} GiB"
+            ),
+            write_sixteen_k,
+        )
+        .for_the_report(),
+        HardCase::new(
+            "document of 100 000 brackets",
+            "[[[[...",
+            "refused, not a stack overflow",
+            || {
+                let brackets = "[".repeat(100_000);
+                read_document::<serde_json::Value>(&brackets, "nested deeper")
+            },
+        ),
+        HardCase::new(
+            "document with the number 1e999",
+            "[1e999]",
+            "refused, not infinity",
+            || read_document::<Vec<f64>>("[1e999]", "number out of range"),
+        ),
+    ]
 }
 
 fn half_floats() -> [HardCase; 3] {
@@ -51,40 +101,14 @@ fn half_floats() -> [HardCase; 3] {
     ]
 }
 
-/// A folder that is removed with its case.
-struct CaseFolder(TempDir);
-
-impl CaseFolder {
-    fn new() -> Result<Self> {
-        Ok(Self(temporary_folder()?))
-    }
-
-    fn path(&self, name: impl AsRef<Path>) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    /// Where a picture of a format is written.
-    fn picture(&self, extension: &str) -> PathBuf {
-        self.path(format!("a.{extension}"))
-    }
-}
-
 /// Values written to a file and read back, as the green of a row of pixels.
 fn through_file(name: &str, values: &[f32], options: &WriteOptions) -> Result<Vec<f32>> {
-    let folder = CaseFolder::new()?;
-    let path = folder.path(name);
-    io::write_with(&path, &green_row(values), options)?;
-    read_green(&path)
-}
-
-fn read_green(path: &Path) -> Result<Vec<f32>> {
-    let picture = io::read::<LinearRgb>(path)?;
+    let folder = temporary_folder()?;
+    let path = folder.path().join(name);
+    let row = Image::from_fn(values.len(), 1, |x, _| LinearRgb::new(0.0, values[x], 0.0));
+    io::write_with(&path, &row, options)?;
+    let picture = io::read::<LinearRgb>(&path)?;
     Ok(picture.pixels().iter().map(|p| p.g).collect())
-}
-
-fn green_row(values: &[f32]) -> Image<LinearRgb> {
-    let pixels = values.iter().map(|&v| LinearRgb::new(0.0, v, 0.0));
-    Image::from_vec(values.len(), 1, pixels.collect())
 }
 
 fn listed(values: &[f32]) -> String {
@@ -105,34 +129,13 @@ fn write_half_floats(values: &[f32], expected: &[f32]) -> Result<Outcome> {
     Ok(Outcome::new(listed(&found), found == expected))
 }
 
-fn half_channels() -> HardCase {
-    HardCase::new(
-        "half-float channels above 65504",
-        "1e5 and -1e5 in a channel of its own, as cut-outs have",
-        "65504 and -65504",
-        write_half_channels,
-    )
-}
-
 fn write_half_channels() -> Result<Outcome> {
-    let folder = CaseFolder::new()?;
-    let path = folder.picture("exr");
+    let folder = temporary_folder()?;
+    let path = folder.path().join("a.exr");
     exr::write_half_channels(&path, (2, 1), &[("TR", &[1e5, -1e5])], &[])?;
     let (_, channels) = exr::read_channels(&path)?;
     let found: Vec<f32> = channels.into_iter().flat_map(|c| c.samples).collect();
     Ok(Outcome::new(listed(&found), found == [HALF_MAX, -HALF_MAX]))
-}
-
-fn exact_floats() -> HardCase {
-    HardCase::new(
-        "float samples at the ends of their range",
-        "the smallest denormal, the smallest normal, 1e-4 beside 1e5, the largest, in EXR and TIFF",
-        "every bit comes back: 0 differ",
-        || {
-            let differ = count_changed_floats("a.exr")? + count_changed_floats("a.tif")?;
-            Ok(Outcome::none(differ, "differ"))
-        },
-    )
 }
 
 fn count_changed_floats(name: &str) -> Result<usize> {
@@ -154,15 +157,6 @@ const EXTREME_FLOATS: [f32; 7] = [
     -f32::MAX,
     -0.0,
 ];
-
-fn clamped_codes() -> HardCase {
-    HardCase::new(
-        "NaN, infinities and negative light in a PNG",
-        "NaN, -inf, -1, 1e38, inf in 8 bits",
-        "0, 0, 0, 1, 1",
-        write_clamped_codes,
-    )
-}
 
 fn write_clamped_codes() -> Result<Outcome> {
     let values = [f32::NAN, f32::NEG_INFINITY, -1.0, 1e38, f32::INFINITY];
@@ -203,8 +197,8 @@ fn no_pixel(format: &'static str) -> HardCase {
 }
 
 fn write_no_pixel(format: &str) -> Result<Outcome> {
-    let folder = CaseFolder::new()?;
-    let path = folder.picture(format);
+    let folder = temporary_folder()?;
+    let path = folder.path().join(format!("a.{format}"));
     let refused =
         [(0, 0), (5, 0)].map(|(w, h)| io::write(&path, &Image::<LinearRgb>::new(w, h)).is_err());
     let is_written = path.exists();
@@ -214,43 +208,17 @@ fn write_no_pixel(format: &str) -> Result<Outcome> {
     ))
 }
 
-/// An outcome whose message lacks the path, which differs in every run.
-fn without_path(outcome: Outcome, path: &Path) -> Outcome {
-    let prefix = format!("{}: ", path.display());
-    Outcome::new(outcome.measured.replace(&prefix, ""), outcome.passed)
-}
-
-fn save<P: AsRef<Path>>(path: P, bytes: &[u8]) -> Result<P> {
-    std::fs::write(&path, bytes).map_err(|e| Error::file(path.as_ref(), e))?;
-    Ok(path)
-}
-
-fn nested_document() -> HardCase {
-    HardCase::new(
-        "document of 100 000 brackets",
-        "[[[[...",
-        "refused, not a stack overflow",
-        || {
-            let brackets = "[".repeat(100_000);
-            read_document::<serde_json::Value>(&brackets, "nested deeper")
-        },
-    )
-}
-
+/// The outcome's message lacks the path, which differs in every run.
 fn read_document<T: DeserializeOwned>(text: &str, cause: &str) -> Result<Outcome> {
-    let folder = CaseFolder::new()?;
-    let path = save(folder.path("a.json"), text.as_bytes())?;
+    let folder = temporary_folder()?;
+    let path = folder.path().join("a.json");
+    io::write_text(&path, text)?;
     let outcome = Outcome::refused(io::read_json::<T>(&path), cause);
-    Ok(without_path(outcome, &path))
-}
-
-fn overlong_number() -> HardCase {
-    HardCase::new(
-        "document with the number 1e999",
-        "[1e999]",
-        "refused, not infinity",
-        || read_document::<Vec<f64>>("[1e999]", "number out of range"),
-    )
+    let prefix = format!("{}: ", path.display());
+    Ok(Outcome {
+        measured: outcome.measured.replace(&prefix, ""),
+        ..outcome
+    })
 }
 
 /// Pixels along a side of the largest picture.
@@ -258,24 +226,12 @@ const SIXTEEN_K_PX: usize = 16_384;
 /// The picture in floats once written and once read, its codes and the file, and something on top.
 const SIXTEEN_K_GIB: f64 = 4.0;
 
-fn sixteen_k_png() -> HardCase {
-    HardCase::new(
-        "16k image",
-        "a matte of 16384 x 16384 pixels to an 8-bit PNG and back",
-        format!(
-            "refused by Limits::pixels (128 Mi) until that is raised, then the same; at most {SIXTEEN_K_GIB} GiB"
-        ),
-        write_sixteen_k,
-    )
-    .for_the_report()
-}
-
 fn write_sixteen_k() -> Result<Outcome> {
     if let Some(shortage) = memory::shortage(SIXTEEN_K_GIB) {
         return Ok(shortage);
     }
-    let folder = CaseFolder::new()?;
-    let path = folder.picture("png");
+    let folder = temporary_folder()?;
+    let path = folder.path().join("a.png");
     let (sound, peak) = memory::peak_gib(|| sixteen_k_through_file(&path));
     let ([refused, same], peak_gib) = (sound?, peak.unwrap_or(0.0));
     Ok(Outcome::new(
@@ -292,14 +248,10 @@ fn sixteen_k_through_file(path: &Path) -> Result<[bool; 2]> {
     )?;
     let error = io::read::<Coverage>(path).err();
     let refused = error.is_some_and(|e| e.to_string().contains("Limits::pixels"));
-    let back = io::read_with::<Coverage>(path, &with_raised_limit())?;
-    Ok([refused, is_xor_pattern(&back)])
-}
-
-fn with_raised_limit() -> ReadOptions {
     let mut options = ReadOptions::default();
     options.limits.pixels = 512 << 20;
-    options
+    let back = io::read_with::<Coverage>(path, &options)?;
+    Ok([refused, is_xor_pattern(&back)])
 }
 
 fn xor_pattern(x: usize, y: usize) -> Coverage {

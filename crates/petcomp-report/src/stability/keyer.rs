@@ -12,12 +12,44 @@ pub(super) fn cases() -> Vec<HardCase> {
     let mut cases: Vec<HardCase> = [0.0, 1e-30, 1e-10, 1e-3].map(weak_screen).into();
     cases.extend(known_pixels());
     cases.extend([
-        screen_color(),
-        extreme_pixels(),
-        non_finite_pixels(),
-        wide_windows(),
-        no_pixels(),
-        twelve_megapixels(),
+        HardCase::new(
+            "keyer: object of the screen's colour",
+            "64 x 64 pixels of the key, in all four profiles",
+            "nothing is left: matte and cut-out sum to 0",
+            key_screen_color,
+        ),
+        HardCase::new(
+            "keyer: values of 1e-42 to 1e30, some negative",
+            "17 x 13 pixels, alphas of 0 to 1.5, all stages, all four profiles",
+            "no NaN in matte or cut-out: 0",
+            key_extreme_pixels,
+        ),
+        HardCase::new(
+            "keyer: NaN and infinity, robust profile",
+            "9 x 9 pixels, one NaN, one of infinite alpha, a column of NaN in the garbage matte",
+            "2 pixels and 9 mattes counted; matte in 0..1, cut-out finite",
+            key_non_finite_pixels,
+        ),
+        HardCase::new(
+            "keyer: windows of hundreds of pixels",
+            "blurs of 300, edges and dilation of 100, in pictures of 1 x 1 to 5 x 1, all four \
+             profiles",
+            "every matte value in 0..1: 0 wrong",
+            key_with_wide_windows,
+        ),
+        HardCase::new(
+            "keyer: no pixel",
+            "0 x 0, 0 x 5 and 5 x 0 pixels, all stages",
+            "a matte and a cut-out of no pixel: 0",
+            key_no_pixels,
+        ),
+        HardCase::new(
+            "keyer: 12 megapixels",
+            "4000 x 3000 pixels, a pattern that repeats every 64",
+            "the matte repeats, too, away from the border: 0 differ",
+            key_twelve_megapixels,
+        )
+        .for_the_report(),
     ]);
     cases
 }
@@ -60,10 +92,6 @@ fn count_outside_unit_range(matte: &Image<Coverage>) -> usize {
     values.filter(|m| !(0.0..=1.0).contains(&m.0)).count()
 }
 
-fn has_nan(p: &PremulRgba) -> bool {
-    [p.r, p.g, p.b, p.a].iter().any(|v| v.is_nan())
-}
-
 fn weak_screen(saturation: f32) -> HardCase {
     HardCase::new(
         format!("keyer: grey screen, {saturation:e} of colour"),
@@ -98,22 +126,9 @@ fn known_pixel(name: &str, value: [f32; 3], expected: f32) -> HardCase {
 }
 
 fn key_known_pixel(value: [f32; 3], expected: f32) -> Result<Outcome> {
-    let matte = matte_of_pixel(value.into());
+    let photo = Image::filled(1, 1, value.into());
+    let matte = key(&photo, GREEN, &KeyOptions::default()).matte[(0, 0)].0;
     Ok(Outcome::near(matte.into(), expected.into(), 1e-7, ""))
-}
-
-fn matte_of_pixel(value: LinearRgb) -> f32 {
-    let photo = Image::filled(1, 1, value);
-    key(&photo, GREEN, &KeyOptions::default()).matte[(0, 0)].0
-}
-
-fn screen_color() -> HardCase {
-    HardCase::new(
-        "keyer: object of the screen's colour",
-        "64 x 64 pixels of the key, in all four profiles",
-        "nothing is left: matte and cut-out sum to 0",
-        key_screen_color,
-    )
 }
 
 fn key_screen_color() -> Result<Outcome> {
@@ -133,15 +148,6 @@ fn absolute_sum(p: &PremulRgba) -> f64 {
     f64::from(p.r.abs() + p.g.abs() + p.b.abs() + p.a)
 }
 
-fn extreme_pixels() -> HardCase {
-    HardCase::new(
-        "keyer: values of 1e-42 to 1e30, some negative",
-        "17 x 13 pixels, alphas of 0 to 1.5, all stages, all four profiles",
-        "no NaN in matte or cut-out: 0",
-        key_extreme_pixels,
-    )
-}
-
 fn key_extreme_pixels() -> Result<Outcome> {
     let photo = Image::from_fn(17, 13, extreme_pixel);
     let mut wrong = 0;
@@ -155,8 +161,10 @@ fn key_extreme_pixels() -> Result<Outcome> {
 }
 
 fn count_nan(keyed: &Keyed) -> usize {
-    let mattes = keyed.matte.pixels().iter().filter(|m| m.0.is_nan()).count();
-    mattes + keyed.cutout.pixels().iter().filter(|p| has_nan(p)).count()
+    let mattes = keyed.matte.pixels().iter().filter(|m| m.0.is_nan());
+    let pixels = keyed.cutout.pixels().iter().map(|p| [p.r, p.g, p.b, p.a]);
+    let pixels = pixels.filter(|p| p.iter().any(|v| v.is_nan()));
+    mattes.count() + pixels.count()
 }
 
 fn extreme_pixel(x: usize, y: usize) -> PremulRgba {
@@ -168,15 +176,6 @@ fn extreme_value(x: usize, y: usize, channel: usize) -> f32 {
     const SIZES: [f32; 8] = [1e-42, 1e-38, 1e-30, 1e-10, 1.0, 1e10, 1e20, 1e30];
     let is_negative = (x + y + channel).is_multiple_of(5);
     SIZES[(x * 7 + y * 3 + channel * 5) % 8] * if is_negative { -1.0 } else { 1.0 }
-}
-
-fn non_finite_pixels() -> HardCase {
-    HardCase::new(
-        "keyer: NaN and infinity, robust profile",
-        "9 x 9 pixels, one NaN, one of infinite alpha, a column of NaN in the garbage matte",
-        "2 pixels and 9 mattes counted; matte in 0..1, cut-out finite",
-        key_non_finite_pixels,
-    )
 }
 
 fn key_non_finite_pixels() -> Result<Outcome> {
@@ -207,15 +206,6 @@ fn is_sound(keyed: &Keyed) -> bool {
         && cutout.all(|p| p.color().is_finite() && p.a.is_finite())
 }
 
-fn wide_windows() -> HardCase {
-    HardCase::new(
-        "keyer: windows of hundreds of pixels",
-        "blurs of 300, edges and dilation of 100, in pictures of 1 x 1 to 5 x 1, all four profiles",
-        "every matte value in 0..1: 0 wrong",
-        key_with_wide_windows,
-    )
-}
-
 fn key_with_wide_windows() -> Result<Outcome> {
     let photos = [(1, 1), (5, 1), (1, 5), (3, 2)].map(tiny_photo);
     let runs = profiles()
@@ -240,15 +230,6 @@ fn with_wide_windows(profile: Profile) -> KeyOptions {
     }
 }
 
-fn no_pixels() -> HardCase {
-    HardCase::new(
-        "keyer: no pixel",
-        "0 x 0, 0 x 5 and 5 x 0 pixels, all stages",
-        "a matte and a cut-out of no pixel: 0",
-        key_no_pixels,
-    )
-}
-
 fn key_no_pixels() -> Result<Outcome> {
     let options = all_stages(Profile::Blender34);
     let keyed = [(0, 0), (0, 5), (5, 0)].map(|(w, h)| key(&Image::new(w, h), GREEN, &options));
@@ -259,16 +240,6 @@ fn key_no_pixels() -> Result<Outcome> {
 /// Period of the pattern in the largest photo, and how far from the border its matte repeats,
 /// pixels.
 const TILE_PX: usize = 64;
-
-fn twelve_megapixels() -> HardCase {
-    HardCase::new(
-        "keyer: 12 megapixels",
-        "4000 x 3000 pixels, a pattern that repeats every 64",
-        "the matte repeats, too, away from the border: 0 differ",
-        key_twelve_megapixels,
-    )
-    .for_the_report()
-}
 
 fn key_twelve_megapixels() -> Result<Outcome> {
     let matte = key(&tiled_photo(), GREEN, &KeyOptions::default()).matte;

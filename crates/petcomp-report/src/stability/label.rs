@@ -3,32 +3,109 @@
 
 use super::staged::{camera_above, card, grey, level_card, one_deep_pixel, rendered, tilted};
 use super::{HardCase, Outcome};
-use petcomp::geom::BBox;
-use petcomp::geom::Point2;
+use petcomp::geom::{BBox, Point2};
 use petcomp::label::{AmodalBox, LabelOptions, ObjectLabel, RleMask, label};
 use petcomp::scene::{Card, Shot};
-use petcomp::{DeepImage, DeepSample, Depth, Image, LinearRgb, ObjectId, PremulRgba, Result};
+use petcomp::{DeepSample, Depth, Image, LinearRgb, ObjectId, PremulRgba, Result};
 use std::f64::consts::FRAC_PI_2;
 
 /// Objects in one pixel, or in one stack.
 const CROWD_SIZE: u32 = 300;
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
-    Ok(vec![
-        no_object(),
-        object_of_one_pixel(),
-        smaller_than_a_pixel(),
-        many_in_a_pixel(),
-        hidden_object(),
-        cut_by_the_border(),
-        larger_than_the_picture(),
-        one_pixel_picture(),
-        out_of_sight(),
-        broken_outline(),
-        deep_stack(),
-        mask_of_16k(),
-        at_the_threshold(),
-    ])
+    let groups = [small_objects(), covered_and_cut(), awkward_objects()];
+    Ok(groups.into_iter().flatten().collect())
+}
+
+fn small_objects() -> Vec<HardCase> {
+    vec![
+        HardCase::new("no object", "a picture of 64 x 48", "no label: 0", || {
+            Ok(Outcome::none(labels_of([64, 48], []).len(), "labels"))
+        }),
+        HardCase::new(
+            "object of one pixel",
+            "pixel (3, 2) alone",
+            "box [3, 2] to [4, 3], area 1, fully visible",
+            label_one_pixel,
+        ),
+        HardCase::new(
+            "object of a hundredth of a pixel",
+            "a card of 1 x 1 mm where a pixel is 10 mm",
+            "below the threshold of 0.1 in every pixel: no label, 0",
+            label_tiny_object,
+        ),
+        HardCase::new(
+            "300 objects in one pixel",
+            "each opaque, each behind the one before it",
+            "300 labels of that pixel; the first is seen, the others are not; shares sum to 1",
+            || Ok(label_many_in_a_pixel()),
+        ),
+    ]
+}
+
+fn covered_and_cut() -> Vec<HardCase> {
+    vec![
+        HardCase::new(
+            "object that is completely hidden",
+            "an opaque card under a larger one",
+            "a label with its whole box, nothing of it visible, occluded by the other",
+            label_hidden_object,
+        ),
+        HardCase::new(
+            "object cut by the corner of the picture",
+            "an opaque card of 20 x 20 px, its middle on the corner [64, 48]",
+            "box and outline within the picture: a quarter, 100 px to one row and column",
+            label_cut_object,
+        ),
+        HardCase::new(
+            "object larger than the picture",
+            "an opaque card 1 km across",
+            "the picture's own box and all its 3072 pixels",
+            label_large_object,
+        ),
+        HardCase::new(
+            "one-pixel image",
+            "1 x 1 pixel, an opaque card over it",
+            "box [0, 0] to [1, 1], 1 px",
+            label_one_pixel_picture,
+        ),
+    ]
+}
+
+fn awkward_objects() -> Vec<HardCase> {
+    vec![
+        HardCase::new(
+            "objects out of sight",
+            "a card edge-on, one behind the camera, one 3 m away",
+            "no label: 0",
+            label_out_of_sight,
+        ),
+        HardCase::new(
+            "outline without an area",
+            "no corner, one, two, three on a line, one of NaN",
+            "the box of the mask all the same, no outline: 5 of 5",
+            label_broken_outlines,
+        ),
+        HardCase::new(
+            "300 cards in a stack",
+            "equal opaque cards, each 1 mm above the one before",
+            "299 covered, the last on top; visible pixels sum to those of one card",
+            label_deep_stack,
+        ),
+        HardCase::new(
+            "mask of 16384 x 16384 pixels",
+            "every pixel of every other column",
+            "2^27 pixels, the whole box but the last column, in 16385 runs",
+            || Ok(count_mask_of_16k()),
+        )
+        .for_the_report(),
+        HardCase::new(
+            "coverage at the threshold",
+            "a pixel covered by exactly 0.1, and one by the next number above it",
+            "a pixel belongs when it is covered by more: 0 and 1 labels",
+            label_at_the_threshold,
+        ),
+    ]
 }
 
 /// A picture in which a card at height 0 shows 100 pixels a metre.
@@ -83,12 +160,6 @@ fn is_about(found: f64, expected: f64) -> bool {
     (found - expected).abs() <= 2.0
 }
 
-fn no_object() -> HardCase {
-    HardCase::new("no object", "a picture of 64 x 48", "no label: 0", || {
-        Ok(Outcome::none(labels_of([64, 48], []).len(), "labels"))
-    })
-}
-
 /// The box of pixel (3, 2).
 const PIXEL_BOX: BBox = BBox {
     x0: 3.0,
@@ -96,15 +167,6 @@ const PIXEL_BOX: BBox = BBox {
     x1: 4.0,
     y1: 3.0,
 };
-
-fn object_of_one_pixel() -> HardCase {
-    HardCase::new(
-        "object of one pixel",
-        "pixel (3, 2) alone",
-        "box [3, 2] to [4, 3], area 1, fully visible",
-        label_one_pixel,
-    )
-}
 
 fn label_one_pixel() -> Result<Outcome> {
     let found = labels_of_one_pixel(&[dark_sample(1, 1.0, 1.0)]);
@@ -129,31 +191,15 @@ fn only_object(objects: &[ObjectLabel], is_right: impl Fn(&ObjectLabel) -> bool)
     )
 }
 
-fn smaller_than_a_pixel() -> HardCase {
-    HardCase::new(
-        "object of a hundredth of a pixel",
-        "a card of 1 x 1 mm where a pixel is 10 mm",
-        "below the threshold of 0.1 in every pixel: no label, 0",
-        label_tiny_object,
-    )
-}
-
 fn label_tiny_object() -> Result<Outcome> {
     let found = labels_of([64, 48], [opaque_card(1, [0.0; 3], 0.001)]);
     Ok(Outcome::none(found.len(), "labels"))
 }
 
-fn many_in_a_pixel() -> HardCase {
-    HardCase::new(
-        "300 objects in one pixel",
-        "each opaque, each behind the one before it",
-        "300 labels of that pixel; the first is seen, the others are not; shares sum to 1",
-        || Ok(label_many_in_a_pixel()),
-    )
-}
-
 fn label_many_in_a_pixel() -> Outcome {
-    let found = labels_of_one_pixel(&crowd_of_samples());
+    // Opaque, one behind another.
+    let crowd = (1..=CROWD_SIZE).map(|id| dark_sample(id, 1.0, if id == 1 { 1.0 } else { 0.0 }));
+    let found = labels_of_one_pixel(&crowd.collect::<Vec<_>>());
     let seen: f64 = found.iter().map(|o| o.visible_fraction).sum();
     let boxed = found.iter().filter(|o| is_boxed_rightly(o)).count();
     let labels = found.len();
@@ -163,25 +209,9 @@ fn label_many_in_a_pixel() -> Outcome {
     )
 }
 
-/// Opaque, one behind another.
-fn crowd_of_samples() -> Vec<DeepSample> {
-    (1..=CROWD_SIZE)
-        .map(|id| dark_sample(id, 1.0, if id == 1 { 1.0 } else { 0.0 }))
-        .collect()
-}
-
 /// In the pixel, of which only the first object is visible.
 fn is_boxed_rightly(object: &ObjectLabel) -> bool {
     object.amodal_box == PIXEL_BOX && object.visible_box.is_empty() == (object.id.0 > 1)
-}
-
-fn hidden_object() -> HardCase {
-    HardCase::new(
-        "object that is completely hidden",
-        "an opaque card under a larger one",
-        "a label with its whole box, nothing of it visible, occluded by the other",
-        label_hidden_object,
-    )
 }
 
 fn label_hidden_object() -> Result<Outcome> {
@@ -198,15 +228,6 @@ fn is_hidden_by_2(object: &ObjectLabel) -> bool {
         && object.visible_box.is_empty()
         && object.covered_by == [ObjectId(2)]
         && is_about(object.amodal_box.width(), 10.0)
-}
-
-fn cut_by_the_border() -> HardCase {
-    HardCase::new(
-        "object cut by the corner of the picture",
-        "an opaque card of 20 x 20 px, its middle on the corner [64, 48]",
-        "box and outline within the picture: a quarter, 100 px to one row and column",
-        label_cut_object,
-    )
 }
 
 fn label_cut_object() -> Result<Outcome> {
@@ -226,15 +247,6 @@ fn is_in_the_picture(p: &Point2<f64>) -> bool {
     (0.0..=64.0).contains(&p.x) && (0.0..=48.0).contains(&p.y)
 }
 
-fn larger_than_the_picture() -> HardCase {
-    HardCase::new(
-        "object larger than the picture",
-        "an opaque card 1 km across",
-        "the picture's own box and all its 3072 pixels",
-        label_large_object,
-    )
-}
-
 fn label_large_object() -> Result<Outcome> {
     let found = labels_of([64, 48], [opaque_card(1, [0.0; 3], 1000.0)]);
     Ok(only_object(&found, |o| {
@@ -244,15 +256,6 @@ fn label_large_object() -> Result<Outcome> {
     }))
 }
 
-fn one_pixel_picture() -> HardCase {
-    HardCase::new(
-        "one-pixel image",
-        "1 x 1 pixel, an opaque card over it",
-        "box [0, 0] to [1, 1], 1 px",
-        label_one_pixel_picture,
-    )
-}
-
 fn label_one_pixel_picture() -> Result<Outcome> {
     let found = labels_of([1, 1], [opaque_card(1, [0.0; 3], 0.5)]);
     Ok(only_object(&found, |o| {
@@ -260,29 +263,17 @@ fn label_one_pixel_picture() -> Result<Outcome> {
     }))
 }
 
-fn out_of_sight() -> HardCase {
-    HardCase::new(
-        "objects out of sight",
-        "a card edge-on, one behind the camera, one 3 m away",
-        "no label: 0",
-        label_out_of_sight,
-    )
-}
-
 fn label_out_of_sight() -> Result<Outcome> {
     let shot = shot_out_of_sight();
     let deep = rendered(&shot);
-    let by_mask = count_labels(&deep, &shot, AmodalBox::Mask);
-    let by_outline = count_labels(&deep, &shot, AmodalBox::Outline);
-    Ok(Outcome::none(by_mask + by_outline, "labels"))
-}
-
-fn count_labels(deep: &DeepImage, shot: &Shot, amodal: AmodalBox) -> usize {
-    let options = LabelOptions {
-        amodal,
-        ..LabelOptions::default()
-    };
-    label(deep, shot, &options).objects.len()
+    let labels = [AmodalBox::Mask, AmodalBox::Outline].map(|amodal| {
+        let options = LabelOptions {
+            amodal,
+            ..LabelOptions::default()
+        };
+        label(&deep, &shot, &options).objects.len()
+    });
+    Ok(Outcome::none(labels.iter().sum(), "labels"))
 }
 
 fn shot_out_of_sight() -> Shot {
@@ -302,15 +293,6 @@ const BROKEN_OUTLINES: [&[[f64; 2]]; 5] = [
     &[[f64::NAN, 0.0], [1.0, 0.0], [1.0, 1.0]],
 ];
 
-fn broken_outline() -> HardCase {
-    HardCase::new(
-        "outline without an area",
-        "no corner, one, two, three on a line, one of NaN",
-        "the box of the mask all the same, no outline: 5 of 5",
-        label_broken_outlines,
-    )
-}
-
 fn label_broken_outlines() -> Result<Outcome> {
     let right = BROKEN_OUTLINES.iter().filter(|o| is_boxed_by_mask(o));
     Ok(Outcome::count(right.count(), 5, "right"))
@@ -325,28 +307,16 @@ fn is_boxed_by_mask(outline: &[[f64; 2]]) -> bool {
     matches!(&found[..], [o] if o.outline_px.is_empty() && is_about(o.amodal_box.width(), 20.0))
 }
 
-fn deep_stack() -> HardCase {
-    HardCase::new(
-        "300 cards in a stack",
-        "equal opaque cards, each 1 mm above the one before",
-        "299 covered, the last on top; visible pixels sum to those of one card",
-        label_deep_stack,
-    )
-}
-
 fn label_deep_stack() -> Result<Outcome> {
     let cards = (1..=CROWD_SIZE).map(|id| opaque_card(id, [0.0, 0.0, 0.001 * f64::from(id)], 0.1));
-    Ok(check_stack(&labels_of([64, 48], cards)))
-}
-
-fn check_stack(found: &[ObjectLabel]) -> Outcome {
+    let found = labels_of([64, 48], cards);
     let topmost = found.iter().filter(|o| o.is_topmost());
     let tops: Vec<u32> = topmost.map(|o| o.id.0).collect();
     let right = found.iter().filter(|o| is_under_all_above(o)).count();
-    Outcome::new(
+    Ok(Outcome::new(
         format!("on top {tops:?}, {right} covered by all above them"),
         tops == [CROWD_SIZE] && right == CROWD_SIZE as usize,
-    )
+    ))
 }
 
 fn is_under_all_above(object: &ObjectLabel) -> bool {
@@ -355,16 +325,6 @@ fn is_under_all_above(object: &ObjectLabel) -> bool {
 
 /// Pixels along a side of the largest mask.
 const LARGEST_SIDE_PX: u32 = 16_384;
-
-fn mask_of_16k() -> HardCase {
-    HardCase::new(
-        "mask of 16384 x 16384 pixels",
-        "every pixel of every other column",
-        "2^27 pixels, the whole box but the last column, in 16385 runs",
-        || Ok(count_mask_of_16k()),
-    )
-    .for_the_report()
-}
 
 fn count_mask_of_16k() -> Outcome {
     let mask = RleMask::from_fn([LARGEST_SIDE_PX; 2], |x, _| x.is_multiple_of(2));
@@ -376,23 +336,10 @@ fn count_mask_of_16k() -> Outcome {
     Outcome::new(format!("{area} px in {runs} runs"), passed)
 }
 
-fn at_the_threshold() -> HardCase {
-    HardCase::new(
-        "coverage at the threshold",
-        "a pixel covered by exactly 0.1, and one by the next number above it",
-        "a pixel belongs when it is covered by more: 0 and 1 labels",
-        label_at_the_threshold,
-    )
-}
-
 fn label_at_the_threshold() -> Result<Outcome> {
     let threshold = LabelOptions::default().alpha_threshold;
-    let at = count_labels_of_alpha(threshold);
-    let above = count_labels_of_alpha(threshold.next_up());
+    let [at, above] = [threshold, threshold.next_up()]
+        .map(|alpha| labels_of_one_pixel(&[dark_sample(1, alpha, alpha)]).len());
     let measured = format!("{at} and {above} labels");
     Ok(Outcome::new(measured, (at, above) == (0, 1)))
-}
-
-fn count_labels_of_alpha(alpha: f32) -> usize {
-    labels_of_one_pixel(&[dark_sample(1, alpha, alpha)]).len()
 }

@@ -1,13 +1,13 @@
 //! Photos that are hard to cut out: each must come out right, or be flagged for review.
 
-use super::bottle::{BLUE, BottlePhoto, GREEN, OutlineAccuracy, review_messages};
+use super::bottle::{BLUE, BottlePhoto, GREEN, OutlineAccuracy};
 use super::{HardCase, Outcome, keyer};
-use crate::matte::{GOOD_BOX_PX, GOOD_IOU};
+use crate::matte::{GOOD_BOX_PX, GOOD_IOU, review_messages};
 use petcomp::matte::{
     CutOut, CutOutOptions, FilmMatte, FilmOptions, PlateOptions, ScreenPlate, TriangulateOptions,
     Triangulated, cut_out, film, triangulate,
 };
-use petcomp::{Coverage, Diagnostic, Image, LinearRgb, Result};
+use petcomp::{Coverage, Image, LinearRgb, Result};
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = keyer::cases();
@@ -35,7 +35,8 @@ enum ExpectedCutOut {
 impl ExpectedCutOut {
     fn description(self) -> String {
         let right = format!(
-            "outline right (IoU {GOOD_IOU}, box to {GOOD_BOX_PX} px of the picture that is searched)"
+            "outline right (IoU {GOOD_IOU}, box to {GOOD_BOX_PX} px of the picture that is \
+             searched)"
         );
         match self {
             Self::Right => format!(
@@ -56,6 +57,19 @@ impl ExpectedCutOut {
             Self::Flagged(what) => reasons.iter().any(|reason| reason.contains(what)),
         }
     }
+
+    fn outcome(self, result: Result<(CutOut, OutlineAccuracy)>) -> Result<Outcome> {
+        match (result, self) {
+            (Ok((cut, found)), _) => {
+                let measured = measured_cut_out(&cut, &found);
+                Ok(Outcome::new(measured, self.is_met(&cut, &found)))
+            }
+            (Err(error), Self::RightOrFlagged) => {
+                Ok(Outcome::new(format!("refused: {error}"), true))
+            }
+            (Err(error), _) => Err(error),
+        }
+    }
 }
 
 /// A matte below a code of 8 bits.
@@ -73,21 +87,6 @@ fn cut_out_case(name: &str, expected: ExpectedCutOut, photo: BottlePhoto) -> Har
     HardCase::new(name, input, expected.description(), move || {
         expected.outcome(photo.cut())
     })
-}
-
-impl ExpectedCutOut {
-    fn outcome(self, result: Result<(CutOut, OutlineAccuracy)>) -> Result<Outcome> {
-        match (result, self) {
-            (Ok((cut, found)), _) => {
-                let measured = measured_cut_out(&cut, &found);
-                Ok(Outcome::new(measured, self.is_met(&cut, &found)))
-            }
-            (Err(error), Self::RightOrFlagged) => {
-                Ok(Outcome::new(format!("refused: {error}"), true))
-            }
-            (Err(error), _) => Err(error),
-        }
-    }
 }
 
 fn measured_cut_out(cut: &CutOut, found: &OutlineAccuracy) -> String {
@@ -126,7 +125,12 @@ fn ordinary_cut_outs() -> Vec<HardCase> {
         cut_out_case("plain photo, green screen", Right, on_screen(GREEN)),
         cut_out_case("plain photo, blue screen", Right, on_screen(BLUE)),
         cut_out_case("grey screen", Right, on_screen(GREY_SCREEN)),
-        film_on_grey(),
+        HardCase::new(
+            "film on a grey screen",
+            "the same photo",
+            "transmittance cannot be measured, and that is flagged",
+            cut_out_film_on_grey,
+        ),
         cut_out_case("cap of the screen's hue", RightOrFlagged, same_hue),
         cut_out_case(
             "object over the border",
@@ -188,15 +192,6 @@ fn of_size(size: (usize, usize), screen: LinearRgb) -> BottlePhoto {
         size,
         ..on_screen(screen)
     }
-}
-
-fn film_on_grey() -> HardCase {
-    HardCase::new(
-        "film on a grey screen",
-        "the same photo",
-        "transmittance cannot be measured, and that is flagged",
-        cut_out_film_on_grey,
-    )
 }
 
 fn cut_out_film_on_grey() -> Result<Outcome> {
@@ -301,13 +296,39 @@ fn filled(color: LinearRgb) -> Image<LinearRgb> {
 }
 
 fn film_mattes() -> Vec<HardCase> {
-    let mut cases = vec![ordinary_film(), underexposed_film()];
+    let mut cases = vec![
+        // The well-conditioned neighbour of the others.
+        HardCase::new(
+            "film, nothing extreme",
+            "neutral film on an even green screen",
+            "transmittance to 0.02 on average",
+            judge_ordinary_film,
+        ),
+        // So dark that no code of a picture would show it: the stage expects the noise of coded
+        // pictures.
+        HardCase::new(
+            "film 1000 times underexposed",
+            "neutral film on an even green screen",
+            "transmittance to 0.02 on average, or a mean uncertainty of at least half of its error",
+            judge_underexposed_film,
+        ),
+    ];
     cases.extend(flagged_films());
     cases.extend([
         even_film("film in a black photo", LinearRgb::BLACK, 0.0),
         even_film("film of the screen's own colour", GREEN, 1.0),
-        empty_mask(),
-        no_background(),
+        HardCase::refused(
+            "film without an object",
+            "a mask of zeros",
+            "mask of the object is empty",
+            film_without_object,
+        ),
+        HardCase::new(
+            "screen without background",
+            "no pixel of it to fit to",
+            "refused: there is not enough",
+            fit_without_background,
+        ),
     ]);
     cases
 }
@@ -315,22 +336,22 @@ fn film_mattes() -> Vec<HardCase> {
 fn flagged_films() -> [HardCase; 3] {
     let clipped = "100.0 % of the object is clipped";
     let (white, dark) = (LinearRgb::WHITE, GREEN.scale(1e-30));
+    let black = LinearRgb::BLACK;
     [
-        (
+        flagged_film(
             "film on a black screen",
-            film_on(LinearRgb::BLACK, 1.0),
-            LinearRgb::BLACK,
+            film_on(black, 1.0),
+            black,
             "too grey",
         ),
-        (
+        flagged_film(
             "film in a photo clipped all over",
             filled(white),
             GREEN,
             clipped,
         ),
-        ("film in a photo of 1e-30", film_on(dark, 1.0), dark, ""),
+        flagged_film("film in a photo of 1e-30", film_on(dark, 1.0), dark, ""),
     ]
-    .map(|(name, photo, screen, cause)| flagged_film(name, photo, screen, cause))
 }
 
 fn film_matte(photo: &Image<LinearRgb>, screen: LinearRgb) -> Result<FilmMatte> {
@@ -361,14 +382,10 @@ fn flagged_film(
 
 fn judge_soundness(found: &FilmMatte, cause: &str) -> Outcome {
     let unsound = found.film.pixels().iter().filter(|p| !p.is_sound()).count();
-    let reported = reported(&found.diagnostics);
+    let messages: Vec<_> = found.diagnostics.iter().map(ToString::to_string).collect();
+    let reported = joined(&messages, "nothing reported");
     let passed = unsound == 0 && reported.contains(cause);
     Outcome::new(format!("{unsound} px unsound, {reported}"), passed)
-}
-
-fn reported(diagnostics: &[Diagnostic]) -> String {
-    let messages: Vec<_> = diagnostics.iter().map(ToString::to_string).collect();
-    joined(&messages, "nothing reported")
 }
 
 /// A photo of one colour: nothing passes where it is black, all where it is the screen's.
@@ -395,16 +412,6 @@ fn mean_uncertainty(uncertainty: &Image<f32>) -> f64 {
     values.sum::<f64>() / ellipse_area()
 }
 
-/// The well-conditioned neighbour of the others.
-fn ordinary_film() -> HardCase {
-    HardCase::new(
-        "film, nothing extreme",
-        "neutral film on an even green screen",
-        "transmittance to 0.02 on average",
-        judge_ordinary_film,
-    )
-}
-
 fn judge_ordinary_film() -> Result<Outcome> {
     let found = film_matte(&film_on(GREEN, 1.0), GREEN)?;
     let off = transmittance_error(&found.transmittance);
@@ -413,16 +420,6 @@ fn judge_ordinary_film() -> Result<Outcome> {
 
 /// Exposure of the underexposed film.
 const DARK_EXPOSURE: f32 = 1e-3;
-
-/// So dark that no code of a picture would show it: the stage expects the noise of coded pictures.
-fn underexposed_film() -> HardCase {
-    HardCase::new(
-        "film 1000 times underexposed",
-        "neutral film on an even green screen",
-        "transmittance to 0.02 on average, or a mean uncertainty of at least half of its error",
-        judge_underexposed_film,
-    )
-}
 
 fn judge_underexposed_film() -> Result<Outcome> {
     let found = film_matte(&film_on(GREEN, DARK_EXPOSURE), GREEN.scale(DARK_EXPOSURE))?;
@@ -440,44 +437,17 @@ fn transmittance_error(found: &Image<LinearRgb>) -> f64 {
 }
 
 fn mean_error_inside(found: &Image<LinearRgb>, expected: impl Fn(usize, usize) -> f32) -> f64 {
-    let inside = pixels_inside().into_iter();
+    let mask = ellipse();
+    let pixels = (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y)));
+    let inside = pixels.filter(|&at| mask[at].0 > 0.0);
     let off = inside.map(|(x, y)| f64::from((found[(x, y)].g - expected(x, y)).abs()));
     off.sum::<f64>() / ellipse_area()
 }
 
-fn pixels_inside() -> Vec<(usize, usize)> {
-    let mask = ellipse();
-    let pixels = (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y)));
-    pixels.filter(|&at| mask[at].0 > 0.0).collect()
-}
-
-fn empty_mask() -> HardCase {
-    HardCase::refused(
-        "film without an object",
-        "a mask of zeros",
-        "mask of the object is empty",
-        film_without_object,
-    )
-}
-
 fn film_without_object() -> Result<FilmMatte> {
+    let (photo, nothing) = (film_on(GREEN, 1.0), Image::new(SIZE.0, SIZE.1));
     let plate = ScreenPlate::even(GREEN, SIZE);
-    let nothing = Image::new(SIZE.0, SIZE.1);
-    film(
-        &film_on(GREEN, 1.0),
-        &plate,
-        &nothing,
-        &FilmOptions::default(),
-    )
-}
-
-fn no_background() -> HardCase {
-    HardCase::new(
-        "screen without background",
-        "no pixel of it to fit to",
-        "refused: there is not enough",
-        fit_without_background,
-    )
+    film(&photo, &plate, &nothing, &FilmOptions::default())
 }
 
 fn fit_without_background() -> Result<Outcome> {
@@ -486,14 +456,11 @@ fn fit_without_background() -> Result<Outcome> {
     Ok(Outcome::refused(plate, "background"))
 }
 
-/// What an exposure leaves of a screen before the sensor saturates.
-fn exposed(screen: LinearRgb, exposure: f32) -> LinearRgb {
-    screen.map(|v| (v * exposure).min(1.0))
-}
-
 fn triangulated(screens: [LinearRgb; 2], exposure: f32) -> Result<Triangulated> {
     let photos = screens.map(|screen| film_on(screen, exposure));
-    let plates = screens.map(|screen| ScreenPlate::even(exposed(screen, exposure), SIZE));
+    // What an exposure leaves of a screen before the sensor saturates.
+    let exposed = screens.map(|screen| screen.map(|v| (v * exposure).min(1.0)));
+    let plates = exposed.map(|screen| ScreenPlate::even(screen, SIZE));
     let shots = [(&photos[0], &plates[0]), (&photos[1], &plates[1])];
     triangulate(&shots, &ellipse(), &TriangulateOptions::default())
 }
@@ -505,9 +472,25 @@ fn two_screens() -> Vec<HardCase> {
         exact_screens("two screens, one of them black", [GREEN, black]),
         similar_screens("two screens that are the same", [GREEN, GREEN]),
         similar_screens("two screens, both black", [black; 2]),
-        saturated_photos(),
-        clipped_screen(),
-        one_screen(),
+        HardCase::refused(
+            "two photos clipped all over",
+            "film on green and blue, 100 times too bright: screens and photos are white",
+            "too similar",
+            || triangulated([GREEN, BLUE], 100.0),
+        ),
+        HardCase::new(
+            "two photos with a clipped screen",
+            "film on green and blue, 3 times too bright: the green of one screen is cut from 1.26 \
+             to 1",
+            "T to 0.05 on average, or flagged, or a residual or mean uncertainty above 0.05",
+            || Ok(judge_clipped_screen(&triangulated([GREEN, BLUE], 3.0)?)),
+        ),
+        HardCase::refused(
+            "triangulation from one photo",
+            "film on green",
+            "expected at least 2",
+            triangulate_one_photo,
+        ),
     ]
 }
 
@@ -531,24 +514,6 @@ fn similar_screens(name: &str, screens: [LinearRgb; 2]) -> HardCase {
     })
 }
 
-fn saturated_photos() -> HardCase {
-    HardCase::refused(
-        "two photos clipped all over",
-        "film on green and blue, 100 times too bright: screens and photos are white",
-        "too similar",
-        || triangulated([GREEN, BLUE], 100.0),
-    )
-}
-
-fn clipped_screen() -> HardCase {
-    HardCase::new(
-        "two photos with a clipped screen",
-        "film on green and blue, 3 times too bright: the green of one screen is cut from 1.26 to 1",
-        "T to 0.05 on average, or flagged, or a residual or mean uncertainty above 0.05",
-        || Ok(judge_clipped_screen(&triangulated([GREEN, BLUE], 3.0)?)),
-    )
-}
-
 fn judge_clipped_screen(found: &Triangulated) -> Outcome {
     let error = transmittance_error(&found.transmittance);
     let unsure = mean_uncertainty(&found.uncertainty);
@@ -559,15 +524,6 @@ fn judge_clipped_screen(found: &Triangulated) -> Outcome {
             "T off by {error:.3}, residual {residual:.3}, uncertainty {unsure:.3}, {flags} flags"
         ),
         error < 0.05 || flags > 0 || residual > 0.05 || unsure > 0.05,
-    )
-}
-
-fn one_screen() -> HardCase {
-    HardCase::refused(
-        "triangulation from one photo",
-        "film on green",
-        "expected at least 2",
-        triangulate_one_photo,
     )
 }
 

@@ -23,6 +23,7 @@ mod staged;
 
 pub use case::{HardCase, Outcome};
 
+use crate::columns::{Column, table_from, table_of};
 use crate::files::write_texts;
 use petcomp::plot::Table;
 use petcomp::{Error, Result};
@@ -46,38 +47,31 @@ const STAGES: &[(&str, Cases)] = &[
 ];
 
 /// How a case ended.
-#[derive(Clone, Debug, PartialEq)]
 pub struct CaseResult {
     /// The stage under test.
     pub stage: &'static str,
-    /// What is extreme about the input.
-    pub name: String,
-    /// What goes in.
-    pub input: String,
-    /// What must come out.
-    pub expectation: String,
+    /// What was tried.
+    pub case: HardCase,
     /// What came out, and whether it meets the expectation.
     pub outcome: Outcome,
     /// Run time, milliseconds.
-    pub wall_ms: f64,
+    wall_ms: f64,
 }
 
-impl CaseResult {
-    fn cells(&self) -> [String; 7] {
-        [
-            self.stage.into(),
-            self.name.clone(),
-            self.input.clone(),
-            self.expectation.clone(),
-            self.outcome.measured.clone(),
-            if self.outcome.passed { "pass" } else { "FAIL" }.into(),
-            format!("{:.1}", self.wall_ms),
-        ]
-    }
-}
+const COLUMNS: [Column<CaseResult>; 7] = [
+    ("stage", |r| r.stage.into()),
+    ("case", |r| r.case.name.clone()),
+    ("input", |r| r.case.input.clone()),
+    ("expectation", |r| r.case.expectation.clone()),
+    ("result", |r| r.outcome.measured.clone()),
+    ("pass", |r| {
+        String::from(if r.outcome.passed { "pass" } else { "FAIL" })
+    }),
+    ("time ms", |r| format!("{:.1}", r.wall_ms)),
+];
 
 /// Names of the stages that have cases.
-pub fn stages() -> impl Iterator<Item = &'static str> {
+fn stages() -> impl Iterator<Item = &'static str> {
     STAGES.iter().map(|(name, _)| *name)
 }
 
@@ -87,84 +81,51 @@ pub fn stages() -> impl Iterator<Item = &'static str> {
 /// [`Error::Value`] for a stage that has none.
 pub fn cases(stage: &str) -> Result<Vec<(&'static str, HardCase)>> {
     let mut all = Vec::new();
-    for (name, cases) in selected_stages(stage)? {
-        all.extend(cases()?.into_iter().map(|case| (*name, case)));
+    for (name, cases) in STAGES {
+        if stage.is_empty() || *name == stage {
+            all.extend(cases()?.into_iter().map(|case| (*name, case)));
+        }
+    }
+    if all.is_empty() {
+        let names = stages().collect::<Vec<_>>().join(", ");
+        let message = format!("\"{stage}\", expected one of {names}");
+        return Err(Error::value("stage", message));
     }
     Ok(all)
 }
 
-fn selected_stages(stage: &str) -> Result<Vec<&'static (&'static str, Cases)>> {
-    let selected: Vec<_> = STAGES
-        .iter()
-        .filter(|(name, _)| stage.is_empty() || *name == stage)
-        .collect();
-    if selected.is_empty() {
-        return Err(unknown_stage(stage));
-    }
-    Ok(selected)
+/// Runs every case of a stage, or of all (an empty name); `progress` is given the number of
+/// finished cases and of all cases.
+pub(crate) fn measure(stage: &str, progress: impl Fn(u64, u64)) -> Result<Vec<CaseResult>> {
+    Ok(run_cases(cases(stage)?, progress))
 }
 
-fn unknown_stage(stage: &str) -> Error {
-    let names = stages().collect::<Vec<_>>().join(", ");
-    Error::value("stage", format!("\"{stage}\", expected one of {names}"))
-}
-
-/// Runs every case of every stage; `progress` is given the number of finished cases and of all
-/// cases.
-///
-/// # Errors
-/// None that a caller can cause: cases are made in code.
-pub fn measure(progress: impl Fn(u64, u64)) -> Result<Vec<CaseResult>> {
-    Ok(run_cases(&cases("")?, progress))
-}
-
-/// Runs cases one after another; `progress` is given the number of finished cases and of all cases.
-pub fn run_cases(
-    cases: &[(&'static str, HardCase)],
-    progress: impl Fn(u64, u64),
-) -> Vec<CaseResult> {
-    let numbered = cases.iter().enumerate();
+/// Runs cases one after another.
+fn run_cases(cases: Vec<(&'static str, HardCase)>, progress: impl Fn(u64, u64)) -> Vec<CaseResult> {
+    let count = cases.len() as u64;
+    let numbered = (0..).zip(cases);
     numbered
         .map(|(i, (stage, case))| {
-            progress(i as u64, cases.len() as u64);
+            progress(i, count);
             case.run_timed(stage)
         })
         .collect()
 }
 
 /// Cases as a table, a row each.
-pub fn table(rows: &[CaseResult]) -> Table {
-    let mut table = Table::new([
-        "stage",
-        "case",
-        "input",
-        "expectation",
-        "result",
-        "pass",
-        "time ms",
-    ]);
-    rows.iter().for_each(|row| table.push(row.cells()));
-    table
+pub(crate) fn table(rows: &[CaseResult]) -> Table {
+    table_of(&COLUMNS, rows)
 }
 
 /// How many cases each stage has and how many of them pass.
-pub fn summary(rows: &[CaseResult]) -> Table {
-    let mut table = Table::new(["stage", "cases", "pass", "fail"]);
-    for stage in stages() {
-        let [cases, passed] = case_counts(rows, stage);
-        if cases > 0 {
-            let counts = [cases, passed, cases - passed].map(|n| n.to_string());
-            table.push(std::iter::once(stage.into()).chain(counts));
-        }
-    }
-    table
-}
-
-/// How many cases a stage has and how many of them pass.
-fn case_counts(rows: &[CaseResult], stage: &str) -> [usize; 2] {
-    let of_stage: Vec<_> = rows.iter().filter(|row| row.stage == stage).collect();
-    let passed = of_stage.iter().filter(|row| row.outcome.passed).count();
-    [of_stage.len(), passed]
+pub(crate) fn summary(rows: &[CaseResult]) -> Table {
+    let stages = rows.chunk_by(|a, b| a.stage == b.stage);
+    let lines = stages.map(|rows| {
+        let passed = rows.iter().filter(|row| row.outcome.passed).count();
+        let [cases, pass, fail] = [rows.len(), passed, rows.len() - passed].map(|n| n.to_string());
+        [rows[0].stage.into(), cases, pass, fail]
+    });
+    table_from(["stage", "cases", "pass", "fail"], lines)
 }
 
 /// Runs the cases of a stage, or of all (an empty name), and writes `stability.csv` and
@@ -173,7 +134,7 @@ fn case_counts(rows: &[CaseResult], stage: &str) -> [usize; 2] {
 /// # Errors
 /// As [`cases`]; files that cannot be written. A case that fails is a row, not an error.
 pub fn write(folder: &Path, stage: &str, progress: impl Fn(u64, u64)) -> Result<Vec<CaseResult>> {
-    let rows = run_cases(&cases(stage)?, progress);
+    let rows = measure(stage, progress)?;
     let table = table(&rows);
     let text = format!("{}\n{}", summary(&rows).markdown(), table.markdown());
     let files = [("stability.csv", &*table.csv()), ("stability.md", &text)];
@@ -229,7 +190,7 @@ mod tests {
                 HardCase::new("good", "", "", || Ok(Outcome::near(1.0, 1.0, 0.0, "m"))),
             ),
         ];
-        let rows = run_cases(&cases, |_, _| ());
+        let rows = run_cases(cases.into(), |_, _| ());
         assert_eq!(
             rows.iter()
                 .map(|row| row.outcome.passed)

@@ -2,8 +2,8 @@
 //! dim, very small and large.
 
 use super::staged::{
-    camera_above, camera_looking_at, card, grey, lamp, level_card, projected_area, rendered,
-    small_shot, tilted,
+    camera_above, camera_looking_at, card, count_drawn, grey, lamp, level_card, projected_area,
+    rendered, small_shot, tilted,
 };
 use super::{HardCase, Outcome, memory, render_light};
 use crate::render::GOOD;
@@ -20,22 +20,73 @@ const LAYER_COUNT: u32 = 200;
 const ROUNDING_ERROR: f64 = LAYER_COUNT as f64 * f32::EPSILON as f64;
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
-    let mut cases = vec![
-        layers_before_the_eye(),
-        layers_before_the_light(),
-        tinted_layers(),
-        near_card(),
-        near_and_grazing(),
-        one_pixel(),
-        white_on_white(),
-        sixteen_k(),
-    ];
+    let mut cases = film_layers();
+    cases.extend(extreme_pictures());
     cases.extend([60.0, 85.0, 89.0, 89.9].map(steep_card));
     cases.extend(render_light::cases());
     cases.extend(nothing_to_see());
     cases.extend(awkward_cards());
     cases.extend(awkward_textures());
     Ok(cases)
+}
+
+fn film_layers() -> Vec<HardCase> {
+    vec![
+        grey_layers(
+            "eye",
+            "200 level cards of transmittance 0.99 over one pixel",
+            "passes",
+            |deep| deep.flat(2, 2).transmittance().g,
+        ),
+        grey_layers(
+            "light",
+            "the surface under 200 level cards of transmittance 0.99",
+            "of the light arrives",
+            |deep| deep.shadow()[(2, 2)].g,
+        ),
+        tinted_layers(),
+    ]
+}
+
+fn extreme_pictures() -> [HardCase; 5] {
+    [
+        HardCase::new(
+            "camera 1 cm above a card",
+            "an opaque card of albedo 1/2, 20 cm wide, 1 cm under the eye, under even light of 1",
+            "alpha 1, light 1/2 and depth 0.01 m in every pixel, to 1e-5",
+            render_near_card,
+        ),
+        HardCase::new(
+            "camera 1 cm above a card, looking along it",
+            "an opaque card 20 m wide, the eye 1 cm over it, tilted by 80 degrees, under even \
+             light of 1",
+            "below the horizon, 1 pixel away from it, alpha 1 and light 1/2, to 1e-4; above it \
+             nothing",
+            render_near_and_grazing,
+        ),
+        HardCase::new(
+            "one-pixel image",
+            "a tilted card in a shadow of its own, seen by 1 x 1 pixel",
+            "the middle pixel of 65 x 65 that the same camera sees, to 1e-5",
+            render_one_pixel,
+        ),
+        HardCase::new(
+            "light between two white planes",
+            "a surface of albedo 1 under a white opaque card, which reflects all that it gets",
+            "no more than 20 times as bright (reflected light is limited to 0.95); never infinite",
+            reflect_between_planes,
+        ),
+        HardCase::new(
+            "16k image",
+            "16384 x 16384 pixels with a card of 2000 x 2000 in the last corner",
+            format!(
+                "{SHOWN_PX:.0} pixels covered, to 1e-4; the last pixel's plate untouched; at most \
+                 {SIXTEEN_K_GIB} GiB"
+            ),
+            || Ok(memory::shortage(SIXTEEN_K_GIB).unwrap_or_else(render_sixteen_k)),
+        )
+        .for_the_report(),
+    ]
 }
 
 fn every_pixel(deep: &DeepImage) -> impl Iterator<Item = (usize, usize)> {
@@ -62,38 +113,18 @@ fn absorbing_film(opacity: LinearRgb) -> Film {
 }
 
 /// What 200 layers of transmittance 0.99 let through.
-fn grey_stack() -> DeepImage {
-    rendered(&stacked_films(absorbing_film(LinearRgb::grey(0.01))))
-}
-
-fn layers_before_the_eye() -> HardCase {
+fn grey_layers(before: &str, input: &str, result: &str, at: fn(&DeepImage) -> f32) -> HardCase {
     let expected = libm::pow(0.99, f64::from(LAYER_COUNT));
     HardCase::new(
-        "200 layers of film before the eye",
-        "200 level cards of transmittance 0.99 over one pixel",
-        format!("0.99^200 = {expected:.6} passes, to 200 roundings"),
-        move || pass_layers_to_the_eye(expected),
+        format!("200 layers of film before the {before}"),
+        input,
+        format!("0.99^200 = {expected:.6} {result}, to 200 roundings"),
+        move || {
+            let deep = rendered(&stacked_films(absorbing_film(LinearRgb::grey(0.01))));
+            let found = at(&deep).into();
+            Ok(Outcome::near(found, expected, ROUNDING_ERROR, ""))
+        },
     )
-}
-
-fn pass_layers_to_the_eye(expected: f64) -> Result<Outcome> {
-    let passes = f64::from(grey_stack().flat(2, 2).transmittance().g);
-    Ok(Outcome::near(passes, expected, ROUNDING_ERROR, ""))
-}
-
-fn layers_before_the_light() -> HardCase {
-    let expected = libm::pow(0.99, f64::from(LAYER_COUNT));
-    HardCase::new(
-        "200 layers of film before the light",
-        "the surface under 200 level cards of transmittance 0.99",
-        format!("0.99^200 = {expected:.6} of the light arrives, to 200 roundings"),
-        move || pass_layers_to_the_light(expected),
-    )
-}
-
-fn pass_layers_to_the_light(expected: f64) -> Result<Outcome> {
-    let arrives = f64::from(grey_stack().shadow()[(2, 2)].g);
-    Ok(Outcome::near(arrives, expected, ROUNDING_ERROR, ""))
 }
 
 /// What a tinted layer passes of red, green and blue.
@@ -141,37 +172,12 @@ fn error_of_grey_sample(s: &DeepSample, depth: f64) -> f64 {
         .fold(0.0, largest)
 }
 
-fn near_card() -> HardCase {
-    HardCase::new(
-        "camera 1 cm above a card",
-        "an opaque card of albedo 1/2, 20 cm wide, 1 cm under the eye, under even light of 1",
-        "alpha 1, light 1/2 and depth 0.01 m in every pixel, to 1e-5",
-        render_near_card,
-    )
-}
-
 fn render_near_card() -> Result<Outcome> {
-    let deep = rendered(&near_card_shot());
-    Ok(Outcome::at_most(
-        error_of_full_card(&deep, 0.01),
-        1e-5,
-        "off",
-    ))
-}
-
-fn near_card_shot() -> Shot {
-    Shot::new(camera_above([64, 48], 60.0))
+    let shot = Shot::new(camera_above([64, 48], 60.0))
         .with_ambient(LinearRgb::WHITE)
-        .with_card(level_card(1, [0.0, 0.0, 0.99], 0.2, grey(1.0)))
-}
-
-fn near_and_grazing() -> HardCase {
-    HardCase::new(
-        "camera 1 cm above a card, looking along it",
-        "an opaque card 20 m wide, the eye 1 cm over it, tilted by 80 degrees, under even light of 1",
-        "below the horizon, 1 pixel away from it, alpha 1 and light 1/2, to 1e-4; above it nothing",
-        render_near_and_grazing,
-    )
+        .with_card(level_card(1, [0.0, 0.0, 0.99], 0.2, grey(1.0)));
+    let off = error_of_full_card(&rendered(&shot), 0.01);
+    Ok(Outcome::at_most(off, 1e-5, "off"))
 }
 
 fn render_near_and_grazing() -> Result<Outcome> {
@@ -277,15 +283,6 @@ fn total_coverage(deep: &DeepImage) -> f64 {
         .sum()
 }
 
-fn one_pixel() -> HardCase {
-    HardCase::new(
-        "one-pixel image",
-        "a tilted card in a shadow of its own, seen by 1 x 1 pixel",
-        "the middle pixel of 65 x 65 that the same camera sees, to 1e-5",
-        render_one_pixel,
-    )
-}
-
 fn render_one_pixel() -> Result<Outcome> {
     let pairs = middle_pixel(1).into_iter().zip(middle_pixel(65));
     let errors = pairs.map(|(a, b)| f64::from((a - b).abs()));
@@ -308,40 +305,23 @@ fn tilted_card_shot(side: u32) -> Shot {
         .with_card(card(1, [0.02, 0.0, 0.2], tilted(0.5), [0.3; 2], sheet))
 }
 
-fn white_on_white() -> HardCase {
-    HardCase::new(
-        "light between two white planes",
-        "a surface of albedo 1 under a white opaque card, which reflects all that it gets",
-        "no more than 20 times as bright (reflected light is limited to 0.95); never infinite",
-        reflect_between_planes,
-    )
-}
-
 fn reflect_between_planes() -> Result<Outcome> {
-    let brightest = brightest_between_planes();
-    let limit = 1.0 / (1.0 - 0.95) * (1.0 + 1e-5);
-    Ok(Outcome::at_most(brightest, limit, "times"))
-}
-
-fn brightest_between_planes() -> f64 {
-    let shot = Shot {
-        interreflection: LinearRgb::WHITE,
-        ..white_card_shot()
-    };
-    let deep = rendered(&shot);
-    let shadow = deep.shadow().pixels().iter();
-    shadow.map(brightest_channel).fold(0.0, largest)
-}
-
-fn brightest_channel(s: &LinearRgb) -> f64 {
-    f64::from(s.r.max(s.g).max(s.b))
-}
-
-fn white_card_shot() -> Shot {
     let white = PremulRgba::new(1.0, 1.0, 1.0, 1.0);
-    small_shot()
+    let shot = small_shot()
         .with_ambient(LinearRgb::WHITE)
-        .with_card(level_card(1, [0.0, 0.0, 0.05], 0.5, white))
+        .with_card(level_card(1, [0.0, 0.0, 0.05], 0.5, white));
+    let deep = rendered(&Shot {
+        interreflection: LinearRgb::WHITE,
+        ..shot
+    });
+    let shadow = deep.shadow().pixels().iter();
+    let brightest = shadow.map(|s| f64::from(s.r.max(s.g).max(s.b)));
+    let limit = 1.0 / (1.0 - 0.95) * (1.0 + 1e-5);
+    Ok(Outcome::at_most(
+        brightest.fold(0.0, largest),
+        limit,
+        "times",
+    ))
 }
 
 /// The larger number; NaN where one is.
@@ -361,18 +341,6 @@ const SIXTEEN_K_GIB: f64 = 6.0;
 /// What it shows of a card of 2000 x 2000 pixels and 64 x 64 texels: alpha falls to one half over
 /// the outermost half texel, which takes an eighth of a texel off each side.
 const SHOWN_PX: f64 = (2000.0 * (1.0 - 0.25 / 64.0)) * (2000.0 * (1.0 - 0.25 / 64.0));
-
-fn sixteen_k() -> HardCase {
-    HardCase::new(
-        "16k image",
-        "16384 x 16384 pixels with a card of 2000 x 2000 in the last corner",
-        format!(
-            "{SHOWN_PX:.0} pixels covered, to 1e-4; the last pixel's plate untouched; at most {SIXTEEN_K_GIB} GiB"
-        ),
-        || Ok(memory::shortage(SIXTEEN_K_GIB).unwrap_or_else(render_sixteen_k)),
-    )
-    .for_the_report()
-}
 
 fn render_sixteen_k() -> Outcome {
     let shot = sixteen_k_shot();
@@ -453,19 +421,13 @@ fn render_invisible(card: &Card) -> Result<Outcome> {
     let shot = Shot::new(camera_above([16, 12], 20.0))
         .with_card(card.clone())
         .with_ambient(LinearRgb::WHITE);
-    let seen = by_both_renderers(&shot).map(|deep| count_drawn(&deep));
+    let seen = by_both_renderers(&shot).map(|deep| count_drawn(&composite::frame(&deep, None)));
     Ok(Outcome::none(seen.iter().sum(), "px"))
 }
 
 fn by_both_renderers(shot: &Shot) -> [DeepImage; 2] {
     let options = RenderOptions::default();
     [render(shot, &options), render_reference(shot, &options)]
-}
-
-fn count_drawn(deep: &DeepImage) -> usize {
-    let pixels = composite::frame(deep, None).into_vec();
-    let drawn = pixels.iter().filter(|p| **p != PremulRgba::TRANSPARENT);
-    drawn.count()
 }
 
 /// Shots whose middle pixel has a known coverage.
@@ -549,15 +511,9 @@ fn middle_coverage(deep: &DeepImage) -> f64 {
 /// Every pixel's light is finite, its coverage and its shadows lie in 0..1.
 fn is_sound(deep: &DeepImage) -> bool {
     let mut shadows = deep.shadow().pixels().iter().flat_map(|s| [s.r, s.g, s.b]);
-    composite::frame(deep, None)
-        .pixels()
-        .iter()
-        .all(is_pixel_sound)
-        && shadows.all(is_share)
-}
-
-fn is_pixel_sound(p: &PremulRgba) -> bool {
-    p.color().is_finite() && is_share(p.a)
+    let frame = composite::frame(deep, None);
+    let mut pixels = frame.pixels().iter();
+    pixels.all(|p| p.color().is_finite() && is_share(p.a)) && shadows.all(is_share)
 }
 
 fn is_share(v: f32) -> bool {

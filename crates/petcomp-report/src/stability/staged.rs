@@ -96,6 +96,12 @@ pub(super) fn rendered(shot: &Shot) -> DeepImage {
     render(shot, &RenderOptions::default())
 }
 
+/// Pixels that are not transparent black.
+pub(super) fn count_drawn(frame: &Image<PremulRgba>) -> usize {
+    let pixels = frame.pixels().iter();
+    pixels.filter(|p| **p != PremulRgba::TRANSPARENT).count()
+}
+
 /// A shot from above, 5 x 5 pixels of a centimetre.
 pub(super) fn small_shot() -> Shot {
     Shot::new(camera_above([5, 5], 100.0))

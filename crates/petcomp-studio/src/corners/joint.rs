@@ -1,6 +1,6 @@
 //! Photos of one camera, solved together.
 
-use super::label_file::labelled;
+use super::label_file::{labelled, usable};
 use super::photos::beside;
 use crate::folder::Folder;
 use crate::refusal::Answer;
@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 
 /// What became of one of the photos.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub(super) struct JointPhoto {
     photo: String,
     /// How many photos share its camera.
@@ -27,10 +27,8 @@ impl JointPhoto {
         Self {
             photo: photo.into(),
             together,
-            focal_px: None,
-            focal_sigma: None,
-            rms_px: None,
             why: Some(why),
+            ..Self::default()
         }
     }
 }
@@ -87,14 +85,6 @@ fn solve_group(
 fn unsolved(names: &[String], error: &Error) -> Vec<JointPhoto> {
     let unsolved = |name: &String| JointPhoto::without_camera(name, names.len(), error.to_string());
     names.iter().map(unsolved).collect()
-}
-
-/// A camera that fits and can see objects on the surface.
-fn usable(outcome: Result<Solution, SolveError>) -> petcomp::Result<Solution> {
-    let solution = outcome.and_then(Solution::fitting)?;
-    camera::check_distance(&solution)?;
-    camera::check_lens(&solution.camera, solution.k1())?;
-    Ok(solution)
 }
 
 /// Writes the camera of a photo where it has one that fits.

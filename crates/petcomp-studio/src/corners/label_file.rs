@@ -4,7 +4,7 @@ use super::photos::{beside, file_name};
 use crate::folder::Folder;
 use crate::refusal::{Answer, Refusal};
 use axum::http::StatusCode;
-use petcomp::camera::{self, CameraFile, Label, LabelledPhoto, Solution, SolveOptions};
+use petcomp::camera::{self, CameraFile, Label, LabelledPhoto, Solution, SolveError, SolveOptions};
 use petcomp::{Error, io};
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -178,7 +178,7 @@ fn write_camera(folder: &Folder, photo: &str) -> Answer<String> {
     let name = beside(photo, "camera.json");
     let place = folder.place(&name)?;
     let solved = labelled(folder, photo).and_then(|labelled| {
-        let solution = solved(&labelled)?;
+        let solution = usable(camera::solve(&labelled.label, &SolveOptions::default()))?;
         Ok(CameraFile::new(&labelled.label, &solution))
     });
     match solved {
@@ -212,11 +212,9 @@ pub(super) fn labelled(folder: &Folder, photo: &str) -> Answer<LabelledPhoto> {
     }
 }
 
-/// A camera that fits its label.
-fn solved(labelled: &LabelledPhoto) -> Answer<Solution> {
-    let solution = camera::solve(&labelled.label, &SolveOptions::default())
-        .and_then(Solution::fitting)
-        .map_err(Error::from)?;
+/// A camera that fits its label and can see objects on the surface.
+pub(super) fn usable(outcome: Result<Solution, SolveError>) -> petcomp::Result<Solution> {
+    let solution = outcome.and_then(Solution::fitting)?;
     camera::check_distance(&solution)?;
     camera::check_lens(&solution.camera, solution.k1())?;
     Ok(solution)

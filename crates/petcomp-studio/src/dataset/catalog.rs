@@ -2,11 +2,12 @@
 
 use crate::folder::Folder;
 use crate::refusal::{Answer, Refusal};
+use crate::studio::next_number;
 use axum::http::StatusCode;
 use petcomp::dataset::index::{DatasetIndex, ObjectFacts, PictureFacts};
 use serde::Serialize;
 use std::collections::{BTreeSet, VecDeque};
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Listings that are kept: two beside each other in each of two tabs, and two before.
@@ -14,7 +15,7 @@ const KEPT: usize = 6;
 
 /// The listings of folders that were used last, the latest at the end.
 #[derive(Default)]
-pub(super) struct Catalogs(Mutex<VecDeque<(String, Arc<Catalog>)>>);
+pub(crate) struct Catalogs(Mutex<VecDeque<(String, Arc<Catalog>)>>);
 
 impl Catalogs {
     /// Lists a folder, anew if it was listed before: rows of that listing stay what they were.
@@ -65,11 +66,6 @@ fn forgotten(name: &str) -> Refusal {
     Refusal::new(StatusCode::NOT_FOUND, what)
 }
 
-fn next_listing() -> u64 {
-    static NEXT: AtomicU64 = AtomicU64::new(1);
-    NEXT.fetch_add(1, Ordering::Relaxed)
-}
-
 /// A folder's pictures, as they were listed.
 pub(super) struct Catalog {
     /// Number of the listing: the same folder has another one when it is listed again.
@@ -113,7 +109,7 @@ pub(super) enum Flag {
 impl Catalog {
     fn new(index: DatasetIndex) -> Self {
         Self {
-            listing: next_listing(),
+            listing: next_number(),
             facts: index.pictures.iter().map(|_| OnceLock::new()).collect(),
             read: AtomicUsize::new(0),
             is_reading: AtomicBool::new(false),

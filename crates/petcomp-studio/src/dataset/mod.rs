@@ -9,6 +9,7 @@ mod sample;
 
 use crate::folder::Folder;
 use crate::message::{Json, Query};
+use crate::photos::parent_of;
 use crate::picture::{may_be_photo, shown};
 use crate::refusal::{Answer, Refusal};
 use crate::server::Page;
@@ -20,7 +21,8 @@ use axum::http::StatusCode;
 use axum::http::header::CACHE_CONTROL;
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
-use catalog::{Catalog, Catalogs, Row};
+pub(crate) use catalog::Catalogs;
+use catalog::{Catalog, Row};
 use filter::{Filter, Order};
 use sample::SampleShown;
 use serde::{Deserialize, Serialize};
@@ -29,12 +31,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub(crate) const PAGES: &[Page] = &[crate::page!("dataset.html"), crate::page!("dataset.js")];
-
-/// What the page keeps between requests.
-#[derive(Default)]
-pub(crate) struct Dataset {
-    catalogs: Catalogs,
-}
 
 /// Most rows that are answered at a time: more than fit on any screen.
 const MAX_ROWS: usize = 500;
@@ -65,12 +61,8 @@ fn folders_of(folder: &Folder) -> Vec<String> {
 
 /// The folders that files lie in.
 fn parents(files: &[String]) -> BTreeSet<String> {
-    let parent = |file: &String| {
-        file.rsplit_once('/')
-            .map_or("", |(parent, _)| parent)
-            .to_owned()
-    };
-    files.iter().map(parent).collect()
+    let folders = files.iter().map(|file| parent_of(file));
+    folders.map(str::to_owned).collect()
 }
 
 /// Whether a folder is another one, or lies below it.
@@ -100,7 +92,7 @@ async fn open(
     Query(FolderName { folder }): Query<FolderName>,
 ) -> Answer<Json<ListedFolder>> {
     blocking(move || {
-        let catalog = studio.dataset.catalogs.open(&studio.folder, &folder)?;
+        let catalog = studio.dataset.open(&studio.folder, &folder)?;
         let index = &catalog.index;
         Ok(Json(ListedFolder {
             listing: catalog.listing,
@@ -113,6 +105,13 @@ async fn open(
         }))
     })
     .await
+}
+
+impl Studio {
+    /// One of a folder's listings.
+    fn catalog(&self, folder: &str, listing: Option<u64>) -> Answer<Arc<Catalog>> {
+        self.dataset.get(&self.folder, folder, listing)
+    }
 }
 
 #[derive(Deserialize)]
@@ -142,19 +141,14 @@ async fn find(
     Json(wanted): Json<RowSearch>,
 ) -> Answer<Json<FoundRows>> {
     blocking(move || {
-        let catalogs = &studio.dataset.catalogs;
-        let catalog = catalogs.get(&studio.folder, &wanted.folder, wanted.listing)?;
+        let catalog = studio.catalog(&wanted.folder, wanted.listing)?;
         let index = &catalog.index;
         let must_read = wanted.filter.needs_facts(index) || wanted.order.needs_facts(index);
         if must_read {
             catalog.read_in_background();
         }
         let (rows, why) = filter::found(&catalog, &wanted.filter, wanted.order);
-        let of = if must_read {
-            catalog.index.pictures.len()
-        } else {
-            0
-        };
+        let of = if must_read { index.pictures.len() } else { 0 };
         Ok(Json(FoundRows {
             rows,
             why,
@@ -178,8 +172,7 @@ async fn rows(
     Json(asked): Json<SomeRows>,
 ) -> Answer<Json<Vec<Row>>> {
     blocking(move || {
-        let catalogs = &studio.dataset.catalogs;
-        let catalog = catalogs.get(&studio.folder, &asked.folder, asked.listing)?;
+        let catalog = studio.catalog(&asked.folder, asked.listing)?;
         let rows = asked.rows.into_iter().take(MAX_ROWS);
         let rows: Answer<_> = rows.map(|row| catalog.row(row)).collect();
         rows.map(Json)
@@ -201,8 +194,7 @@ async fn sample(
     Query(asked): Query<OneRow>,
 ) -> Answer<Json<SampleShown>> {
     blocking(move || {
-        let catalogs = &studio.dataset.catalogs;
-        let catalog = catalogs.get(&studio.folder, &asked.folder, asked.listing)?;
+        let catalog = studio.catalog(&asked.folder, asked.listing)?;
         picture_file(&studio.folder, &catalog, asked.row)?;
         SampleShown::of(&catalog.index, asked.row).map(Json)
     })
@@ -214,8 +206,7 @@ async fn picture(
     Query(asked): Query<OneRow>,
 ) -> Answer<Response> {
     let response = blocking(move || {
-        let catalogs = &studio.dataset.catalogs;
-        let catalog = catalogs.get(&studio.folder, &asked.folder, asked.listing)?;
+        let catalog = studio.catalog(&asked.folder, asked.listing)?;
         shown(
             &picture_file(&studio.folder, &catalog, asked.row)?,
             asked.side,

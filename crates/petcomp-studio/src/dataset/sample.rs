@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// A picture and what is in it.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub(super) struct SampleShown {
     name: String,
     /// Its file, below the dataset's folder.
@@ -29,7 +29,7 @@ pub(super) struct SampleShown {
 }
 
 /// An object in it; places in pixels.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 struct ObjectShown {
     id: u32,
     class: u32,
@@ -69,8 +69,6 @@ impl SampleShown {
     fn of_record(record: SampleRecord) -> Self {
         let objects = record.labels.objects.iter();
         Self {
-            name: String::new(),
-            file: String::new(),
             image: record.labels.image,
             background: record.drawn.plate.clone(),
             objects: objects
@@ -85,6 +83,7 @@ impl SampleShown {
             knotted: record.knotted,
             rejected: record.rejected,
             draws: record.draws,
+            ..Self::default()
         }
     }
 
@@ -94,17 +93,11 @@ impl SampleShown {
         let image = [header.width as u32, header.height as u32];
         let boxes = index.boxes(row)?.unwrap_or_default().into_iter().zip(1..);
         Ok(Self {
-            name: String::new(),
-            file: String::new(),
             image,
-            background: String::new(),
             objects: boxes
                 .map(|((class, shares), id)| ObjectShown::of_box(id, class, shares, image))
                 .collect(),
-            distractors: Vec::new(),
-            knotted: Vec::new(),
-            rejected: Vec::new(),
-            draws: BTreeMap::new(),
+            ..Self::default()
         })
     }
 }
@@ -134,14 +127,8 @@ impl ObjectShown {
         Self {
             id,
             class,
-            asset: String::new(),
             bbox: [left, top, left + w * width, top + h * height],
-            visible_box: None,
-            outline: Vec::new(),
-            mask: Vec::new(),
-            visible: None,
-            covered_by: Vec::new(),
-            unlabelled: None,
+            ..Self::default()
         }
     }
 }

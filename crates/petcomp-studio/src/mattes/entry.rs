@@ -3,6 +3,7 @@
 use super::review::review_of;
 use crate::folder::Folder;
 use crate::message::Json;
+use crate::photos::is_list;
 use crate::refusal::{Answer, Refusal};
 use crate::studio::Studio;
 use crate::turn::blocking;
@@ -103,11 +104,6 @@ impl Photos {
             plates: plates(folder),
         }
     }
-}
-
-fn is_list(path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default();
-    name == "photos.toml" || name == "photos.csv"
 }
 
 fn listed(folder: &Folder, list: &str, read: &List) -> Vec<ListedPhoto> {

@@ -5,7 +5,7 @@ use crate::folder::Folder;
 use crate::message::Json;
 use crate::picture::tag_of;
 use crate::refusal::{Answer, Refusal};
-use crate::studio::Studio;
+use crate::studio::{Studio, next_number};
 use crate::turn::{Tab, Turns};
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -122,12 +122,6 @@ impl Mattes {
         self.solved.keep(number, Arc::new(solved), SOLVED);
         number
     }
-}
-
-fn next_number() -> u64 {
-    use std::sync::atomic::{AtomicU64, Ordering};
-    static NEXT: AtomicU64 = AtomicU64::new(1);
-    NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 #[derive(Deserialize)]

@@ -63,7 +63,11 @@ impl PartReader<'_> {
                 out.put_block(self.header(), block);
             }
         }
-        Ok(out.finish(self.sampling))
+        // Rows between samples are made from those around them.
+        if let Some(sampling) = self.sampling {
+            out.interpolate_rows(sampling);
+        }
+        Ok(out.samples)
     }
 
     /// Blocks that are decoded at a time.
@@ -93,6 +97,11 @@ impl PartReader<'_> {
     }
 }
 
+/// Columns and rows from one pixel to another.
+pub(super) fn offset(to: Vec2<i32>, from: Vec2<i32>) -> [i64; 2] {
+    [(to.x(), from.x()), (to.y(), from.y())].map(|(to, from)| i64::from(to) - i64::from(from))
+}
+
 /// What came out of a piece of the file.
 enum DecodedBlock {
     Pixels(UncompressedBlock),
@@ -117,13 +126,14 @@ impl<'a> SampleBuffer<'a> {
     fn new(reader: &PartReader<'a>) -> Self {
         let header = reader.header();
         let (width, height) = (reader.window.size.x(), reader.window.size.y());
-        let (at, window) = (header.own_attributes.layer_position, reader.window.position);
+        let at = header.own_attributes.layer_position;
+        let [left, top] = offset(at, reader.window.position);
         Self {
             picked: reader.picked,
             width,
             height,
-            left: i64::from(at.x()) - i64::from(window.x()),
-            top: i64::from(at.y()) - i64::from(window.y()),
+            left,
+            top,
             rows: header.layer_size.y(),
             order: reader.order,
             samples: bytemuck::zeroed_vec(width * height * reader.picked.len()),
@@ -132,14 +142,12 @@ impl<'a> SampleBuffer<'a> {
 
     fn put_block(&mut self, header: &Header, block: DecodedBlock) {
         match block {
-            DecodedBlock::Lines(lines) => self.put_lines(&lines),
+            DecodedBlock::Lines(lines) => {
+                for line in lines {
+                    self.put(line.channel, [0, line.y], &line.samples);
+                }
+            }
             DecodedBlock::Pixels(block) => self.put_pixels(header, &block),
-        }
-    }
-
-    fn put_lines(&mut self, lines: &[SampleLine]) {
-        for line in lines {
-            self.put(line.channel, [line.x, line.y], &line.samples);
         }
     }
 
@@ -151,14 +159,6 @@ impl<'a> SampleBuffer<'a> {
             to_floats(line.value, kind, &mut floats);
             self.put(channel, [at.x(), at.y()], &floats);
         }
-    }
-
-    /// All samples, those between rows made from them.
-    fn finish(mut self, sampling: Option<&Sampling>) -> Vec<f32> {
-        if let Some(sampling) = sampling {
-            self.interpolate_rows(sampling);
-        }
-        self.samples
     }
 
     /// A run of samples of a channel, cut to the window.

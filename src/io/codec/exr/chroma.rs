@@ -35,9 +35,10 @@ impl Sampling {
     /// should be.
     pub(super) fn find(file: &[u8]) -> Option<(Self, Vec<u8>)> {
         let offsets = sampling_offsets(file)?;
-        let pairs: Option<Vec<[usize; 2]>> =
-            offsets.iter().map(|&at| read_pair(file, at)).collect();
-        let pairs = pairs?;
+        let pairs = offsets
+            .iter()
+            .map(|&at| Some([read_sampling(file, at)?, read_sampling(file, at + 4)?]));
+        let pairs: Vec<[usize; 2]> = pairs.collect::<Option<_>>()?;
         if pairs.iter().flatten().all(|&n| n == 1) {
             return None;
         }
@@ -50,14 +51,11 @@ impl Sampling {
 
     /// Whether the part is one that is read: rows, with a window that every sampling divides.
     pub(super) fn check(&self, header: &Header) -> Result<(), Refusal> {
+        let divides = self.0.iter().all(|&pair| divides(pair, header));
         match header.blocks {
-            exr::meta::BlockDescription::ScanLines if self.divides(header) => Ok(()),
+            exr::meta::BlockDescription::ScanLines if divides => Ok(()),
             _ => Err("damaged EXR: sampling of channels that does not divide the picture".into()),
         }
-    }
-
-    fn divides(&self, header: &Header) -> bool {
-        self.0.iter().all(|pair| divides(*pair, header))
     }
 
     /// Rows of pixels for a sample of a channel.
@@ -165,7 +163,6 @@ impl Sampling {
         let rows = y..(y + y_step).min(header.layer_size.y());
         rows.map(move |y| SampleLine {
             channel,
-            x: 0,
             y,
             samples: samples.clone(),
         })
@@ -231,10 +228,6 @@ fn offsets_in_list(file: &[u8], mut at: usize) -> Option<Vec<usize>> {
         at = sampling + FULL_SAMPLING.len();
     }
     Some(offsets)
-}
-
-fn read_pair(file: &[u8], at: usize) -> Option<[usize; 2]> {
-    Some([read_sampling(file, at)?, read_sampling(file, at + 4)?])
 }
 
 /// Pixels for a sample; none for a number that no file has.

@@ -18,5 +18,5 @@ pub use write::Compression;
 pub(crate) use ::exr::prelude::FlatSamples;
 pub(crate) use parts::encode_parts;
 pub(crate) use read::{channels, decode, header};
-pub(crate) use samples::{float_samples, half_samples};
+pub(crate) use samples::half_samples;
 pub(crate) use write::encode;

@@ -1,9 +1,10 @@
 //! EXR files of several parts: pictures of one size, each with channels of its own.
 
 use super::attributes::{FIRST_ATTRIBUTE, add_texts, sort_attributes, utf8_text};
+use super::write::channel_list;
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
-    LayerAttributes, SmallVec, Vec2, WritableImage,
+    AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
+    LayerAttributes, Vec2, WritableImage,
 };
 use std::io::Cursor;
 
@@ -17,12 +18,6 @@ pub struct Part {
     pub channels: Vec<(String, ChannelSamples)>,
     /// Texts to store with it, by name.
     pub metadata: Vec<(String, String)>,
-}
-
-impl Part {
-    fn error_in(&self, channel: &str, what: &str) -> String {
-        format!("{}: channel {channel}: {what}", self.name)
-    }
 }
 
 /// Samples of one channel.
@@ -76,36 +71,16 @@ fn check_parts((width, height): (usize, usize), parts: &[Part]) -> Result<(), St
 }
 
 fn part_layer(
-    (width, height): (usize, usize),
+    size: (usize, usize),
     part: &Part,
 ) -> Result<Layer<AnyChannels<FlatSamples>>, String> {
-    let mut list = SmallVec::new();
-    for (name, samples) in &part.channels {
-        let samples = samples.to_flat();
-        check_count(&samples, (width, height)).map_err(|e| part.error_in(name, &e))?;
-        list.push(AnyChannel::new(utf8_text(name), samples));
-    }
+    let planes = part.channels.iter();
+    let planes = planes.map(|(name, samples)| (name.as_str(), samples.to_flat()));
+    let channels = channel_list(size, planes).map_err(|e| format!("{}: {e}", part.name))?;
     let mut attributes = LayerAttributes::named(utf8_text(&part.name));
     add_texts(&mut attributes, &part.metadata);
-    let (encoding, channels) = (Encoding::SMALL_LOSSLESS, AnyChannels::sort(list));
-    Ok(Layer::new(
-        Vec2(width, height),
-        attributes,
-        encoding,
-        channels,
-    ))
-}
-
-/// Fails where there is not one sample for each pixel.
-pub(super) fn check_count(
-    samples: &FlatSamples,
-    (width, height): (usize, usize),
-) -> Result<(), String> {
-    let count = samples.len();
-    if count == width * height {
-        return Ok(());
-    }
-    Err(format!("{count} samples, expected {width} x {height}"))
+    let (size, encoding) = (Vec2(size.0, size.1), Encoding::SMALL_LOSSLESS);
+    Ok(Layer::new(size, attributes, encoding, channels))
 }
 
 /// The byte of the version that holds the kind of file, and its bit for several parts.

@@ -1,7 +1,7 @@
 //! Headers and pixels of EXR files.
 
 use super::attributes::string_of;
-use super::blocks::{PartReader, SampleOrder};
+use super::blocks::{PartReader, SampleOrder, offset};
 use super::chroma::{LUMINANCE_CHROMA, Sampling, to_rgb};
 use crate::color::RgbSpace;
 use crate::io::codec::channels::{ChannelMatch, Choice, Wanted, is_finished};
@@ -54,15 +54,11 @@ pub(crate) fn channels(
     let reader = file.reader(part, &picked, file.window(), SampleOrder::Planar)?;
     let samples = reader.read()?;
     let planes = samples.chunks_exact(width * height);
-    let channels = names.into_iter().zip(planes).map(Channel::from);
+    let channels = names.into_iter().zip(planes).map(|(name, plane)| Channel {
+        name,
+        samples: plane.to_vec(),
+    });
     Ok(((width, height), channels.collect()))
-}
-
-impl From<(String, &[f32])> for Channel {
-    fn from((name, plane): (String, &[f32])) -> Self {
-        let samples = plane.to_vec();
-        Self { name, samples }
-    }
 }
 
 /// A file whose headers were checked.
@@ -110,9 +106,7 @@ impl<'a> CheckedFile<'a> {
     /// Columns and rows of a window that a part stores.
     fn stored_in(&self, part: usize, window: IntegerBounds) -> [Range<usize>; 2] {
         let stored = data_window(&self.meta.headers[part]);
-        let (at, shown_at) = (stored.position, window.position);
-        let left = i64::from(at.x()) - i64::from(shown_at.x());
-        let top = i64::from(at.y()) - i64::from(shown_at.y());
+        let [left, top] = offset(stored.position, window.position);
         [
             overlap(left, stored.size.x(), window.size.x()),
             overlap(top, stored.size.y(), window.size.y()),
@@ -300,14 +294,10 @@ pub(crate) fn header(
 
 /// The first bytes, as if every channel had a sample for each pixel.
 fn read_start(file: &mut impl Read) -> Result<Vec<u8>, Refusal> {
-    let start = first_bytes(file)?;
-    Ok(Sampling::find(&start).map_or(start, |(_, even)| even))
-}
-
-fn first_bytes(file: &mut impl Read) -> Result<Vec<u8>, exr::error::Error> {
     let mut start = Vec::new();
-    file.take(FIRST_BYTES).read_to_end(&mut start)?;
-    Ok(start)
+    let read = file.take(FIRST_BYTES).read_to_end(&mut start);
+    read.map_err(exr::error::Error::from)?;
+    Ok(Sampling::find(&start).map_or(start, |(_, even)| even))
 }
 
 fn listed_names(channels: &ChannelList) -> Vec<String> {
@@ -346,12 +336,8 @@ fn writable_aspect(aspect: f32) -> f32 {
 
 /// Column and row of the first stored pixel in the display window.
 fn data_offset(header: &exr::meta::header::Header) -> [i64; 2] {
-    let stored = header.own_attributes.layer_position;
     let shown = header.shared_attributes.display_window.position;
-    [
-        i64::from(stored.x()) - i64::from(shown.x()),
-        i64::from(stored.y()) - i64::from(shown.y()),
-    ]
+    offset(header.own_attributes.layer_position, shown)
 }
 
 /// `R G B A` first, the rest by name.
@@ -378,10 +364,6 @@ fn text_attributes(header: &exr::meta::header::Header) -> Notes {
     notes
 }
 
-fn are_colors(wanted: Wanted, picked: &[usize]) -> bool {
-    wanted.is_color() && picked.len() >= 3
-}
-
 /// The wanted channels of the part that has them under the best names.
 pub(crate) fn decode(
     bytes: &[u8],
@@ -397,7 +379,7 @@ pub(crate) fn decode(
     let mut names = file.picked_names(part, &picked);
     let reader = file.reader(part, &picked, window, SampleOrder::Interleaved)?;
     let mut samples = reader.read()?;
-    if are_colors(wanted, &picked) {
+    if wanted.is_color() && picked.len() >= 3 {
         convert_colors(&mut samples, &mut names, &file.space())?;
     }
     let stored = file.stored_in(part, window);
@@ -497,9 +479,11 @@ fn convert_colors(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::codec::exr::{Compression, encode, float_samples};
+    use crate::io::codec::exr::{Compression, encode};
     use crate::pixel::{Film, LinearRgb};
-    use exr::prelude::{AnyChannel, AnyChannels, Encoding, Layer, LayerAttributes, WritableImage};
+    use exr::prelude::{
+        AnyChannel, AnyChannels, Encoding, FlatSamples, Layer, LayerAttributes, WritableImage,
+    };
     use std::io::Cursor;
 
     fn notes(n: usize) -> Notes {
@@ -514,7 +498,7 @@ mod tests {
             encode(
                 (2, 1),
                 Canvas::default(),
-                vec![("Z", float_samples(vec![1.0, 2.0]))],
+                vec![("Z", FlatSamples::F32(vec![1.0, 2.0]))],
                 Compression::Zip,
                 &notes(12),
             )
@@ -532,7 +516,7 @@ mod tests {
     fn texts_are_utf_8() {
         let (channel, key, value) = ("grün.Z", "petcomp:größe", "grün, 瓶子");
         let notes = vec![(key.to_owned(), value.to_owned())];
-        let planes = vec![(channel, float_samples(vec![1.0]))];
+        let planes = vec![(channel, FlatSamples::F32(vec![1.0]))];
         let file = encode((1, 1), Canvas::default(), planes, Compression::None, &notes).unwrap();
         for text in [channel, key, value] {
             let mut places = file.windows(text.len());
@@ -551,7 +535,7 @@ mod tests {
             at: [-3, 7],
             pixel_aspect: 2.0,
         };
-        let planes = vec![("Z", float_samples(vec![1.0, 2.0]))];
+        let planes = vec![("Z", FlatSamples::F32(vec![1.0, 2.0]))];
         let file = encode((2, 1), canvas, planes, Compression::Zip, &[]).unwrap();
         let read = header(file.as_slice(), 10_000, &Limits::default()).unwrap();
         assert_eq!((read.canvas, read.data_at), (canvas, [0, 0]));
@@ -568,7 +552,7 @@ mod tests {
     /// ACEScg (0.322761, 0.482919, 0.841329) is Rec. 709 (0.18, 0.5, 0.9), by colour-science.
     #[test]
     fn other_primaries_become_ours() {
-        let plane = |name, v: f32| AnyChannel::new(name, float_samples(vec![v]));
+        let plane = |name, v: f32| AnyChannel::new(name, FlatSamples::F32(vec![v]));
         let list = [
             plane("R", 0.322_761),
             plane("G", 0.482_919),
@@ -630,7 +614,7 @@ mod tests {
             AnyChannels::sort(
                 [AnyChannel::new(
                     "Y",
-                    float_samples(vec![1.0, 2.0, 3.0, 4.0]),
+                    FlatSamples::F32(vec![1.0, 2.0, 3.0, 4.0]),
                 )]
                 .into_iter()
                 .collect(),
@@ -676,11 +660,11 @@ mod tests {
         );
     }
 
-    type FilePart = Layer<AnyChannels<exr::prelude::FlatSamples>>;
+    type FilePart = Layer<AnyChannels<FlatSamples>>;
 
     /// A part of one value, stored in so many pixels from the first of the display window on.
     fn part(name: &str, channels: &[&str], (width, height): (usize, usize)) -> FilePart {
-        let plane = || float_samples(vec![0.5; width * height]);
+        let plane = || FlatSamples::F32(vec![0.5; width * height]);
         let planes = channels.iter().map(|&name| AnyChannel::new(name, plane()));
         Layer::new(
             Vec2(width, height),

@@ -6,10 +6,9 @@ use exr::prelude::FlatSamples;
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 
-/// A run of samples of one channel: where it begins in the part, and the values.
+/// A row of samples of one channel of the part.
 pub(super) struct SampleLine {
     pub(super) channel: usize,
-    pub(super) x: usize,
     pub(super) y: usize,
     pub(super) samples: Vec<f32>,
 }
@@ -31,9 +30,9 @@ pub(super) fn to_floats(bytes: &[u8], kind: SampleType, floats: &mut Vec<f32>) {
     }
 }
 
-/// Floats as halves, rounded to nearest; what is finite stays so, 65504 at most: programs blur and
-/// scale what they read, and one infinite pixel would take its neighbours along.
-fn to_halves(samples: &[f32]) -> Vec<f16> {
+/// Floats to be stored as halves, rounded to nearest; what is finite stays so, 65504 at most:
+/// programs blur and scale what they read, and one infinite pixel would take its neighbours along.
+pub(crate) fn half_samples(samples: &[f32]) -> FlatSamples {
     let mut out = vec![f16::ZERO; samples.len()];
     out.as_mut_slice().convert_from_f32_slice(samples);
     for (half, v) in out.iter_mut().zip(samples) {
@@ -41,15 +40,5 @@ fn to_halves(samples: &[f32]) -> Vec<f16> {
             *half = f16::MAX.copysign(*half);
         }
     }
-    out
-}
-
-/// Samples that are stored as halves.
-pub(crate) fn half_samples(samples: &[f32]) -> FlatSamples {
-    FlatSamples::F16(to_halves(samples))
-}
-
-/// Samples that are stored as floats.
-pub(crate) fn float_samples(samples: Vec<f32>) -> FlatSamples {
-    FlatSamples::F32(samples)
+    FlatSamples::F16(out)
 }

@@ -1,7 +1,6 @@
 //! EXR files of one part.
 
 use super::attributes::{FIRST_ATTRIBUTE, add_texts, sort_attributes, utf8_text};
-use super::parts::check_count;
 use crate::io::header::Canvas;
 use exr::prelude::Compression as Method;
 use exr::prelude::{
@@ -61,21 +60,20 @@ pub(crate) fn encode(
     Ok(bytes)
 }
 
-fn channel_list(
-    size: (usize, usize),
-    planes: Vec<(&str, FlatSamples)>,
+/// Channels by name; fails where there is not one sample for each pixel.
+pub(super) fn channel_list<'a>(
+    (width, height): (usize, usize),
+    planes: impl IntoIterator<Item = (&'a str, FlatSamples)>,
 ) -> Result<AnyChannels<FlatSamples>, String> {
     let mut list = SmallVec::new();
-    for plane in planes {
-        list.push(checked_channel(plane, size)?);
+    for (name, samples) in planes {
+        let count = samples.len();
+        if count != width * height {
+            return Err(format!(
+                "channel {name}: {count} samples, expected {width} x {height}"
+            ));
+        }
+        list.push(AnyChannel::new(utf8_text(name), samples));
     }
     Ok(AnyChannels::sort(list))
-}
-
-fn checked_channel(
-    (name, samples): (&str, FlatSamples),
-    size: (usize, usize),
-) -> Result<AnyChannel<FlatSamples>, String> {
-    check_count(&samples, size).map_err(|e| format!("channel {name}: {e}"))?;
-    Ok(AnyChannel::new(utf8_text(name), samples))
 }

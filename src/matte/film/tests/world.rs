@@ -3,7 +3,6 @@
 //! `_view`, `_mask` and `_plate` pictures.
 
 use super::*;
-use crate::image::Mask;
 use crate::io;
 use crate::matte::{
     KeyOptions, Keying, Screen, TriangulateOptions, Triangulated, screen_color, triangulate,
@@ -88,13 +87,9 @@ impl Truth {
 
     /// The same screen as a board of some other paint.
     fn board(&self, paint: LinearRgb) -> Image<LinearRgb> {
-        let most = self
-            .k
-            .pixels()
-            .iter()
-            .map(|p| p.r.max(p.g).max(p.b))
-            .fold(0.0, f32::max);
-        self.k.map(|p| paint.scale(p.r.max(p.g).max(p.b) / most))
+        let light = self.k.pixels().iter().map(|p| p.max_channel());
+        let most = light.fold(0.0, f32::max);
+        self.k.map(|p| paint.scale(p.max_channel() / most))
     }
 
     /// Mean error of alpha over the object.
@@ -118,7 +113,7 @@ impl Truth {
         } else {
             GREEN
         };
-        let level = |p: LinearRgb| p.r.max(p.g).max(p.b) / other.g.max(other.b);
+        let level = |p: LinearRgb| p.max_channel() / other.g.max(other.b);
         self.k.map(|p| other.scale(level(p)))
     }
 
@@ -141,8 +136,8 @@ impl Truth {
     }
 }
 
-fn free(mask: &Image<Coverage>) -> Mask {
-    crate::matte::screen::screen_pixels(mask)
+fn plate_around(photo: &Image<LinearRgb>, mask: &Image<Coverage>) -> ScreenPlate {
+    ScreenPlate::fit_outside(photo, mask, &PlateOptions::default()).unwrap()
 }
 
 fn plate_error(plate: &ScreenPlate, truth: &Truth) -> f64 {
@@ -161,8 +156,10 @@ fn plate_error(plate: &ScreenPlate, truth: &Truth) -> f64 {
     differs.iter().sum::<f64>() / differs.len() as f64
 }
 
-fn names_in(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap();
+/// Every photo of the folder with its name.
+fn truths() -> impl Iterator<Item = (String, Truth)> {
+    let folder = std::env::var("PETCOMP_WORLD").expect("PETCOMP_WORLD names a folder");
+    let entries = std::fs::read_dir(&folder).unwrap();
     let mut names: Vec<String> = entries
         .filter_map(|e| {
             e.unwrap()
@@ -173,7 +170,10 @@ fn names_in(folder: &Path) -> Vec<String> {
         })
         .collect();
     names.sort();
-    names
+    names.into_iter().map(move |name| {
+        let truth = read(Path::new(&folder), &name);
+        (name, truth)
+    })
 }
 
 /// Paints of boards that tell nothing of film, scene-linear as seen.
@@ -189,16 +189,12 @@ const BOARDS: [[f32; 3]; 6] = [
 #[test]
 #[ignore = "needs a folder of rendered photos, and minutes"]
 fn errors_on_grey_boards() {
-    let folder = std::env::var("PETCOMP_WORLD").expect("PETCOMP_WORLD names a folder");
-    let folder = Path::new(&folder);
     let mut worse = Vec::new();
     for paint in BOARDS.map(LinearRgb::from) {
         let mut rows = Vec::new();
-        for name in names_in(folder) {
-            let truth = read(folder, &name);
+        for (name, truth) in truths() {
             let photo = truth.simulated(&truth.board(paint), 5);
-            let plate =
-                ScreenPlate::fit(&photo, &free(&truth.mask), &PlateOptions::default()).unwrap();
+            let plate = plate_around(&photo, &truth.mask);
             let found = film(&photo, &plate, &truth.mask, &FilmOptions::default()).unwrap();
             let opaque: Image<Film> =
                 photo.zip_map(&truth.mask, |p, m| p.opaque().masked(m).into());
@@ -221,18 +217,14 @@ fn errors_on_grey_boards() {
 #[test]
 #[ignore = "needs a folder of rendered photos, and minutes"]
 fn doubts_follow_errors() {
-    let folder = std::env::var("PETCOMP_WORLD").expect("PETCOMP_WORLD names a folder");
-    let folder = Path::new(&folder);
-    for name in names_in(folder) {
-        let truth = read(folder, &name);
+    for (name, truth) in truths() {
         let other = truth.simulated(&truth.other_screen(), 3);
         for (screen, photo) in [("own", &truth.photo), ("other", &other)] {
-            let plate =
-                ScreenPlate::fit(photo, &free(&truth.mask), &PlateOptions::default()).unwrap();
+            let plate = plate_around(photo, &truth.mask);
             let found = film(photo, &plate, &truth.mask, &FilmOptions::default()).unwrap();
             let (lit, shaded) = (
                 truth.error(&found.film, &truth.v),
-                truth.error(&found.shaded(), &truth.t),
+                truth.error(&shaded(&found.film, &found.transmittance), &truth.t),
             );
             let hue = strongest_channel(plate.color());
             println!(
@@ -246,34 +238,25 @@ fn doubts_follow_errors() {
 #[test]
 #[ignore = "needs a folder of rendered photos, and minutes"]
 fn errors_on_rendered_photos() {
-    let folder = std::env::var("PETCOMP_WORLD").expect("PETCOMP_WORLD names a folder");
-    let folder = Path::new(&folder);
-    let names = names_in(folder);
     let mut rows = Vec::new();
-    for name in &names {
-        let truth = read(folder, name);
+    for (name, truth) in truths() {
         let started = std::time::Instant::now();
-        let plate =
-            ScreenPlate::fit(&truth.photo, &free(&truth.mask), &PlateOptions::default()).unwrap();
+        let plate = plate_around(&truth.photo, &truth.mask);
         let fitted = started.elapsed();
         let one = film(&truth.photo, &plate, &truth.mask, &FilmOptions::default()).unwrap();
         let ms = started.elapsed().as_secs_f64() * 1e3;
         let simulated = truth.simulated(&truth.k, 1);
         let clean = film(&simulated, &plate, &truth.mask, &FilmOptions::default()).unwrap();
         let two = truth.two();
-        let shaded = |t: &Triangulated| {
-            t.film
-                .zip_map(&t.transmittance, |f, t| Film::new(f.color, t))
-        };
         let (paper, paper_clean) = (truth.paper(&truth.photo), truth.paper(&simulated));
         let row = [
             truth.error(&paper, &truth.t),
-            truth.error(&one.shaded(), &truth.t),
+            truth.error(&shaded(&one.film, &one.transmittance), &truth.t),
             truth.error(&paper, &truth.v),
             truth.error(&one.film, &truth.v),
             truth.error(&paper_clean, &truth.t),
-            truth.error(&clean.shaded(), &truth.t),
-            truth.error(&shaded(&two), &truth.t),
+            truth.error(&shaded(&clean.film, &clean.transmittance), &truth.t),
+            truth.error(&shaded(&two.film, &two.transmittance), &truth.t),
             truth.error(&paper_clean, &truth.v),
             truth.error(&clean.film, &truth.v),
             truth.error(&two.film, &truth.v),

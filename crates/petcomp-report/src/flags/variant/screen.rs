@@ -1,9 +1,8 @@
 //! What the screen is, and what lies on it.
 
 use crate::matte::truth::Known;
-use petcomp::{Image, LinearRgb, Mask};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+use crate::matte::{largest_channel, uniform};
+use petcomp::{Image, LinearRgb};
 use std::f64::consts::TAU;
 
 /// The photo on another screen, of which the object hides and shades the same shares.
@@ -35,11 +34,6 @@ fn light_on_screen(photo: LinearRgb, screen: LinearRgb) -> f32 {
     photo[key] / screen[key].max(f32::MIN_POSITIVE)
 }
 
-/// The first of the largest channels.
-fn largest_channel(color: [f32; 3]) -> usize {
-    (1..3).fold(0, |best, c| if color[c] > color[best] { c } else { best })
-}
-
 /// A transmittance below this is opaque.
 const OPAQUE_TRANSMITTANCE: f32 = 0.15;
 /// The smallest share of an object that is painted where it is opaque.
@@ -48,9 +42,11 @@ const MIN_PAINTED_SHARE: f64 = 0.02;
 /// The object with its opaque parts painted in the screen's hue, as bright as they were; nothing
 /// where it has none.
 pub(super) fn hued(known: &Known) -> Option<Image<LinearRgb>> {
-    let opaque = opaque_parts(known);
+    let opaque = known
+        .transmittance
+        .map(|t| t.r.max(t.g).max(t.b) < OPAQUE_TRANSMITTANCE);
     let object = known.mask.pixels().iter().filter(|c| c.0 > 0.5).count();
-    if (count_set(&opaque) as f64) < MIN_PAINTED_SHARE * object as f64 {
+    if (opaque.count() as f64) < MIN_PAINTED_SHARE * object as f64 {
         return None;
     }
     let (w, h) = known.photo.size();
@@ -61,16 +57,6 @@ pub(super) fn hued(known: &Known) -> Option<Image<LinearRgb>> {
             known.photo[(x, y)]
         }
     }))
-}
-
-fn opaque_parts(known: &Known) -> Mask {
-    known
-        .transmittance
-        .map(|t| t.r.max(t.g).max(t.b) < OPAQUE_TRANSMITTANCE)
-}
-
-fn count_set(mask: &Mask) -> usize {
-    mask.pixels().iter().filter(|p| **p).count()
 }
 
 /// A pixel whose foreground has the screen's hue.
@@ -101,12 +87,6 @@ fn screen_light(known: &Known, at: (usize, usize)) -> LinearRgb {
     } else {
         known.transmittance[at] * known.screen[at]
     }
-}
-
-/// Uniform random numbers of 0 to 1.
-fn uniform(seed: u64) -> impl FnMut() -> f64 {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    move || f64::from(rng.next_u32()) / f64::from(u32::MAX)
 }
 
 /// Creases of a screen, how much darker they are and how wide in pixels.

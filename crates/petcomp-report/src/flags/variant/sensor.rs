@@ -1,14 +1,9 @@
 //! What a camera makes of light: noise and codes.
 
 use crate::matte::normal;
-use petcomp::color::{decode_srgb8, encode_srgb8, linear_to_srgb, srgb_to_linear};
+use petcomp::color::{decode_srgb8, encode_srgb8};
 use petcomp::io::{self, Chroma};
 use petcomp::{Image, LinearRgb};
-
-/// A value as a camera of 8 bits stores it.
-pub(super) fn coded(p: LinearRgb) -> LinearRgb {
-    p.map(|v| srgb_to_linear((255.0 * linear_to_srgb(v.clamp(0.0, 1.0))).round() / 255.0))
-}
 
 /// The photo with noise of a standard deviation.
 pub(super) fn noisy(photo: &Image<LinearRgb>, sigma: f32, seed: u64) -> Image<LinearRgb> {
