@@ -31,6 +31,28 @@ pub(crate) trait Shared: Clone {
     fn upgrade(weak: &Self::Weak) -> Option<Self>;
 }
 
+/// What knows how much memory it takes.
+pub(crate) trait InMemory {
+    /// Bytes, always the same.
+    fn bytes(&self) -> usize;
+}
+
+impl<T: InMemory> Shared for Arc<T> {
+    type Weak = Weak<T>;
+
+    fn bytes(&self) -> usize {
+        T::bytes(self)
+    }
+
+    fn downgrade(&self) -> Self::Weak {
+        Arc::downgrade(self)
+    }
+
+    fn upgrade(weak: &Self::Weak) -> Option<Self> {
+        weak.upgrade()
+    }
+}
+
 /// Values by name: those used last stay while they take no more than some bytes, and one of any
 /// size; so do those that somebody else holds, which take no more memory by this.
 #[derive(Debug)]
@@ -140,19 +162,9 @@ pub(crate) fn upgrade_optional<T>(weak: &Option<Weak<T>>) -> Option<Option<Arc<T
 mod tests {
     use super::*;
 
-    impl Shared for Arc<usize> {
-        type Weak = Weak<usize>;
-
+    impl InMemory for usize {
         fn bytes(&self) -> usize {
-            **self
-        }
-
-        fn downgrade(&self) -> Self::Weak {
-            Arc::downgrade(self)
-        }
-
-        fn upgrade(weak: &Self::Weak) -> Option<Self> {
-            weak.upgrade()
+            *self
         }
     }
 

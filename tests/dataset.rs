@@ -918,8 +918,10 @@ fn a_contact_sheet_shows_the_pictures_asked_for() {
     let dir = made(12);
     let six = contact_sheet_of(dir.path(), 6).unwrap();
     let all = contact_sheet_of(dir.path(), 100).unwrap();
-    // Two columns of three, and three of four.
-    assert!(six.width() < all.width() && six.height() < all.height());
+    // Two columns of three, and three of four: of pictures 48 px high with a line below.
+    assert_eq!(all.height() - six.height(), 48 + 4 + 16 + 16);
+    let column = all.width() - six.width();
+    assert_eq!(six.width(), 2 * column - 16 + 2 * 28);
     let orange = petcomp::Srgb8 {
         r: 0xE6,
         g: 0x9F,

@@ -141,7 +141,7 @@ fn made_of(labels: &str, shot: fn(u64) -> Shot) -> tempfile::TempDir {
         inputs: Default::default(),
     };
     plan.writers.extend(setup.writers(&pictures));
-    let options = setup.options();
+    let options = setup.options;
     let sample = |k| sample_of(shot(k), &options);
     generate(&plan, sample, &|_| {}, &AtomicBool::new(false)).unwrap();
     dir

@@ -18,7 +18,8 @@ const BYTES: usize = 12;
 /// One at a time: the mark is everybody's.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// What a call needs at its worst, bytes for each pixel of a picture.
+/// What a call needs at its worst beyond what was there before it, bytes for each pixel of a
+/// picture; none where the system does not tell.
 fn bytes_a_pixel<T>(call: impl FnOnce() -> T) -> Option<f64> {
     Some(memory::peak_growth(call)? as f64 / PIXELS as f64)
 }

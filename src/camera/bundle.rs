@@ -80,11 +80,15 @@ impl Bundle {
         options: &SolveOptions,
     ) -> Result<Self, SolveError> {
         let labels: Vec<&Label> = used.iter().map(|&i| &labels[i]).collect();
-        let mut problems = labels
+        let problems = labels
             .iter()
             .map(|label| Problem::new(label, framing_or(label, unknown), options))
             .collect::<Result<Vec<_>, _>>()?;
         let surface = surfaces_shown(labels.into_iter().zip(&problems));
+        Self::from_problems(problems, surface)
+    }
+
+    fn from_problems(mut problems: Vec<Problem>, surface: Vec<usize>) -> Result<Self, SolveError> {
         share_lens(&mut problems);
         Ok(Self {
             residuals: problems.iter().map(without_shared_priors).collect(),
@@ -541,10 +545,7 @@ fn least<'a>(
 
 /// Priors of the lens, and of each surface's stretch.
 fn shared_priors(problems: &[Problem], surface: &[usize]) -> Option<Vec<Prior>> {
-    let lens = &problems.first()?.residuals.priors;
-    let principal = Prior::at_zero(lens.principal_sigma);
-    // In the order of `LENS_UNKNOWNS`.
-    let mut shared = vec![lens.ln_focal, principal, principal, lens.kappa];
+    let mut shared = lens_priors(&problems.first()?.residuals.priors).to_vec();
     let surfaces = surface.iter().max().map_or(0, |last| last + 1);
     shared.extend((0..surfaces).map(|s| {
         let photos = problems.iter().zip(surface).filter(|&(_, &x)| x == s);
@@ -552,6 +553,12 @@ fn shared_priors(problems: &[Problem], surface: &[usize]) -> Option<Vec<Prior>> 
         Prior::at_zero(least(shown_by, |priors| priors.stretch_sigma))
     }));
     Some(shared)
+}
+
+/// In the order of [`LENS_UNKNOWNS`].
+fn lens_priors(priors: &ParameterPriors) -> [Prior; 4] {
+    let principal = Prior::at_zero(priors.principal_sigma);
+    [priors.ln_focal, principal, principal, priors.kappa]
 }
 
 /// What a photo shows, with flat priors of what is shared.

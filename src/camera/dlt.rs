@@ -16,15 +16,22 @@ pub(crate) fn homography(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<Homogra
     if pairs.len() < 4 {
         return None;
     }
-    let (sources, targets): (Vec<_>, Vec<_>) = pairs.iter().copied().unzip();
-    let (from, to) = (normalisation(&sources)?, normalisation(&targets)?);
-    let rows = pairs
+    let (from, to) = normalisations(pairs)?;
+    let normalized = pairs
         .iter()
-        .flat_map(|(p, q)| equations(&(from * p.to_homogeneous()), &(to * q.to_homogeneous())));
-    let square = rows.map(|row| row * row.transpose()).sum();
+        .map(|(p, q)| (from * p.to_homogeneous(), to * q.to_homogeneous()));
+    let square = normal_matrix(normalized);
     let h = null_vector(square, SINGULAR_EIGENVALUE * pairs.len() as f64)?;
     let map = to.try_inverse()? * Matrix3::from_row_slice(h.as_slice()) * from;
     map.iter().all(|v| v.is_finite()).then_some(Homography(map))
+}
+
+/// The sum of the squares of all equations.
+fn normal_matrix(pairs: impl Iterator<Item = (Vector3<f64>, Vector3<f64>)>) -> SMatrix<f64, 9, 9> {
+    pairs
+        .flat_map(|(p, q)| equations(&p, &q))
+        .map(|row| row * row.transpose())
+        .sum()
 }
 
 /// The two linear equations of a pair of points, one for each coordinate.
@@ -49,6 +56,12 @@ fn null_vector(square: SMatrix<f64, 9, 9>, threshold: f64) -> Option<SVector<f64
         .map(|i| eigen.eigenvalues[i])
         .fold(f64::MAX, f64::min);
     (second > threshold).then(|| eigen.eigenvectors.column(smallest).into())
+}
+
+/// Those of the points on either side of pairs.
+fn normalisations(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<(Matrix3<f64>, Matrix3<f64>)> {
+    let (from, to): (Vec<_>, Vec<_>) = pairs.iter().copied().unzip();
+    Some((normalisation(&from)?, normalisation(&to)?))
 }
 
 /// The map to zero mean and a root mean square distance of sqrt 2.

@@ -2,7 +2,7 @@
 
 use super::exchange::{BlenderCamera, OpencvCamera, matrix_rows};
 use super::focal::FocalSource;
-use super::label::{Framing, Label, LabelImage};
+use super::label::{Framing, Label, LabelImage, version_one};
 use super::label_check::MAX_MAGNITUDE;
 use super::pinhole::{Camera, k1_from_kappa};
 use super::solution::Solution;
@@ -23,6 +23,7 @@ pub struct CameraFile {
     /// What kind of file this is.
     pub format: CameraFormat,
     /// Version of the format: 1.
+    #[serde(deserialize_with = "version_one")]
     pub version: u32,
     /// The label's picture.
     pub image: LabelImage,

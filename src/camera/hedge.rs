@@ -11,17 +11,38 @@ use super::import::place_for_more;
 use super::label::{Framing, Label};
 use super::model::Unknowns;
 use super::options::SolveOptions;
-use super::pinhole::distorted;
+use super::pinhole::{Camera, distorted};
 use super::rectangle::corner_points;
 use super::solution::{Sigma, Solution};
 use super::uncertainty::{grid_at_height, repaired_variance};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::geom::{Point2, Point3, Vector2};
+use crate::geom::{Point2, Point3, Vector2, Vector3};
 use nalgebra::Matrix2;
 
 /// Corners that fit a cropped picture this much better than a whole one belong to a cropped one.
 pub(crate) fn is_off_center(whole: f64, loose: f64) -> bool {
     whole > loose + CHI2_99
+}
+
+/// How far apart two cameras are.
+struct CameraDifference {
+    ln_focal: f64,
+    tilt: f64,
+    center: Vector3<f64>,
+    /// Along one axis, root mean square.
+    principal_px: f64,
+}
+
+impl CameraDifference {
+    fn new(from: &Camera, to: &Camera) -> Self {
+        let principal = to.principal_px - from.principal_px;
+        Self {
+            ln_focal: libm::log(to.focal_px.x / from.focal_px.x),
+            tilt: to.tilt() - from.tilt(),
+            center: to.center() - from.center(),
+            principal_px: principal.norm() / std::f64::consts::SQRT_2,
+        }
+    }
 }
 
 impl Solution {
@@ -93,20 +114,16 @@ impl Solution {
     }
 
     fn sigma_with(&self, loose: &Self, apart: &Unknowns) -> Sigma {
-        let (sigma, from, to) = (&loose.sigma, &self.camera, &loose.camera);
-        let ln_focal = libm::log(to.focal_px.x / from.focal_px.x);
-        let center = to.center() - from.center();
-        let principal = to.principal_px - from.principal_px;
-        // Along one axis, root mean square.
-        let principal_px = principal.norm() / std::f64::consts::SQRT_2;
+        let sigma = &loose.sigma;
+        let off = CameraDifference::new(&self.camera, &loose.camera);
         Sigma {
-            ln_focal: libm::hypot(sigma.ln_focal, ln_focal),
-            tilt: libm::hypot(sigma.tilt, to.tilt() - from.tilt()),
-            center: sigma.center + center * center.transpose(),
+            ln_focal: libm::hypot(sigma.ln_focal, off.ln_focal),
+            tilt: libm::hypot(sigma.tilt, off.tilt),
+            center: sigma.center + off.center * off.center.transpose(),
             corners_px: self.corner_covariances_with(loose),
             reference_height: self.sigma.reference_height,
             height_px: libm::hypot(sigma.height_px, self.height_apart_px(loose)),
-            principal_px: libm::hypot(sigma.principal_px, principal_px),
+            principal_px: libm::hypot(sigma.principal_px, off.principal_px),
             covariance: sigma.covariance + apart * apart.transpose(),
         }
     }

@@ -271,13 +271,12 @@ impl JointSolver<'_> {
     fn estimate_from(&self, used: &[usize], unknown: Framing) -> Result<JointEstimate, SolveError> {
         let bundle = Bundle::new(self.labels, used, unknown, self.options)?;
         let best = bundle.best(self.alone).ok_or(SolveError::NoPose)?;
-        let fits = best.chi2.iter().zip(bundle.degrees_of_freedom());
         Ok(JointEstimate {
             used: used.to_vec(),
             solutions: bundle.solutions(&best, self.options),
             conflict: bundle.focal_conflict(&best),
             states: best.states,
-            fits: fits.map(|(&chi2, dof)| PhotoFit::new(chi2, dof)).collect(),
+            fits: PhotoFit::of_all(&best.chi2, &bundle.degrees_of_freedom()),
             cost: best.cost,
             shared_dof: bundle.shared_degrees_of_freedom(),
             outliers: Vec::new(),
@@ -302,6 +301,11 @@ impl PhotoFit {
             dof,
             probability: chi::exceeds(chi2, dof).unwrap_or(1.0),
         }
+    }
+
+    fn of_all(chi2: &[f64], dof: &[usize]) -> Vec<Self> {
+        let pairs = chi2.iter().zip(dof);
+        pairs.map(|(&chi2, &dof)| Self::new(chi2, dof)).collect()
     }
 
     /// By probability, or where both have too little of it to be told apart, by chi squared per
@@ -334,11 +338,12 @@ impl JointEstimate {
             && (worst_photo(&self.fits).is_some() || self.cost > apart + CHI2_99 * gained as f64)
     }
 
-    /// With a warning about every photo.
+    /// With a warning about every photo, in its own pixels.
     fn warned(mut self, conflict: &FocalConflict) -> Self {
-        let warning = conflict.warning(&self.solutions[0]);
-        let all = self.solutions.iter_mut();
-        all.for_each(|solution| solution.warnings.push(warning.clone()));
+        for solution in &mut self.solutions {
+            let warning = conflict.warning(solution);
+            solution.warnings.push(warning);
+        }
         self
     }
 
@@ -662,6 +667,34 @@ mod tests {
         }
     }
 
+    /// Makes a label that of a photo of a quarter of the size.
+    fn reduce(label: &mut Label) {
+        (label.image.width, label.image.height) = (label.image.width / 4, label.image.height / 4);
+        let surface = &mut label.surface;
+        surface.corners_px = surface.corners_px.map(|c| c.map(|p| p.map(|v| v / 4.0)));
+        surface.corner_sigma_px = surface.corner_sigma_px.map(|s| s / 4.0);
+    }
+
+    #[test]
+    fn a_warning_about_photos_of_several_sizes_is_in_the_pixels_of_each() {
+        let (mut labels, focal) = labels(1, 6, [10.0, 30.0]);
+        let equivalent = 1.5 * focal / 5000.0 * 36f64.hypot(24.0);
+        labels
+            .iter_mut()
+            .for_each(|l| l.camera.focal_35mm = Some(equivalent));
+        labels[3..].iter_mut().for_each(reduce);
+        let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
+        let shares = [1.5, 1.5, 1.5, 0.375, 0.375, 0.375];
+        for (photo, share) in joint.photos.iter().zip(shares) {
+            let solution = photo.as_ref().unwrap();
+            let mut warnings = solution.warnings.iter();
+            let conflict = warnings.find(|w| w.code == Code::FocalPriorConflict);
+            let (focal_px, exif_px) = (solution.camera.focal_px.x, share * focal);
+            let told = format!("the corners give {focal_px:.0} px, EXIF data {exif_px:.0} px");
+            assert!(conflict.unwrap().message.contains(&told), "{conflict:?}");
+        }
+    }
+
     #[test]
     fn one_photo_alone_is_solved_as_alone() {
         let (labels, _) = labels(2, 1, [20.0, 20.0]);
@@ -817,13 +850,7 @@ mod tests {
         labels[0].camera.principal_point_px = Some([2010.0, 1490.0]);
         let together = solve_joint(&labels, &SolveOptions::default()).unwrap();
         let mut reduced = labels.clone();
-        for label in &mut reduced[3..] {
-            (label.image.width, label.image.height) =
-                (label.image.width / 4, label.image.height / 4);
-            let surface = &mut label.surface;
-            surface.corners_px = surface.corners_px.map(|c| c.map(|p| p.map(|v| v / 4.0)));
-            surface.corner_sigma_px = surface.corner_sigma_px.map(|s| s / 4.0);
-        }
+        reduced[3..].iter_mut().for_each(reduce);
         assert_eq!(group_by_camera(&reduced), [vec![0, 1, 2, 3, 4, 5]]);
         let scaled = solve_joint(&reduced, &SolveOptions::default()).unwrap();
         for (i, (a, b)) in together.photos.iter().zip(&scaled.photos).enumerate() {

@@ -443,7 +443,7 @@ fn is_missing(value: &Value, key: &str) -> bool {
     value.pointer(key).is_none_or(Value::is_null)
 }
 
-fn version_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+pub(super) fn version_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
     match u32::deserialize(deserializer)? {
         1 => Ok(1),
         other => Err(D::Error::custom(format!("{other}, expected 1"))),

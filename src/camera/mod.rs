@@ -89,7 +89,7 @@ pub use read::read_label;
 pub use read::{
     LabelledPhoto, check_distance, check_size, is_called_camera, read_labels, with_photo,
 };
-pub(crate) use read::{apply_exif, check_camera_distance, labels_in};
+pub(crate) use read::{apply_exif, check_camera_distance, labels_beside, labels_in};
 pub(crate) use rectangle::square_from_corners;
 pub use rectify::warp;
 #[doc(hidden)]

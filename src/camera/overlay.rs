@@ -232,12 +232,19 @@ impl OverlayDrawing {
             drawing.line(line, GRID_COLOR, GRID_WEIGHT);
         }
         drawing.draw_box(solution.size, solution.sigma.reference_height);
-        let zoom = width as f64 / f64::from(solution.camera.image[0].max(1));
-        for (corner, covariance) in solution.corners_px.iter().zip(&solution.sigma.corners_px) {
-            drawing.cross(corner * zoom);
-            drawing.ellipse(corner * zoom, &(covariance * zoom * zoom));
-        }
+        drawing.draw_corners(solution);
         drawing
+    }
+
+    /// The labelled corners and their error ellipses.
+    fn draw_corners(&mut self, solution: &Solution) {
+        let [from, to] = [&solution.camera, &self.camera]
+            .map(|camera| Vector2::from(camera.image.map(|side| f64::from(side.max(1)))));
+        let zoom = Matrix2::from_diagonal(&to.component_div(&from));
+        for (corner, covariance) in solution.corners_px.iter().zip(&solution.sigma.corners_px) {
+            self.cross(zoom * corner);
+            self.ellipse(zoom * corner, &(zoom * covariance * zoom));
+        }
     }
 
     /// The rectangle, and a box of some height over it.
@@ -414,6 +421,21 @@ mod tests {
         }
         // Lines are 3 pixels wide.
         assert!(farthest > 4.0, "{farthest}");
+    }
+
+    #[test]
+    fn labelled_corners_are_marked_on_a_photo_of_another_shape() {
+        let solution = tilted();
+        let drawn = overlay(&Image::filled(200, 300, LinearRgb::BLACK), &solution);
+        let is_mark = |p: LinearRgb| p.r > 0.3 && p.g < 0.1 * p.r && p.b > 0.3 * p.r;
+        let pixels = (0..300).flat_map(|y| (0..200).map(move |x| (x, y)));
+        let marks: Vec<(usize, usize)> = pixels.filter(|&at| is_mark(drawn[at])).collect();
+        for corner in solution.corners_px {
+            let shown = Point2::new(corner.x / 2.0, corner.y);
+            let off_px = |(x, y): (usize, usize)| (Point2::new(x as f64, y as f64) - shown).norm();
+            let near = marks.iter().filter(|&&at| off_px(at) < 6.0);
+            assert!(near.count() >= 4, "{shown}: {marks:?}");
+        }
     }
 
     #[test]

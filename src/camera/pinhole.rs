@@ -199,6 +199,16 @@ mod tests {
     use crate::camera::tilted_camera;
     use crate::geom::Plane;
 
+    /// Turned about all three axes.
+    fn rolled_camera() -> Camera {
+        let level = tilted_camera();
+        let roll = UnitQuaternion::from_euler_angles(0.0, 0.0, 0.7);
+        Camera {
+            camera_from_world: roll * level.camera_from_world,
+            ..level
+        }
+    }
+
     #[test]
     #[should_panic(expected = "height: -1, expected above 0 (metres)")]
     fn no_camera_below_the_surface_looks_down() {
@@ -207,22 +217,22 @@ mod tests {
 
     #[test]
     fn a_pixel_s_ray_projects_back_to_it() {
-        let cam = tilted_camera();
-        let px = Point2::new(123.4, 321.0);
+        let cam = rolled_camera();
+        let px = Point2::new(123.4, 32.1);
         let (back, depth) = cam.project(cam.ray(px).at(0.8)).expect("in front");
         assert!((back - px).norm() < 1e-10 && (depth - 0.8).abs() < 1e-12);
     }
 
     #[test]
     fn the_homography_agrees_with_projection() {
-        let cam = tilted_camera();
+        let cam = rolled_camera();
         let (px, _) = cam.project(Point3::new(0.2, -0.1, 0.0)).expect("in front");
         assert!((cam.pixel_from_surface().map(Point2::new(0.2, -0.1)) - px).norm() < 1e-10);
     }
 
     #[test]
     fn resizing_keeps_the_view() {
-        let (cam, p) = (tilted_camera(), Point3::new(0.1, 0.05, 0.02));
+        let (cam, p) = (rolled_camera(), Point3::new(0.1, 0.05, 0.02));
         let half = cam.resized([80, 60]);
         let (a, b) = (
             cam.project(p).expect("in front").0,
@@ -233,7 +243,7 @@ mod tests {
 
     #[test]
     fn tilt_is_measured_from_straight_down() {
-        let cam = tilted_camera();
+        let cam = rolled_camera();
         let ray = cam.ray(cam.principal_px);
         assert!(Plane::surface().intersect(&ray).is_some());
         let cos = ray.direction.normalize().dot(&-Vector3::z());

@@ -3,7 +3,7 @@
 use super::error::SolveError;
 use super::focal::plausible_equivalents;
 use super::import::{self, Annotation};
-use super::label::Label;
+use super::label::{Label, LabelImage};
 use super::pinhole::Camera;
 use super::solution::Solution;
 use crate::bounds::{CAMERA, SURFACE, number};
@@ -150,9 +150,34 @@ fn labels_of(
 /// # Errors
 /// As [`read_labels`]; a folder that cannot be read; a photo that is labelled twice.
 pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<LabelledPhoto>> {
+    labels_or(folder, size, |_, error| Err(error))
+}
+
+/// The same where one photo alone is asked for: files that cannot be used are left out, but for the
+/// one that is called as it is.
+pub(crate) fn labels_beside(
+    name: &str,
+    folder: &Path,
+    size: Option<[f64; 2]>,
+) -> Result<Vec<LabelledPhoto>> {
+    labels_or(folder, size, |path, error| {
+        if label_name(path) == name {
+            return Err(error);
+        }
+        log::info!("{error}; left out");
+        Ok(Some(Vec::new()))
+    })
+}
+
+/// The labels of a folder, and what is to be had in place of those of a file that cannot be used.
+fn labels_or(
+    folder: &Path,
+    size: Option<[f64; 2]>,
+    instead: impl Fn(&Path, Error) -> Result<Option<Vec<LabelledPhoto>>>,
+) -> Result<Vec<LabelledPhoto>> {
     let mut all: Vec<LabelledPhoto> = Vec::new();
     for path in label_paths(folder)? {
-        match labels_if_any(&path, size)? {
+        match labels_if_any(&path, size).or_else(|error| instead(&path, error))? {
             Some(labels) => all.extend(labels),
             None => log::info!("{}: no label", path.display()),
         }
@@ -189,9 +214,10 @@ fn push_new(found: &mut Vec<LabelledPhoto>, labelled: LabelledPhoto) -> Result<(
 
 /// The files of a folder that may hold labels, in order of name.
 fn label_paths(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let entries = std::fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
+    let entries = entries.map_err(|e| Error::file(folder, e))?;
     let mut paths: Vec<PathBuf> = entries
-        .flatten()
+        .iter()
         .map(|entry| entry.path())
         .filter(|path| may_be_label(path))
         .collect();
@@ -336,8 +362,7 @@ fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto>
         .and_then(|_| annotation.label())
         .map_err(|e| e.within(&file).in_file(path))?;
     if annotation.size.is_none() {
-        let header = io::read_header(path.with_file_name(&file))?;
-        (label.image.width, label.image.height) = (header.width as u32, header.height as u32);
+        fill_in_size(&mut label.image, &path.with_file_name(&file))?;
     }
     label.image.file = file;
     Ok(LabelledPhoto {
@@ -346,6 +371,13 @@ fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto>
         name,
         is_ours: false,
     })
+}
+
+/// Takes over the size of the label's photo.
+fn fill_in_size(image: &mut LabelImage, photo: &Path) -> Result<()> {
+    let header = io::read_header(photo)?;
+    (image.width, image.height) = (header.width as u32, header.height as u32);
+    Ok(())
 }
 
 /// The name of an annotation's photo: the first that is there, in or below the folder or directly
@@ -607,6 +639,23 @@ pub(super) mod tests {
         let found = labels_in(folder.path(), None).unwrap();
         let names: Vec<&str> = found.iter().map(|one| one.name.as_str()).collect();
         assert_eq!(names, ["a", "b", "c"]);
+    }
+
+    #[test]
+    fn a_file_that_is_no_label_stands_in_the_way_of_its_own_photo_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let [label] = labels_of_photos(["a.jpg"]);
+        io::write_json(folder.path().join("a.label.json"), &label).unwrap();
+        std::fs::write(folder.path().join("b.label.json"), "{").unwrap();
+        let found = labels_beside("a", folder.path(), None).unwrap();
+        assert_eq!((found.len(), found[0].name.as_str()), (1, "a"));
+        for refused in [
+            labels_beside("b", folder.path(), None),
+            labels_in(folder.path(), None),
+        ] {
+            let told = refused.unwrap_err().to_string();
+            assert!(told.contains("b.label.json: "), "{told}");
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::focal::PriorSource;
 use super::hedge::is_off_center;
 use super::label::{Framing, Label};
 use super::options::{CornerOrder, SolveOptions};
+use super::pinhole::diagonal_px;
 use super::problem::Problem;
 use super::refine::Minimum;
 use super::search::{SearchResult, degrees_apart};
@@ -35,7 +36,8 @@ const GROSS_FOCAL_RATIO: f64 = 1.8;
 /// A camera that does not fit its label is returned, too: [`Solution::fitting`] refuses it.
 /// # Errors
 /// [`SolveError`], for labels that no camera can have seen. A view from straight above is not an
-/// error. # Examples
+/// error.
+/// # Examples
 /// ```
 /// # use petcomp::camera::{self, Label};
 /// // A rectangle of 0.6 m x 0.4 m from 0.8 m away, tilted by 30 degrees.
@@ -217,7 +219,8 @@ impl Solution {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FocalConflict {
     source: PriorSource,
-    prior_px: f64,
+    /// The focal length that was expected, in half diagonals of the picture.
+    prior_half_diagonals: f64,
     /// How far apart the two are, in standard deviations of the difference.
     sigmas: f64,
     /// The label states the camera's height, from which the focal length follows, too.
@@ -230,7 +233,7 @@ impl FocalConflict {
         let prior = problem.residuals.priors.ln_focal;
         let conflict = Self {
             source: problem.prior_source,
-            prior_px: problem.units.focal_px(prior.mean),
+            prior_half_diagonals: libm::exp(prior.mean),
             sigmas: focal.prior_conflict(prior)?.abs(),
             has_height: !problem.residuals.priors.ln_height.is_flat(),
         };
@@ -244,15 +247,18 @@ impl FocalConflict {
 
     /// A solution without the prior is farther from it than a wrong EXIF value alone explains.
     fn is_gross(&self, without: &Solution) -> bool {
-        let ratio = without.camera.focal_px.x / self.prior_px;
+        let ratio = without.camera.focal_px.x / self.prior_px(without);
         libm::log(ratio).abs() > libm::log(GROSS_FOCAL_RATIO)
+    }
+
+    /// The focal length that was expected, in pixels of a solution's picture.
+    fn prior_px(&self, solution: &Solution) -> f64 {
+        self.prior_half_diagonals * diagonal_px(solution.camera.image) / 2.0
     }
 
     /// With the solution without the EXIF value, or else with the one that is taken.
     pub(super) fn warning(&self, solution: &Solution) -> Diagnostic {
-        let Self {
-            prior_px, sigmas, ..
-        } = *self;
+        let (prior_px, sigmas) = (self.prior_px(solution), self.sigmas);
         let focal_px = solution.camera.focal_px.x;
         let [source, causes] = source_and_causes(self.source);
         // What the corners give alone is known only where a solution goes by them alone: beside a

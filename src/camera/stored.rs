@@ -457,7 +457,8 @@ mod tests {
         let desk = Desk::new();
         let labelled = desk.write(&desk.label(0));
         type Edit = fn(&mut CameraFile);
-        let edits: [(Edit, &str); 6] = [
+        let edits: [(Edit, &str); 7] = [
+            (|f| f.version = 2, "version: 2, expected 1"),
             (
                 |f| f.image.width = 1,
                 "image: 1 x 3000 pixels, expected 4000 x 3000",

@@ -187,19 +187,25 @@ fn covariance(information: &Square) -> (Square, f64) {
     inverse[(LN_FOCAL, LN_FOCAL)] = 0.0;
     let mut response = -(inverse * coupling);
     let own = f64::from(information[(LN_FOCAL, LN_FOCAL)] > 0.0);
-    // On the focal length, when all else answers to it.
-    let left = (own + coupling.dot(&response)).max(0.0);
+    let left = information_left(own, &coupling, &response);
     if own > 0.0 {
         response[LN_FOCAL] = 1.0;
         inverse += response * response.transpose() / left.max(ROUNDING_SHARE);
     }
-    for i in (0..UNKNOWNS).filter(|&i| information[(i, i)] == 0.0) {
-        clear_unknown(&mut inverse, i);
-    }
+    clear_uninformed(&mut inverse, information);
     (
-        inverse.component_mul(&(scale * scale.transpose())),
+        unscaled(&inverse, &scale),
         unscaled_information(left, scale[LN_FOCAL]),
     )
+}
+
+/// On the focal length, when all else answers to it.
+fn information_left(own: f64, coupling: &Unknowns, response: &Unknowns) -> f64 {
+    (own + coupling.dot(response)).max(0.0)
+}
+
+fn unscaled(covariance: &Square, scale: &Unknowns) -> Square {
+    covariance.component_mul(&(scale * scale.transpose()))
 }
 
 /// Information in an unknown's own unit; zero where there is only rounding.
@@ -226,6 +232,13 @@ fn inverse_or_rounded(matrix: &Square) -> Option<Square> {
         .cholesky()
         .or_else(|| (matrix + Square::identity() * ROUNDING_SHARE).cholesky())
         .map(|c| c.inverse())
+}
+
+/// No variance for unknowns without information.
+fn clear_uninformed(covariance: &mut Square, information: &Square) {
+    for i in (0..UNKNOWNS).filter(|&i| information[(i, i)] == 0.0) {
+        clear_unknown(covariance, i);
+    }
 }
 
 /// With a unit diagonal, also where there is no information.

@@ -10,7 +10,7 @@
 
 use super::display::Display;
 use super::stripes::{SeenStripes, Wave};
-use super::view::{View, where_set};
+use super::view::View;
 use crate::image::{Image, Mask};
 use crate::matte::LightPath;
 use crate::pixel::Coverage;
@@ -233,12 +233,16 @@ impl BendInput<'_> {
 
     /// Amplitude of stripes on the empty display, as a share of its light.
     fn contrast(&self, period: usize, axis: usize) -> f32 {
-        let waves = &self.seen.waves[period][axis];
-        let shares = waves.zip_map(self.light, |wave, light| wave.amplitude / light.max(1e-6));
-        let free = self
-            .free
-            .zip_map(&self.seen.consistent, |free, consistent| free && consistent);
-        median(where_set(&shares, &free), f32::total_cmp).unwrap_or(0.5)
+        let waves = self.seen.waves[period][axis].pixels();
+        let shares = self
+            .free_pixels()
+            .map(|i| waves[i].amplitude / self.light.pixels()[i].max(1e-6));
+        median(shares, f32::total_cmp).unwrap_or(0.5)
+    }
+
+    fn free_pixels(&self) -> impl Iterator<Item = usize> {
+        let [free, consistent] = [self.free, &self.seen.consistent].map(Image::pixels);
+        (0..free.len()).filter(move |&i| free[i] && consistent[i])
     }
 }
 

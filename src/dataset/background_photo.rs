@@ -94,14 +94,14 @@ impl BackgroundPhoto {
         Ok(places)
     }
 
-    /// The labelled photo of this name alone, whose camera only is found; all of them where none
-    /// has it.
+    /// The labelled photo of this name alone, whose label and camera only have to be right; all of
+    /// them where none has it.
     pub(crate) fn named(
         name: &str,
         folder: &Path,
         options: BackgroundOptions,
     ) -> Result<Vec<Self>> {
-        let labels = camera::labels_in(folder, options.surface_size)?;
+        let labels = camera::labels_beside(name, folder, options.surface_size)?;
         let Some(labelled) = labels.iter().find(|labelled| labelled.name == name) else {
             return Self::all(folder, options);
         };
@@ -125,9 +125,14 @@ impl BackgroundPhoto {
         Ok(places)
     }
 
-    /// All that the photos of a folder are read from, those too that were not opened.
-    pub(crate) fn files_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<PathBuf>> {
-        let labels = camera::labels_in(folder, size)?;
+    /// All that the labelled photo of this name and the others of its folder are read from, those
+    /// too that were not opened.
+    pub(crate) fn files_beside(
+        name: &str,
+        folder: &Path,
+        size: Option<[f64; 2]>,
+    ) -> Result<Vec<PathBuf>> {
+        let labels = camera::labels_beside(name, folder, size)?;
         let files = labels.iter().flat_map(|labelled| {
             let photo = labelled.photo();
             let front = photo.as_deref().and_then(front_beside);

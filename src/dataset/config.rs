@@ -332,7 +332,7 @@ mod tests {
     fn examples() -> Vec<String> {
         let mut examples: Vec<_> = told_keys()
             .filter(|told| told.is_example)
-            .map(|told| format!("{} = {}", told.path, told.shown))
+            .map(|told| format!("{} = {}", told.path, told.value))
             .collect();
         examples.sort();
         examples

@@ -14,6 +14,7 @@ use crate::label::overlay::{UNLABELLED, draw_labels};
 use crate::label::{Labels, ObjectLabel};
 use crate::pixel::{LinearRgb, ObjectId, Srgb8};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::path::Path;
 
 const PAPER: Srgb8 = draw::rgb(0x1C, 0x1E, 0x22);
@@ -60,13 +61,17 @@ impl ContactTile {
 }
 
 /// The picture no wider than `width`.
-pub(super) fn shrunk(picture: &Image<LinearRgb>, width: usize) -> Image<LinearRgb> {
+pub(super) fn shrunk(
+    picture: Cow<'_, Image<LinearRgb>>,
+    width: usize,
+) -> Cow<'_, Image<LinearRgb>> {
     let (w, h) = picture.size();
     let width = width.clamp(1, w.max(1));
     if width >= w {
-        return picture.clone();
+        return picture;
     }
-    resize(picture, width, (h * width).div_ceil(w.max(1)).max(1))
+    let height = (h * width).div_ceil(w.max(1)).max(1);
+    Cow::Owned(resize(&picture, width, height))
 }
 
 /// Lays out pictures in rows, each with its boxes and a caption, under a legend of the classes.
@@ -104,7 +109,7 @@ fn read_tile(folder: &Path, line: &JournalLine, labelling: Labelling) -> Result<
     let record: SampleRecord = io::read_json(line.file(folder, "scenes/")?)?;
     let record = record.into_labelled(labelling);
     Ok(ContactTile {
-        picture: shrunk(&picture, PICTURE_WIDTH_PX),
+        picture: shrunk(Cow::Owned(picture), PICTURE_WIDTH_PX).into_owned(),
         caption: tile_caption(line, &record),
         labels: record.labels,
         labelled: record.labelled,
@@ -314,7 +319,7 @@ mod tests {
     #[test]
     fn a_small_picture_is_not_made_larger() {
         let picture = Image::filled(40, 30, LinearRgb::WHITE);
-        let size = |width| shrunk(&picture, width).size();
+        let size = |width| shrunk(Cow::Borrowed(&picture), width).size();
         assert_eq!((size(320), size(20)), ((40, 30), (20, 15)));
     }
 

@@ -54,6 +54,16 @@ impl DatasetCounts {
         self.objects.saturating_sub(self.labelled)
     }
 
+    /// Objects that got no label though nothing lies over them, or it would not matter: too much of
+    /// them lies outside of the picture, or nothing of them is seen.
+    pub fn left_out(&self) -> u64 {
+        let accounted = match self.policy {
+            Obstructed::Drop | Obstructed::Ignore => self.labelled + self.obstructed,
+            Obstructed::Keep | Obstructed::Class => self.labelled,
+        };
+        self.objects.saturating_sub(accounted)
+    }
+
     /// Counts what the lines of a plan's journal say; `made` of the `asked` images are this run's.
     pub(crate) fn new(lines: &[JournalLine], plan: &Plan, asked: u64, made: u64) -> Self {
         let classes = ClassCount::for_classes(&plan.classes, lines);
@@ -131,4 +141,27 @@ fn sum_of(lines: &[JournalLine], count: fn(&JournalLine) -> u32) -> u64 {
 /// The sums of counts by part.
 pub(super) fn sum_by_part(counts: impl Iterator<Item = [u64; 2]>) -> [u64; 2] {
     counts.fold([0; 2], |sums, counts| [0, 1].map(|i| sums[i] + counts[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_object_is_labelled_obstructed_or_left_out() {
+        let left_out = |policy, labelled| {
+            let counts = DatasetCounts {
+                objects: 10,
+                labelled,
+                obstructed: 3,
+                policy,
+                ..DatasetCounts::default()
+            };
+            counts.left_out()
+        };
+        assert_eq!(left_out(Obstructed::Drop, 5), 2);
+        assert_eq!(left_out(Obstructed::Ignore, 5), 2);
+        assert_eq!(left_out(Obstructed::Keep, 8), 2);
+        assert_eq!(left_out(Obstructed::Class, 8), 2);
+    }
 }

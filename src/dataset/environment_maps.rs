@@ -5,9 +5,9 @@ use crate::dataset::DatasetConfig;
 use crate::dataset::known_files::KnownFiles;
 use crate::error::{Error, Result};
 use crate::io;
-use crate::lru::{LruCache, Shared};
+use crate::lru::{InMemory, LruCache};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 
 /// Bytes of pictures that are kept.
 const KEPT_BYTES: usize = 1 << 30;
@@ -89,19 +89,9 @@ impl EnvironmentMaps {
     }
 }
 
-impl Shared for Arc<Panorama> {
-    type Weak = Weak<Panorama>;
-
+impl InMemory for Panorama {
     fn bytes(&self) -> usize {
         size_of_val(self.image().pixels())
-    }
-
-    fn downgrade(&self) -> Self::Weak {
-        Arc::downgrade(self)
-    }
-
-    fn upgrade(weak: &Self::Weak) -> Option<Self> {
-        weak.upgrade()
     }
 }
 

@@ -37,7 +37,7 @@ pub(super) fn fingerprint(
     Ok(json!({
         "scene": scene,
         "render": render,
-        "label": labels.options(),
+        "label": labels.options,
         "assets": assets,
         "backgrounds": of_places(places, inputs)?,
         "notes": notes(places),

@@ -5,7 +5,7 @@ use crate::dataset::label_table::LabelTable;
 use crate::dataset::{Coco, Layers, Mot, Obstructed, Pictures, Voc, WebDataset, Writer, Yolo};
 use crate::error::{Error, Result};
 use crate::geom::BBox;
-use crate::label::{AmodalBox, LabelOptions, ObjectLabel, ObstructionRule, OutlineKind, RleMask};
+use crate::label::{LabelOptions, ObjectLabel, RleMask};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -16,20 +16,9 @@ pub struct LabelConfig {
     /// What happens to the labels of obstructed objects: `drop`, `keep`, `ignore` or `class`.
     /// Default: `drop`, as in the paper.
     pub obstructed: Obstructed,
-    /// When an object is obstructed: the key `overlap_iou` or the key `min_visible`. Default:
-    /// `overlap_iou = 0`, when another lies over it, any overlap.
-    pub obstruction: ObstructionRule,
-    /// An object has no label when more than this share of its outline lies outside of the picture,
-    /// 0 to 1; truncation and the box of the whole outline are then told as well. Default: none.
-    pub max_truncation: Option<f64>,
-    /// A pixel belongs to an object when more than this share of it is covered, 0 to less than 1.
-    /// Default: 0.1.
-    pub alpha_threshold: f32,
-    /// What an amodal box is drawn around: `mask` or `outline`. Default: `mask`.
-    pub amodal: AmodalBox,
-    /// What is taken for the outline of an object: `hull` or `mask`. Default: `hull`, as in the
-    /// paper.
-    pub outline: OutlineKind,
+    /// How objects are labelled: the keys `overlap_iou` or `min_visible`, `max_truncation`,
+    /// `alpha_threshold`, `amodal` and `outline`.
+    pub options: LabelOptions,
     /// How far polygons (YOLO's `segment`, COCO's `polygon`) may be from the border of a mask,
     /// pixels: fewer corners. Default: 0, along the edges of pixels.
     pub simplify: f64,
@@ -100,20 +89,9 @@ impl Extent {
 
 impl Default for LabelConfig {
     fn default() -> Self {
-        let LabelOptions {
-            amodal,
-            outline,
-            alpha_threshold,
-            max_truncation,
-            obstruction,
-        } = LabelOptions::default();
         Self {
             obstructed: Obstructed::default(),
-            obstruction,
-            max_truncation,
-            alpha_threshold,
-            amodal,
-            outline,
+            options: LabelOptions::default(),
             simplify: 0.0,
             formats: vec![Format::Yolo],
             yolo: Yolo::default(),
@@ -130,26 +108,16 @@ impl LabelConfig {
     /// # Errors
     /// [`Error::Value`](crate::Error::Value) for the first number that cannot be right.
     pub fn check(&self) -> Result<()> {
-        self.obstruction.check()?;
+        let options = &self.options;
+        options.obstruction.check()?;
         let share = Bounds::new(0.0, 1.0, "a share");
-        if let Some(max) = self.max_truncation {
+        if let Some(max) = options.max_truncation {
             share.check("max_truncation", max)?;
         }
-        check_threshold(self.alpha_threshold)?;
+        check_threshold(options.alpha_threshold)?;
         Bounds::new(0.0, 1000.0, "pixels").check("simplify", self.simplify)?;
         Bounds::new(1.0, 1e6, "samples in an archive")
             .check("webdataset.samples", self.webdataset.samples as f64)
-    }
-
-    /// How labels are made.
-    pub fn options(&self) -> LabelOptions {
-        LabelOptions {
-            amodal: self.amodal,
-            outline: self.outline,
-            alpha_threshold: self.alpha_threshold,
-            max_truncation: self.max_truncation,
-            obstruction: self.obstruction,
-        }
     }
 
     /// The writers of the layouts, each once, in the order in which [`Format`] lists them:
@@ -202,7 +170,7 @@ impl LabelConfig {
                 ..self.mot
             }),
             Format::Layers => Arc::new(Layers {
-                alpha_threshold: self.alpha_threshold,
+                alpha_threshold: self.options.alpha_threshold,
                 ..self.layers
             }),
             Format::WebDataset => Arc::new(self.webdataset),
@@ -312,10 +280,5 @@ mod tests {
             Extent::Visible
         );
         assert_eq!(extent("yolo = { boxes = 'visible' }"), Extent::Visible);
-    }
-
-    #[test]
-    fn the_defaults_of_the_table_are_those_of_the_labels() {
-        assert_eq!(LabelConfig::default().options(), LabelOptions::default());
     }
 }

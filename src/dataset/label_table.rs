@@ -1,7 +1,7 @@
 //! The table `[labels]` as files have it: one rule, of which each variant has a key of its own.
 
 use crate::dataset::{Coco, Format, LabelConfig, Layers, Mot, Obstructed, Voc, WebDataset, Yolo};
-use crate::label::{AmodalBox, OutlineKind, RuleInFile};
+use crate::label::{AmodalBox, LabelOptions, OutlineKind, RuleInFile};
 use serde::{Deserialize, Serialize};
 
 /// A [`LabelConfig`] by the keys of a file.
@@ -48,15 +48,22 @@ impl Default for LabelTable {
 
 impl From<LabelConfig> for LabelTable {
     fn from(config: LabelConfig) -> Self {
-        let rule = RuleInFile::from(config.obstruction);
+        let LabelOptions {
+            amodal,
+            outline,
+            alpha_threshold,
+            max_truncation,
+            obstruction,
+        } = config.options;
+        let rule = RuleInFile::from(obstruction);
         Self {
             obstructed: config.obstructed,
             overlap_iou: rule.overlap_iou,
             min_visible: rule.min_visible,
-            max_truncation: config.max_truncation,
-            alpha_threshold: config.alpha_threshold,
-            amodal: config.amodal,
-            outline: config.outline,
+            max_truncation,
+            alpha_threshold,
+            amodal,
+            outline,
             simplify: config.simplify,
             formats: config.formats,
             yolo: config.yolo,
@@ -78,12 +85,14 @@ impl TryFrom<LabelTable> for LabelConfig {
             min_visible: table.min_visible,
         };
         Ok(Self {
-            obstruction: rule.try_into()?,
             obstructed: table.obstructed,
-            max_truncation: table.max_truncation,
-            alpha_threshold: table.alpha_threshold,
-            amodal: table.amodal,
-            outline: table.outline,
+            options: LabelOptions {
+                amodal: table.amodal,
+                outline: table.outline,
+                alpha_threshold: table.alpha_threshold,
+                max_truncation: table.max_truncation,
+                obstruction: rule.try_into()?,
+            },
             simplify: table.simplify,
             formats: table.formats,
             yolo: table.yolo,
@@ -121,7 +130,7 @@ mod tests {
         let config: LabelConfig = toml::from_str("min_visible = 0.97").unwrap();
         let rule = ObstructionRule::Visibility { min_visible: 0.97 };
         assert_eq!(
-            (config.options().obstruction, config.check().is_ok()),
+            (config.options.obstruction, config.check().is_ok()),
             (rule, true)
         );
         assert!(!written(&config).contains("overlap_iou"));

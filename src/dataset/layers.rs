@@ -183,27 +183,68 @@ fn nearest(samples: &[DeepSample], threshold: f32) -> f32 {
         .map_or(f32::INFINITY, |sample| sample.depth.0)
 }
 
-/// A channel of an object: its layer and name, how a sample gives its value, and what it is where
-/// the object is not.
-type ObjectChannel = (&'static str, &'static str, fn(&DeepSample) -> f32, f32);
+/// One channel of an object.
+struct ObjectChannel {
+    layer: &'static str,
+    name: &'static str,
+    value: fn(&DeepSample) -> f32,
+    /// Where the object is not.
+    none: f32,
+}
 
 const OBJECT_CHANNELS: [ObjectChannel; 6] = [
-    ("object", "R", |s| s.light.r, 0.0),
-    ("object", "G", |s| s.light.g, 0.0),
-    ("object", "B", |s| s.light.b, 0.0),
-    ("object", "A", |s| s.visible, 0.0),
-    ("object", "Z", |s| s.depth.0, f32::INFINITY),
-    ("amodal", "A", |s| s.alpha, 0.0),
+    ObjectChannel {
+        layer: "object",
+        name: "R",
+        value: |s| s.light.r,
+        none: 0.0,
+    },
+    ObjectChannel {
+        layer: "object",
+        name: "G",
+        value: |s| s.light.g,
+        none: 0.0,
+    },
+    ObjectChannel {
+        layer: "object",
+        name: "B",
+        value: |s| s.light.b,
+        none: 0.0,
+    },
+    ObjectChannel {
+        layer: "object",
+        name: "A",
+        value: |s| s.visible,
+        none: 0.0,
+    },
+    ObjectChannel {
+        layer: "object",
+        name: "Z",
+        value: |s| s.depth.0,
+        none: f32::INFINITY,
+    },
+    ObjectChannel {
+        layer: "amodal",
+        name: "A",
+        value: |s| s.alpha,
+        none: 0.0,
+    },
 ];
 
 fn object_channels(deep: &DeepImage, id: ObjectId) -> [NamedChannel; 6] {
-    OBJECT_CHANNELS.map(|(layer, name, value, none)| {
-        let plane = value_per_pixel(deep, |samples| {
-            let own = samples.iter().find(|s| s.object == id);
-            own.map_or(none, value)
-        });
-        (format!("{layer}{:03}.{name}", id.0), plane)
+    OBJECT_CHANNELS.map(|channel| {
+        let name = format!("{}{:03}.{}", channel.layer, id.0, channel.name);
+        (name, channel.plane(deep, id))
     })
+}
+
+impl ObjectChannel {
+    fn plane(&self, deep: &DeepImage, id: ObjectId) -> Vec<f32> {
+        value_per_pixel(deep, |samples| {
+            let own = samples.iter().find(|s| s.object == id);
+            own.map_or(self.none, self.value)
+        })
+    }
 }
 
 /// One value for each pixel.

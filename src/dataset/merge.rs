@@ -200,13 +200,14 @@ fn open_shard(path: &Path) -> Result<(Value, ShardShare)> {
 
 /// The plan that a dataset was made with, but for where its samples come from.
 fn merged_plan(document: &Value, count: u64, folder: &Path) -> Result<Plan> {
+    let classes = field(document, "classes")?;
     Ok(Plan {
         writers: writers_of(field(document, "writers")?)?,
         seed: field(document, "seed")?,
         recipe: field(document, "recipe")?,
         split: field(document, "split")?,
         obstructed: field(document, "obstructed")?,
-        ..Plan::new(folder, count, field(document, "classes")?)
+        ..Plan::new(folder, count, classes)
     })
 }
 

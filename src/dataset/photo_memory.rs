@@ -2,9 +2,9 @@
 
 use crate::dataset::known_files::KnownFiles;
 use crate::image::Image;
-use crate::lru::{LruCache, Shared};
+use crate::lru::{InMemory, LruCache};
 use crate::pixel::{Coverage, LinearRgb};
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 
 /// Plates and masks of all places of a recipe, at each size that was asked for.
 #[derive(Debug)]
@@ -28,18 +28,8 @@ impl PhotoMemory {
     }
 }
 
-impl<P: Copy> Shared for Arc<Image<P>> {
-    type Weak = Weak<Image<P>>;
-
+impl<P: Copy> InMemory for Image<P> {
     fn bytes(&self) -> usize {
         size_of_val(self.pixels())
-    }
-
-    fn downgrade(&self) -> Self::Weak {
-        Arc::downgrade(self)
-    }
-
-    fn upgrade(weak: &Self::Weak) -> Option<Self> {
-        weak.upgrade()
     }
 }

@@ -245,7 +245,7 @@ impl Pipeline {
         let cut_outs = photos.flat_map(|photo| photo.files());
         let places = match self.places.is_empty() {
             true => Vec::new(),
-            false => BackgroundPhoto::files_in(backgrounds, *surface_size)?,
+            false => BackgroundPhoto::files_beside(&scene.plate, backgrounds, *surface_size)?,
         };
         let listed = self.surroundings.files().map(|(_, path)| path);
         let named = scene.environment.iter().map(|map| folder.join(&map.file));
@@ -422,7 +422,7 @@ impl Pipeline {
 
     /// Labels of a shot with these deep samples, whatever becomes of its edges.
     fn label_shot(&self, deep: &DeepImage, shot: &Shot) -> Labels {
-        let options = self.config.labels.options();
+        let options = self.config.labels.options;
         if !shot.edges.reshape_cut_outs() {
             return label::label(deep, shot, &options);
         }
@@ -451,7 +451,7 @@ impl Pipeline {
         Ok(label::label(
             &render::render_coverage(&shot, &self.config.render),
             &shot,
-            &self.config.labels.options(),
+            &self.config.labels.options,
         ))
     }
 

@@ -311,7 +311,7 @@ mod tests {
         };
         config.render.subsamples += 1;
         config.scene.settle.attempts = 3;
-        config.labels.obstruction = ObstructionRule::Visibility { min_visible: 0.97 };
+        config.labels.options.obstruction = ObstructionRule::Visibility { min_visible: 0.97 };
         config.scene.image = [64, 48];
         config.scene.environment.files = vec!["../sky.exr".into()];
         let scene = scene_under("../sky.exr");

@@ -32,9 +32,6 @@ pub struct Setting {
     pub ends: Option<[f64; 2]>,
     /// What kinds of values it takes.
     pub takes: Kinds,
-    /// The value as the template shows it.
-    #[serde(skip)]
-    pub(super) shown: &'static str,
 }
 
 /// What kinds of values a setting takes: as many of them as a recipe is read with.
@@ -96,9 +93,14 @@ fn values_at(value: &Value, at: &str) -> Vec<(String, Value)> {
 /// What the template shows for a path.
 pub(crate) fn told_value(path: &str) -> Option<&'static str> {
     let generic = of_first_entry(path);
-    told_keys()
-        .find(|told| told.path == generic)
-        .map(|told| told.shown)
+    let mut table = String::new();
+    DatasetConfig::template().lines().find_map(|line| {
+        if let Some(next) = table_of(line) {
+            table = next;
+        }
+        let (key, value) = key_and_value(line)?;
+        (field_path(&table, key) == generic).then_some(value)
+    })
 }
 
 /// The path with every index 0, as the template has it.
@@ -112,6 +114,7 @@ fn of_first_entry(path: &str) -> String {
 }
 
 /// Every key of the template, but for the kinds of values that it takes.
+#[cfg(test)]
 pub(super) fn told_keys() -> impl Iterator<Item = Setting> {
     let groups = told_groups().into_iter();
     groups.flat_map(|group| group.settings)
@@ -221,7 +224,7 @@ fn kept(words: &[String], is_kept: impl Fn(&String) -> bool) -> Vec<String> {
 
 impl Setting {
     /// A key with its value and its comment.
-    fn told(path: String, shown: &'static str, docs: String) -> Self {
+    fn told(path: String, shown: &str, docs: String) -> Self {
         Self {
             is_example: docs.contains("no default"),
             ends: ends(&docs),
@@ -229,7 +232,6 @@ impl Setting {
             docs,
             value: value_of(shown),
             takes: Kinds::default(),
-            shown,
         }
     }
 

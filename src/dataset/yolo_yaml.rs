@@ -20,8 +20,9 @@ pub(crate) struct DataYaml {
     nc: Option<usize>,
     /// Names of the classes, in order.
     pub(crate) names: Vec<String>,
-    /// Numbers of the keypoints in a label.
-    keypoint_numbers: usize,
+    /// The line of `kpt_shape`, and how many numbers the keypoints in a label have by it or what is
+    /// wrong with it; none of labels without keypoints.
+    keypoints: Option<(usize, Result<usize, String>)>,
 }
 
 /// Most classes that are numbered where `nc` alone tells of them.
@@ -87,6 +88,7 @@ impl DataYaml {
     /// whatever else is wrong.
     pub(crate) fn read(text: &str) -> (Self, Vec<Problem>) {
         let (yaml, mut problems) = Self::read_given(text);
+        problems.extend(yaml.keypoint_problem());
         problems.extend(yaml.missing().into_iter().map(|what| (None, what)));
         (yaml, problems)
     }
@@ -95,8 +97,7 @@ impl DataYaml {
     pub(crate) fn read_names(text: &str) -> Result<Vec<String>, Problem> {
         let (yaml, problems) = Self::read_given(text);
         let unnamed = yaml.names_problem().map(|what| (None, what));
-        let wrong = problems.into_iter().find(|(_, what)| what != KEYPOINTS);
-        match wrong.or(unnamed) {
+        match problems.into_iter().next().or(unnamed) {
             None => Ok(yaml.names),
             Some(problem) => Err(problem),
         }
@@ -105,21 +106,17 @@ impl DataYaml {
     /// How many numbers the keypoints in a label have by `kpt_shape`, whatever else is wrong; 0
     /// without it.
     pub(crate) fn read_keypoint_numbers(text: &str) -> Result<usize, Problem> {
-        let (yaml, problems) = Self::read_given(text);
-        let mut of_shape = problems
-            .into_iter()
-            .filter(|(_, what)| what.starts_with("kpt_shape: ") && what != KEYPOINTS);
-        match of_shape.next() {
-            Some(problem) => Err(problem),
-            None => Ok(yaml.keypoint_numbers),
+        match Self::read_given(text).0.keypoints {
+            None => Ok(0),
+            Some((line, numbers)) => numbers.map_err(|what| (Some(line), what)),
         }
     }
 
-    /// What is there, and what is wrong with it.
+    /// What is there, and what is wrong with it; keypoints are wrong for some readers alone.
     fn read_given(text: &str) -> (Self, Vec<Problem>) {
         let (mut yaml, mut problems) = (Self::default(), Vec::new());
         let read = Reader::new(text).read_keys(|key, line, value| {
-            if let Err((value_line, what)) = yaml.set(key, value) {
+            if let Err((value_line, what)) = yaml.set(key, line, value) {
                 problems.push((Some(value_line.unwrap_or(line)), what));
             }
         });
@@ -137,7 +134,7 @@ impl DataYaml {
         }
     }
 
-    fn set(&mut self, key: &str, value: Value) -> Result<(), Problem> {
+    fn set(&mut self, key: &str, line: usize, value: Value) -> Result<(), Problem> {
         match key {
             "path" => self.path = value.texts(key)?.pop(),
             "train" => self.train = value.texts(key)?,
@@ -148,8 +145,7 @@ impl DataYaml {
             "nc" => self.nc = Some(value.count(key)?),
             "names" => return self.set_names(value),
             "kpt_shape" if !matches!(value, Value::Null) => {
-                self.keypoint_numbers = value.keypoint_numbers(key)?;
-                return Err((None, KEYPOINTS.into()));
+                self.keypoints = Some((line, value.keypoint_numbers(key)));
             }
             _ => {}
         }
@@ -167,6 +163,8 @@ impl DataYaml {
         };
         entries.sort_by_key(|(_, key, _)| key.parse().unwrap_or(usize::MAX));
         let mut wrong = Ok(());
+        // Of a key that stands twice trainers take the last value.
+        self.names.clear();
         for (expected, (line, key, name)) in entries.into_iter().enumerate() {
             if wrong.is_ok() && key != expected.to_string() {
                 wrong = Err((Some(line), format!("class {key}, expected {expected}")));
@@ -174,6 +172,12 @@ impl DataYaml {
             self.names.push(name);
         }
         wrong
+    }
+
+    fn keypoint_problem(&self) -> Option<Problem> {
+        let (line, numbers) = self.keypoints.as_ref()?;
+        let what = numbers.as_ref().err().map_or(KEYPOINTS, String::as_str);
+        Some((Some(*line), what.to_owned()))
     }
 
     fn missing(&self) -> Vec<String> {
@@ -231,7 +235,7 @@ impl Value {
     }
 
     /// Points by the numbers of each.
-    fn keypoint_numbers(&self, key: &str) -> Result<usize, Problem> {
+    fn keypoint_numbers(&self, key: &str) -> Result<usize, String> {
         let texts: &[String] = match self {
             Self::List(texts) => &texts[..],
             _ => &[],
@@ -239,7 +243,7 @@ impl Value {
         let numbers = texts.iter().map(|text| text.parse::<usize>().ok());
         match numbers.collect::<Option<Vec<_>>>().as_deref() {
             Some(&[points @ 1..=MAX_KEYPOINTS, each @ 2..=3]) => Ok(points * each),
-            _ => Err((None, format!("{key}: expected [number of points, 2 or 3]"))),
+            _ => Err(format!("{key}: expected [number of points, 2 or 3]")),
         }
     }
 
@@ -472,6 +476,18 @@ mod tests {
     }
 
     #[test]
+    fn of_names_that_stand_twice_the_last_count() {
+        for last in ["names:\n  0: cap\n  1: none\n", "names: [cap, none]\n"] {
+            let text = format!("train: a\nval: b\nnames:\n  0: old\n{last}");
+            let (yaml, faults) = DataYaml::read(&text);
+            assert_eq!(
+                (yaml.names, faults),
+                (["cap", "none"].map(String::from).to_vec(), vec![])
+            );
+        }
+    }
+
+    #[test]
     fn faults_name_their_line() {
         let (_, faults) = DataYaml::read("train: a\nnc: two\nnames:\n  0: cap\n  2: none\n");
         assert_eq!(faults[0], (Some(2), "nc: two, expected a number".into()));
@@ -524,8 +540,10 @@ mod tests {
         let (_, problems) = DataYaml::read(text);
         assert_eq!(problems.len(), 1);
         assert_eq!(problems[0], (Some(4), KEYPOINTS.into()));
-        let names = DataYaml::read_names("kpt_shape: [4, 2]\nnames: [cap]\n");
-        assert_eq!(names, Ok(vec!["cap".into()]));
+        for shape in ["[4, 2]", "17"] {
+            let names = DataYaml::read_names(&format!("kpt_shape: {shape}\nnames: [cap]\n"));
+            assert_eq!(names, Ok(vec!["cap".into()]), "{shape}");
+        }
         let numbers = DataYaml::read_keypoint_numbers;
         assert_eq!(numbers(text), Ok(8));
         assert_eq!(numbers("names: 3\nkpt_shape:\n"), Ok(0));

@@ -106,6 +106,7 @@ fn channel_or_zero(values: &[f32], c: usize) -> f32 {
 
 /// The distance of two values, magnified; 1 where one of them is not a number.
 fn magnified_error(u: f32, v: f32) -> f32 {
+    // The gain is a power of 2: its inverse times itself is 1 exactly.
     DIFFERENCE_GAIN * distance(u, v, 1.0 / DIFFERENCE_GAIN)
 }
 

@@ -107,15 +107,14 @@ impl CocoTruth {
     }
 
     fn without_annotations(document: &CocoDocument) -> Result<Self> {
-        let images = places("images", document.images.iter().map(|image| image.id))?;
-        let categories = places("categories", document.categories.iter().map(|c| c.id))?;
-        let records: Vec<_> = images.values().map(|&i| &document.images[i]).collect();
+        let images = document.image_places()?;
+        let categories = document.category_places()?;
+        let records = document.images_at(images.values());
         let names = sheet_names(&records).into_iter();
         let sheets = names.zip(&records).map(|(name, image)| image.sheet(name));
-        let classes = categories.values().map(|&i| &document.categories[i].name);
         Ok(Self {
             sheets: sheets.collect(),
-            classes: classes.cloned().collect(),
+            classes: document.category_names(categories.values()),
             files: records.iter().map(|image| image.file()).collect(),
             images: images.keys().copied().zip(0..).collect(),
             categories: categories.into_keys().zip(0..).collect(),
@@ -355,6 +354,24 @@ impl CocoDetection {
             box_area: area_of(self.bbox),
             confidence: self.score,
         })
+    }
+}
+
+impl CocoDocument {
+    fn image_places(&self) -> Result<BTreeMap<i64, usize>> {
+        places("images", self.images.iter().map(|image| image.id))
+    }
+
+    fn category_places(&self) -> Result<BTreeMap<i64, usize>> {
+        places("categories", self.categories.iter().map(|c| c.id))
+    }
+
+    fn images_at<'a>(&self, places: impl Iterator<Item = &'a usize>) -> Vec<&ImageRecord> {
+        places.map(|&i| &self.images[i]).collect()
+    }
+
+    fn category_names<'a>(&self, places: impl Iterator<Item = &'a usize>) -> Vec<String> {
+        places.map(|&i| self.categories[i].name.clone()).collect()
     }
 }
 

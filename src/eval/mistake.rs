@@ -43,7 +43,7 @@ pub fn mistakes(sheets: &[EvalImage], options: &ConfusionOptions) -> Vec<Mistake
     all.into_iter().map(|(_, mistake)| mistake).collect()
 }
 
-/// With the severity of each.
+/// The mistakes of one image, with the severity of each.
 fn rated_mistakes(
     i: usize,
     sheet: &EvalImage,

@@ -105,12 +105,18 @@ fn encode<P: ToFile>(
         Some(Format::Exr) => encode_exr(image, bits, options),
         Some(Format::Tiff) => encode_tiff(image, bits, &options.metadata),
         Some(Format::Jpeg) => encode_jpeg(image, options),
-        _ => {
-            let (channels, codes) = (P::NAMES.len(), Codes::new(image, bits));
-            let (effort, metadata) = (options.png_effort, &options.metadata);
-            png::encode(image.size(), channels, &codes, effort, metadata).map_err(|e| e.to_string())
-        }
+        _ => encode_png(image, bits, options),
     }
+}
+
+fn encode_png<P: ToFile>(
+    image: &Image<P>,
+    bits: Bits,
+    options: &WriteOptions,
+) -> std::result::Result<Vec<u8>, String> {
+    let (channels, codes) = (P::NAMES.len(), Codes::new(image, bits));
+    let (effort, metadata) = (options.png_effort, &options.metadata);
+    png::encode(image.size(), channels, &codes, effort, metadata).map_err(|e| e.to_string())
 }
 
 fn encode_tiff<P: ToFile>(
@@ -155,19 +161,31 @@ pub(super) fn sample_storage<P: ToFile>(
 fn possible_storage<P: ToFile>(
     format: Option<Format>,
 ) -> std::result::Result<&'static [Bits], String> {
-    match (format, P::CODED) {
-        (Some(Format::Exr), true) => Ok(&[Bits::Half, Bits::Float]),
-        (Some(Format::Tiff), true) => Ok(&[Bits::Sixteen, Bits::Eight, Bits::Float]),
-        (Some(Format::Png), true) => Ok(&[Bits::Eight, Bits::Sixteen]),
-        (Some(Format::Jpeg), true) => Ok(&[Bits::Eight]),
-        (Some(Format::Exr), false) => Ok(&[Bits::Float, Bits::Half]),
-        (Some(Format::Tiff), false) if P::NAMES.len() == 1 => Ok(&[Bits::Float]),
-        (Some(Format::Tiff | Format::Png | Format::Jpeg), false) => {
+    if P::CODED {
+        return possible_codes(format);
+    }
+    match format {
+        Some(Format::Exr) => Ok(&[Bits::Float, Bits::Half]),
+        Some(Format::Tiff) if P::NAMES.len() == 1 => Ok(&[Bits::Float]),
+        Some(Format::Tiff | Format::Png | Format::Jpeg) => {
             Err("a depth needs .exr or .tif, and a film .exr".into())
         }
-        _ => Err("cannot be written, expected the extension .exr, .png, .jpg or .tif".into()),
+        _ => Err(NOT_WRITTEN.into()),
     }
 }
+
+/// The same for a pixel that means something in integers.
+fn possible_codes(format: Option<Format>) -> std::result::Result<&'static [Bits], String> {
+    match format {
+        Some(Format::Exr) => Ok(&[Bits::Half, Bits::Float]),
+        Some(Format::Tiff) => Ok(&[Bits::Sixteen, Bits::Eight, Bits::Float]),
+        Some(Format::Png) => Ok(&[Bits::Eight, Bits::Sixteen]),
+        Some(Format::Jpeg) => Ok(&[Bits::Eight]),
+        _ => Err(NOT_WRITTEN.into()),
+    }
+}
+
+const NOT_WRITTEN: &str = "cannot be written, expected the extension .exr, .png, .jpg or .tif";
 
 fn encode_exr<P: ToFile>(
     image: &Image<P>,

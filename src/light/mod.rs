@@ -6,7 +6,6 @@
 //! (exposure, colour of the light, blur, noise) into numbers.
 //!
 //! ```
-//! use petcomp::LinearRgb;
 //! use petcomp::geom::{Point3, Vector3};
 //! use petcomp::light::irradiance;
 //! use petcomp::scene::{AreaLight, LightShape};
@@ -14,11 +13,7 @@
 //!
 //! let lamp = AreaLight {
 //!     shape: LightShape::Ellipse,
-//!     position: [0.0, 0.0, 10.0],
-//!     target: [0.0; 3],
-//!     size: [0.1; 2],
-//!     power: 10.0,
-//!     color: LinearRgb::WHITE,
+//!     ..AreaLight::new([0.0, 0.0, 10.0], [0.1; 2], 10.0)
 //! };
 //! // So far away it is a point: power over pi times the squared distance.
 //! let e = irradiance(&lamp, Point3::origin(), Vector3::z());

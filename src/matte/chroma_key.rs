@@ -1,11 +1,14 @@
 //! Chroma Key: a wedge in the plane of the colour differences.
 
-use super::check::{check_length, check_value};
+use super::check::check_value;
 use super::key::{Photo, Profile, differences};
 use crate::error::Result;
 use crate::image::Image;
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
 use serde::{Deserialize, Serialize};
+
+/// Blender goes down to 0, where the matte is infinite inside the wedge.
+const MIN_GAIN: f32 = 1e-6;
 
 /// Settings of [`chroma_key`], under the names that Blender 3.4 gives them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,8 +22,8 @@ pub struct ChromaKeyOptions {
     /// Opening angle of the wedge that is keyed wholly, radians, 0 to 30 degrees (3.4 "cutoff", 4.5
     /// "minimum"). Default: 10 degrees.
     pub threshold: f32,
-    /// Distance inside the wedge over which the matte falls to 0, at least 0 (4.5 "falloff").
-    /// Default: 1.
+    /// Distance inside the wedge over which the matte falls to 0, at least 0.000001 (4.5
+    /// "falloff"). Default: 1.
     pub gain: f32,
 }
 
@@ -45,7 +48,9 @@ impl ChromaKeyOptions {
     pub fn check(&self) -> Result<()> {
         check_angle("key.tolerance", self.tolerance, [1.0, 80.0])?;
         check_angle("key.threshold", self.threshold, [0.0, 30.0])?;
-        check_length("key.gain", self.gain)
+        check_value(self.gain >= MIN_GAIN, "key.gain", || {
+            format!("{}, expected at least {MIN_GAIN}", self.gain)
+        })
     }
 }
 
@@ -157,5 +162,26 @@ fn normalized(c: f32, r: f32) -> (f32, f32) {
         (0.0, 0.0)
     } else {
         (c / length, r / length)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_gain_that_is_taken_makes_an_infinite_matte() {
+        let of_gain = |gain: f32| ChromaKeyOptions {
+            threshold: 0.0,
+            gain,
+            ..ChromaKeyOptions::default()
+        };
+        let told = of_gain(0.0).check().unwrap_err().to_string();
+        assert_eq!(told, "key.gain: 0, expected at least 0.000001");
+        let least = of_gain(MIN_GAIN);
+        least.check().unwrap();
+        let green = LinearRgb::new(0.04, 0.4, 0.08);
+        let matte = chroma_key(&Image::filled(1, 1, green), green, &least)[(0, 0)];
+        assert!(matte.0.is_finite() && matte.0 < -1.0, "{matte:?}");
     }
 }

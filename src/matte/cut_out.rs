@@ -254,11 +254,10 @@ impl ObjectRegion {
         let drawn = cropped(&claims.outline);
         let boundary = corrected_coverage(boundary, drawn.as_ref());
         let kept = hull_roi(&found.hull, options.margin_px, size);
-        let longer = kept.width.max(kept.height);
         Self {
             around,
             kept,
-            scale: (options.longest_side as f64 / longer as f64).min(1.0),
+            scale: reduction(kept, options.longest_side),
             photo: prepared.photo.crop(around),
             cut: softened(&boundary, options.soften_px),
             claims: cropped(&claims.transmittance),
@@ -346,6 +345,12 @@ impl Boundary {
             Self::Hull => &found.mask,
         }
     }
+}
+
+/// The factor that makes the longer side of a region at most this long.
+fn reduction(kept: Roi, longest_side: usize) -> f64 {
+    let longer = kept.width.max(kept.height);
+    (longest_side as f64 / longer as f64).min(1.0)
 }
 
 /// The whole pixels that a hull and a margin around it cover.

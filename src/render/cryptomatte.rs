@@ -39,19 +39,11 @@ impl Cryptomatte {
             .map(|(object, name)| (*object, id_of_name(name)))
             .collect();
         let planes = rank_planes(deep, &ids).into_iter().enumerate();
-        let texts = [
-            ("name", layer.to_owned()),
-            ("hash", "MurmurHash3_32".to_owned()),
-            ("conversion", "uint32_to_float32".to_owned()),
-            ("manifest", manifest_text(names)),
-        ];
         Self {
             channels: planes
                 .map(|(i, plane)| (channel_name(layer, i), plane))
                 .collect(),
-            metadata: texts
-                .map(|(what, text)| (attribute_name(layer, what), text))
-                .into(),
+            metadata: layer_metadata(layer, names),
         }
     }
 }
@@ -72,21 +64,23 @@ fn rank_planes(deep: &DeepImage, ids: &[(ObjectId, f32)]) -> Vec<Vec<f32>> {
     planes
 }
 
-/// Ids and visible coverage of a pixel's objects, the most visible first; as many as there are
-/// ranks.
+/// Ids and visible coverage of a pixel's objects, each once, the most visible first; as many as
+/// there are ranks.
 fn ranked_objects(
     samples: &[DeepSample],
     ids: &[(ObjectId, f32)],
     count: usize,
 ) -> Vec<(f32, f32)> {
-    let mut ranks: Vec<(f32, f32)> = samples
-        .iter()
-        .filter(|s| s.visible > 0.0)
-        .filter_map(|s| {
-            let &(_, id) = ids.iter().find(|(known, _)| *known == s.object)?;
-            Some((id, s.visible))
-        })
-        .collect();
+    let mut ranks: Vec<(f32, f32)> = Vec::new();
+    for s in samples.iter().filter(|s| s.visible > 0.0) {
+        let Some(&(_, id)) = ids.iter().find(|(known, _)| *known == s.object) else {
+            continue;
+        };
+        match ranks.iter_mut().find(|(ranked, _)| *ranked == id) {
+            Some((_, coverage)) => *coverage += s.visible,
+            None => ranks.push((id, s.visible)),
+        }
+    }
     // By id where coverage is the same, so that nothing depends on depth.
     ranks.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
     ranks.resize(count, (0.0, 0.0));
@@ -98,6 +92,18 @@ fn channel_name(layer: &str, i: usize) -> String {
     format!("{layer}{set:02}.{channel}")
 }
 
+fn layer_metadata(layer: &str, names: &[(ObjectId, String)]) -> Vec<(String, String)> {
+    let texts = [
+        ("name", layer.to_owned()),
+        ("hash", "MurmurHash3_32".to_owned()),
+        ("conversion", "uint32_to_float32".to_owned()),
+        ("manifest", manifest_text(names)),
+    ];
+    texts
+        .map(|(what, text)| (attribute_name(layer, what), text))
+        .into()
+}
+
 /// Ids by name, as JSON.
 fn manifest_text(names: &[(ObjectId, String)]) -> String {
     let ids = names
@@ -107,19 +113,19 @@ fn manifest_text(names: &[(ObjectId, String)]) -> String {
 }
 
 /// Name of a layer's attribute, which has the layer's key in it.
-pub(crate) fn attribute_name(layer: &str, what: &str) -> String {
+fn attribute_name(layer: &str, what: &str) -> String {
     let hash = format!("{:08x}", murmur3(layer.as_bytes()));
     format!("cryptomatte/{}/{what}", &hash[..KEY_DIGITS])
 }
 
 /// The id of a name as the manifest has it.
-pub(crate) fn hex_id(name: &str) -> String {
+fn hex_id(name: &str) -> String {
     format!("{:08x}", id_of_name(name).to_bits())
 }
 
 /// The id of a name: its hash as a float, the exponent moved away from those of zero, subnormals,
 /// infinity and NaN.
-pub(crate) fn id_of_name(name: &str) -> f32 {
+fn id_of_name(name: &str) -> f32 {
     const MANTISSA: u32 = (1 << 23) - 1;
     const SIGN: u32 = 1 << 31;
     let hash = murmur3(name.as_bytes());
@@ -201,6 +207,8 @@ mod tests {
             sample(2, 0.5),
             sample(3, 0.0),
             sample(9, 0.1),
+            // An object of which the pixel has two samples counts once.
+            sample(1, 0.125),
         ];
         let deep = DeepImage::from_pixels(Image::filled(1, 1, LinearRgb::WHITE), [pixel]);
         let names = [1, 2, 3].map(|id| (ObjectId(id), format!("object{id}")));
@@ -208,8 +216,18 @@ mod tests {
         let values: Vec<_> = found.channels.iter().map(|(_, plane)| plane[0]).collect();
         assert_eq!(
             values[..5],
-            [id_of_name("object2"), 0.5, id_of_name("object1"), 0.25, 0.0]
+            [
+                id_of_name("object2"),
+                0.5,
+                id_of_name("object1"),
+                0.375,
+                0.0
+            ]
         );
+        let [name, manifest] = [0, 3].map(|i| found.metadata[i].1.as_str());
+        assert_eq!(name, "CryptoObject");
+        let expected = format!("\"object1\":\"{}\"", hex_id("object1"));
+        assert!(manifest.contains(&expected), "{manifest}");
         assert_eq!(
             (found.channels.len(), found.channels[7].0.as_str()),
             (12, "CryptoObject01.A")

@@ -67,7 +67,6 @@ mod view;
 #[doc(hidden)]
 pub use check::check;
 pub use cryptomatte::Cryptomatte;
-pub(crate) use cryptomatte::{attribute_name, hex_id, id_of_name};
 pub use deep::{render, render_coverage};
 pub(crate) use deep::{render_beyond, render_unhidden};
 pub use options::RenderOptions;

@@ -35,13 +35,17 @@ pub fn render_reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
         Vec::new()
     };
     let shadow = Image::from_vec(world.view.width, world.view.height, shadow);
-    let samples = lists
-        .into_iter()
-        .map(|list| list.into_iter().map(|sample| sample.deep).collect());
-    let deep = DeepImage::from_pixels(shadow, samples).with_tints(tints);
+    let deep = deep_image(shadow, lists).with_tints(tints);
     Bounces::new(shot)
         .brighten(deep)
         .held_out(shot.holdout.as_deref())
+}
+
+fn deep_image(shadow: Image<LinearRgb>, lists: Vec<Vec<ReferenceSample>>) -> DeepImage {
+    let samples = lists
+        .into_iter()
+        .map(|list| list.into_iter().map(|sample| sample.deep).collect());
+    DeepImage::from_pixels(shadow, samples)
 }
 
 /// A deep sample and what it hides per channel.
@@ -142,10 +146,7 @@ impl<'a> ReferenceWorld<'a> {
     fn render_pixel(&self, x: f64, y: f64, offsets: &[f64]) -> (Vec<ReferenceSample>, LinearRgb) {
         let [ideal_x, ideal_y] = self.ideal_px([x, y]);
         let order = self.depth_order(ideal_x, ideal_y);
-        let mut samples: Vec<_> = order
-            .iter()
-            .map(|&(k, depth)| ReferenceSample::new(self.cards[k].card.id, depth))
-            .collect();
+        let mut samples = self.empty_samples(&order);
         let weight = 1.0 / (offsets.len() * offsets.len()) as f32;
         let mut shadow = ShadowRatio::default();
         for oy in offsets {
@@ -176,6 +177,13 @@ impl<'a> ReferenceWorld<'a> {
                 .then(self.cards[a.0].card.id.cmp(&self.cards[b.0].card.id))
         });
         order
+    }
+
+    fn empty_samples(&self, order: &[(usize, f64)]) -> Vec<ReferenceSample> {
+        order
+            .iter()
+            .map(|&(k, depth)| ReferenceSample::new(self.cards[k].card.id, depth))
+            .collect()
     }
 
     /// Adds what the cards do along one ray, front to back; returns what passes through all of

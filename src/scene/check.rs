@@ -121,7 +121,8 @@ fn check_color(color: LinearRgb, at: &str, bounds: &Bounds) -> Result<()> {
     check_within(&color.channels().map(f64::from), at, bounds)
 }
 
-/// Three factors, as people type them.
+/// Fails unless every channel is within bounds; the message shows the channels as they were typed,
+/// in single precision.
 pub(super) fn check_factors(color: LinearRgb, at: &str, bounds: &Bounds) -> Result<()> {
     let factors = color.channels();
     let are_within = factors.iter().all(|&factor| bounds.contains(factor.into()));

@@ -137,8 +137,10 @@ impl Lens {
     pub(super) fn check(&self) -> Result<()> {
         K1.check("lens.k1", self.k1)?;
         SENSOR.check("lens.sensor_mm", self.sensor_mm)?;
-        Range::check_optional(self.f_number.map(Range::fixed), "lens.f_number", &F_NUMBER)?;
-        Range::check_optional(self.focus_m.map(Range::fixed), "lens.focus_m", &FOCUS)
+        self.f_number
+            .map_or(Ok(()), |n| F_NUMBER.check("lens.f_number", n))?;
+        self.focus_m
+            .map_or(Ok(()), |focus| FOCUS.check("lens.focus_m", focus))
     }
 
     /// Fails on a barrel that folds the corners of a camera's pictures over, or nearly.
@@ -419,6 +421,11 @@ mod tests {
             ..good
         };
         assert!(reported(nan).starts_with("lens.k1: NaN"));
+        let no_number = Lens {
+            f_number: Some(f64::NAN),
+            ..good
+        };
+        assert!(reported(no_number).starts_with("lens.f_number: NaN, expected 0.5 to 1000"));
         let closed = Lens {
             f_number: Some(0.0),
             ..good

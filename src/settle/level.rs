@@ -79,8 +79,7 @@ pub(super) fn flat(
     allowance: &Allowance,
 ) -> Result<Vec<Pose>> {
     let mut bodies = leveled_solids(scene, options);
-    let at_rest = bodies.iter().filter(|solid| stands(solid));
-    let mut lying: Vec<Solid> = at_rest.map(upright_box).collect();
+    let mut lying = boxes_at_rest(&bodies);
     for i in falling_from_lowest(&bodies) {
         allowance.take(1 + lying.len() as u64)?;
         let solid = moved_inside(&bodies[i], scene.surface.size);
@@ -89,6 +88,12 @@ pub(super) fn flat(
     }
     let fallen = bodies.iter().filter(|solid| solid.falls);
     Ok(fallen.map(|solid| solid.world_from_body).collect())
+}
+
+/// The upright boxes around what is at rest.
+fn boxes_at_rest(bodies: &[Solid]) -> Vec<Solid> {
+    let at_rest = bodies.iter().filter(|solid| stands(solid));
+    at_rest.map(upright_box).collect()
 }
 
 fn stands(solid: &Solid) -> bool {

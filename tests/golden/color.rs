@@ -28,17 +28,17 @@ pub(crate) struct Tolerance {
 }
 
 impl Tolerance {
-    pub(crate) fn of(case: &Case, table: &str) -> Self {
-        let bound = |key| {
-            case.table[table]
-                .get(key)
-                .and_then(toml::Value::as_float)
-                .unwrap_or(0.0)
+    /// `fail` of a table of the case, and `fail_relative`, 0 without it.
+    pub(crate) fn of(case: &Case, table: &str) -> Result<Self, String> {
+        let bound = |key: &str| {
+            let value = case.table.get(table)?.get(key)?;
+            let expected = || format!("{table}.{key}: {value}, expected a number like 1e-6");
+            Some(value.as_float().ok_or_else(expected))
         };
-        Self {
-            fail: bound("fail"),
-            fail_relative: bound("fail_relative"),
-        }
+        Ok(Self {
+            fail: bound("fail").ok_or_else(|| format!("{table}.fail: missing"))??,
+            fail_relative: bound("fail_relative").unwrap_or(Ok(0.0))?,
+        })
     }
 
     pub(crate) fn check(
@@ -75,7 +75,7 @@ impl Tolerance {
 }
 
 fn curves(case: &Case, reference: &Value) -> Result<(), String> {
-    let near = Tolerance::of(case, "tolerance");
+    let near = Tolerance::of(case, "tolerance")?;
     let samples = floats(&reference["samples"]);
     let ours = [
         ("srgb", Curve::Srgb),
@@ -102,7 +102,7 @@ fn curves(case: &Case, reference: &Value) -> Result<(), String> {
 }
 
 fn spaces(case: &Case, reference: &Value) -> Result<(), String> {
-    let exact = Tolerance::of(case, "matrices");
+    let exact = Tolerance::of(case, "matrices")?;
     for (name, matrix) in reference["matrices"]
         .as_object()
         .ok_or("matrices: not a table")?
@@ -110,7 +110,7 @@ fn spaces(case: &Case, reference: &Value) -> Result<(), String> {
         let ours = matrix_named(name).ok_or_else(|| format!("no matrix {name}"))?;
         exact.check(name, ours.transpose().iter().copied(), &floats(matrix))?;
     }
-    let near = Tolerance::of(case, "tolerance");
+    let near = Tolerance::of(case, "tolerance")?;
     let colors = &reference["colors"];
     for (name, matrix) in [
         ("xyz", color::xyz_from_rgb(&RgbSpace::REC709).into()),
@@ -148,7 +148,7 @@ fn matrix_named(name: &str) -> Option<Matrix3<f64>> {
 }
 
 fn hsv(case: &Case, reference: &Value) -> Result<(), String> {
-    let near = Tolerance::of(case, "tolerance");
+    let near = Tolerance::of(case, "tolerance")?;
     let polar = each_color(&reference["rgb"], |rgb| {
         let Hsv { h, s, v } = color::rgb_to_hsv(rgb.into());
         [h, s, v]
@@ -161,7 +161,7 @@ fn hsv(case: &Case, reference: &Value) -> Result<(), String> {
 }
 
 fn shift_hsv(case: &Case, reference: &Value) -> Result<(), String> {
-    let near = Tolerance::of(case, "tolerance");
+    let near = Tolerance::of(case, "tolerance")?;
     for shift in reference["shifts"].as_array().ok_or("shifts: not a list")? {
         let [hue, saturation, value] = ["hue_deg", "saturation", "value"]
             .map(|key| shift[key].as_f64().unwrap_or(f64::NAN) as f32);

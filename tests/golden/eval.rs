@@ -40,7 +40,7 @@ struct Yolov5 {
 pub(crate) fn run(case: &Case) -> Result<(), String> {
     let boxes: Boxes = json(&case.dir.join("boxes.json"))?;
     let reference: Reference = json(&case.dir.join("reference.json"))?;
-    let near = Tolerance::of(case, "tolerance");
+    let near = Tolerance::of(case, "tolerance")?;
     let sheets = sheets(&boxes);
     coco(&sheets, &reference.coco, near)?;
     yolov5(&sheets, &reference.yolov5, near)

@@ -432,8 +432,7 @@ impl AddPhotoArgs {
         asset::check_not_written_over(&entries, &self.output)?;
         let (mut added, mut batch) = (0, FileBatch::default());
         for entry in &entries {
-            let record = asset::add_photo(&self.output, entry, &self.classes, &options);
-            match record.map(|record| report_added(&record, global)) {
+            match self.add_photo(entry, &options, global) {
                 Err(error) if entries.len() == 1 || matches!(error, Error::Value { .. }) => {
                     return Err(error);
                 }
@@ -444,6 +443,17 @@ impl AddPhotoArgs {
             }
         }
         Ok((added, batch))
+    }
+
+    fn add_photo(
+        &self,
+        entry: &PhotoEntry,
+        options: &CutOutOptions,
+        global: &GlobalArgs,
+    ) -> petcomp::Result<()> {
+        let record = asset::add_photo(&self.output, entry, &self.classes, options)?;
+        report_added(&record, global);
+        Ok(())
     }
 
     /// One for each cut-out; all photos of a capture are of one.

@@ -1743,12 +1743,13 @@ fn a_scene_is_rendered_without_its_recipe() {
         let place = sample(&format!("backgrounds/{name}"));
         std::fs::copy(place, desk.path("places").join(name)).unwrap();
     }
-    // Nor does it matter that no camera fits the label of another photo, but where all are opened.
+    // Nor does it matter what is wrong with the label of another photo, but where all are opened.
     desk.write("places/other.label.json", DENTED_LABEL);
     let places = ["--set", "backgrounds=\"../places\""];
     let all = ["scene", "draw", "demo/recipe.toml", "-o", "no.toml"];
     let refused = desk.refused(&[&all[..], &places].concat());
     assert!(refused.contains("other.label.json: "), "{refused}");
+    desk.write("places/broken.label.json", "no JSON");
     let hidden = |args: &[&str]| {
         with_set(&[&["label", scene, "demo/recipe.toml"], args, &places].concat());
     };

@@ -56,13 +56,34 @@ impl Given {
         let [height, width, channels] = shape_of(name, array)?;
         let size = [width, height];
         check_size(name, size)?;
-        let (is_floats, is_codes) = (is_of::<f32>(array), is_of::<u8>(array));
+        if is_of::<f32>(array) {
+            Self::of_floats(array, size, channels)
+        } else if is_of::<u8>(array) {
+            Self::of_codes(array, size, channels)
+        } else {
+            Err(wrong_dtype(name, array))
+        }
+    }
+
+    fn of_floats(
+        array: &Bound<'_, PyUntypedArray>,
+        size: [usize; 2],
+        channels: usize,
+    ) -> PyResult<Self> {
         match channels {
-            3 if is_floats => foreign::<f32, _>(array, size).map(Self::Rgb),
-            _ if is_floats => foreign::<f32, _>(array, size).map(Self::Rgba),
-            3 if is_codes => foreign::<u8, _>(array, size).map(Self::Codes),
-            _ if is_codes => foreign::<u8, _>(array, size).map(Self::CodesAlpha),
-            _ => Err(wrong_dtype(name, array)),
+            3 => foreign::<f32, _>(array, size).map(Self::Rgb),
+            _ => foreign::<f32, _>(array, size).map(Self::Rgba),
+        }
+    }
+
+    fn of_codes(
+        array: &Bound<'_, PyUntypedArray>,
+        size: [usize; 2],
+        channels: usize,
+    ) -> PyResult<Self> {
+        match channels {
+            3 => foreign::<u8, _>(array, size).map(Self::Codes),
+            _ => foreign::<u8, _>(array, size).map(Self::CodesAlpha),
         }
     }
 
@@ -247,13 +268,17 @@ fn premultiplied_pixel(code: Srgba8) -> PremulRgba {
     straight.to_premul()
 }
 
+fn is_finite<P: Pod>(pixel: &P) -> bool {
+    let channels: &[f32] = bytemuck::cast_slice(std::slice::from_ref(pixel));
+    channels.iter().all(|channel| channel.is_finite())
+}
+
 /// Pixels made of floats, each of which is a number.
 fn finite<P: Pod>(name: &str, pixels: Foreign<P>) -> Result<Pixels<P>> {
-    let (width, height) = pixels.view().size();
-    for y in 0..height {
-        let numbers: &[f32] = bytemuck::cast_slice(pixels.view().row(y));
-        if let Some(i) = numbers.iter().position(|number| !number.is_finite()) {
-            let x = i * width / numbers.len();
+    let view = pixels.view();
+    for y in 0..view.size().1 {
+        let mut row = view.row(y).iter();
+        if let Some(x) = row.position(|pixel| !is_finite(pixel)) {
             let what = format!("not finite in column {x}, row {y}, expected finite numbers");
             return Err(Error::value(name, what));
         }

@@ -176,10 +176,13 @@ fn solved(label: &Label, force: bool) -> Result<(petcomp::Camera, String)> {
     Ok((solution.camera, text(&record(label, &solution))?))
 }
 
-/// A solution that fits its label, whose camera can see objects on the surface.
+/// A solution that fits its label, whose camera can see objects on the surface through a lens that
+/// can have taken the photo.
 fn accepted(solution: Solution) -> Result<Solution> {
     camera::check_distance(&solution)?;
-    solution.fitting().map_err(Error::from)
+    let solution = solution.fitting()?;
+    camera::check_lens(&solution.camera, solution.k1())?;
+    Ok(solution)
 }
 
 fn record(label: &Label, solution: &Solution) -> serde_json::Value {

@@ -63,12 +63,12 @@ fn scores_of(
     let sheets = truth.with_detections(predictions)?;
     truth.describe(&mut options);
     let run = Run { name, sheets };
-    if let Some(folder) = output {
-        page::write(folder, slice::from_ref(&run), &options)?;
-    }
-    let metrics = Metrics::of(&run, &options);
-    page::warn_of_empty_truth(truth_path, slice::from_ref(&metrics));
-    metrics_json(&metrics, &options)
+    let metrics = match output {
+        Some(folder) => page::write(folder, slice::from_ref(&run), &options)?,
+        None => vec![Metrics::of(&run, &options)],
+    };
+    page::warn_of_empty_truth(truth_path, &metrics);
+    metrics_json(&metrics[0], &options)
 }
 
 fn read_truth(path: &Path, size: Option<[u32; 2]>) -> Result<EvalTruth> {

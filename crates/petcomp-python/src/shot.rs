@@ -134,7 +134,7 @@ impl Settings {
     fn sample(&self, shot: &Shot) -> dataset::Sample {
         let deep = render::render(shot, &self.render);
         let frame = composite::frame(&deep, shot.plate.as_deref());
-        let labels = label::label(&deep, shot, &self.labels.options());
+        let labels = label::label(&deep, shot, &self.labels.options);
         dataset::Sample {
             deep,
             ..dataset::Sample::new(frame, labels)

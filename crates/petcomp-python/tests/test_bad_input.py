@@ -276,6 +276,20 @@ def test_a_rectangle_in_millimetres_is_no_rectangle_in_metres():
             petcomp.Camera.from_rectangle(corners, [0.56 * unit, 0.37 * unit], [1280, 853])
 
 
+def test_a_lens_that_folds_the_picture_over_needs_force():
+    corners = [[235.8, 239.2], [1019.7, 215.7], [1008.9, 701.2], [275.6, 738.8]]
+    label = {
+        "format": "plane-label",
+        "version": 1,
+        "image": {"file": "", "width": 1280, "height": 960, "cropped": False},
+        "surface": {"id": "tray", "width_m": 0.56, "height_m": 0.37, "corners_px": corners},
+        "camera": {"k1": -5},
+    }
+    with pytest.raises(errors.InvalidValueError, match="^camera.k1: -5, expected at least -1.4"):
+        petcomp.camera.solve(label)
+    assert petcomp.camera.solve(label, force=True).camera.image == (1280, 960)
+
+
 def test_what_a_function_would_not_hear_is_refused(tmp_path):
     sample = petcomp.Sample.from_masks(np.zeros((4, 4, 3), np.uint8), [np.ones((4, 4), bool)], [0], ["a"])
     for arguments, says in (
@@ -326,6 +340,8 @@ def test_evaluation_of_what_cannot_be_is_refused():
         ([two], [truth], r"boxes: shape \(4, 2\), expected \(n, 4\)"),
         ([{"boxes": []}], [truth], "scores: missing"),
         ([found], [{**truth, "iscrowd": [1]}], "unknown key 'iscrowd'"),
+        ([found], [found], r"truth\[0\]: unknown key 'scores', expected boxes, classes and ignored"),
+        ([{**found, "ignored": [0]}], [truth], r"predictions\[0\]: unknown key 'ignored'"),
         ([found], [{**truth, "ignored": [0.5]}], "ignored: 0.5"),
         ([found], [{**truth, "ignored": [False, True]}], "one number for each of 1 boxes"),
         (3, [truth], "expected a path or a list"),

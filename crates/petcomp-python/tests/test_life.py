@@ -7,6 +7,7 @@ import os
 import pickle
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import threading
@@ -15,6 +16,7 @@ import time
 import numpy as np
 import petcomp
 import pytest
+from conftest import ROOT
 
 
 def picture_of(recipe, k):
@@ -323,3 +325,37 @@ def test_threads_are_set():
         petcomp.set_threads(0)
     with pytest.raises(ValueError, match="threads: 5000"):
         petcomp.set_threads(5000)
+
+
+# As a program in C has it, where nothing else was asked for.
+READ_TWICE = """
+import os, signal, subprocess, sys, petcomp
+signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+first = petcomp.io.read(sys.argv[1])
+workers = subprocess.run(["pgrep", "-P", str(os.getpid()), "petcomp-oiio"], capture_output=True, text=True)
+worker = int(workers.stdout)
+os.kill(worker, signal.SIGKILL)
+while open(f"/proc/{worker}/stat").read().split()[2] != "Z":
+    pass
+assert (petcomp.io.read(sys.argv[1]) == first).all()
+"""
+
+
+def test_a_dead_worker_does_not_end_the_process(tmp_path):
+    worker = ROOT / "target/release/petcomp-oiio-worker"
+    if not worker.exists():
+        pytest.skip("built without OpenImageIO")
+    (tmp_path / "scan.dpx").write_bytes(dpx(64, 48))
+    environment = {**os.environ, "PETCOMP_OIIO_WORKER": str(worker)}
+    words = [sys.executable, "-c", READ_TWICE, tmp_path / "scan.dpx"]
+    done = subprocess.run(words, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def dpx(width, height):
+    """A film scan of 8-bit grey, linear, by SMPTE 268M: which only OpenImageIO reads."""
+    header = bytearray(b"\xff" * 2048)
+    struct.pack_into(">4sI8sI", header, 0, b"SDPX", 2048, b"V1.0", 2048 + 3 * width * height)
+    struct.pack_into(">HHII", header, 768, 0, 1, width, height)
+    struct.pack_into(">IIfIfBBBBHHIII", header, 780, 0, 0, 0.0, 255, 1.0, 50, 2, 2, 8, 0, 0, 2048, 0, 0)
+    return bytes(header) + b"\x80" * (3 * width * height)

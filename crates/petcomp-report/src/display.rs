@@ -40,7 +40,7 @@ struct DisplayRow {
     errors: Option<[f64; BACKGROUNDS.len()]>,
     /// Errors of the displacement where it is known, pixels of the photo.
     flow_errors: Vec<f64>,
-    /// Pixels inside.
+    /// Pixels inside; 0 where the true displacement is not known.
     inside: usize,
     /// Why there is no cut-out.
     refused: String,
@@ -56,9 +56,9 @@ struct DisplaySummary {
     /// The same as a share of the paper's on the same bottles: over all backgrounds, the plain one,
     /// and those with a pattern.
     shares: [f64; 3],
-    /// Of the pixels inside, how many have a displacement.
+    /// Of the pixels inside, how many have a displacement; not a number where the truth has none.
     known: f64,
-    /// Of those, how many have the right one; and the median error.
+    /// Of those, how many have the right one, and the median error; not numbers without any.
     good_flow: f64,
     median_flow_px: f64,
 }
@@ -130,7 +130,7 @@ impl Reality {
             method,
             errors: None,
             flow_errors: Vec::new(),
-            inside: self.inside.count(),
+            inside: self.flow.as_ref().map_or(0, |_| self.inside.count()),
             refused: String::new(),
         };
         match found {
@@ -227,13 +227,13 @@ impl DisplaySummary {
         Self {
             method,
             bottles: own.len(),
-            failed: own.len() - pairs.len(),
+            failed: own.iter().filter(|row| row.errors.is_none()).count(),
             error: mean_of(&pairs, |(own, _)| {
                 own.iter().sum::<f64>() / own.len() as f64
             }),
             shares: [share(0..5), share(4..5), share(0..4)],
-            known: flow.len() as f64 / inside.max(1) as f64,
-            good_flow: good as f64 / flow.len().max(1) as f64,
+            known: flow.len() as f64 / inside as f64,
+            good_flow: good as f64 / flow.len() as f64,
             median_flow_px: flow.get(flow.len() / 2).copied().unwrap_or(f64::NAN),
         }
     }
@@ -246,7 +246,7 @@ fn paper_errors(rows: &[DisplayRow], bottle: &str) -> Option<[f64; BACKGROUNDS.l
 
 /// A share or a length; nothing where there is none.
 fn shown(value: f64, unit: &str) -> String {
-    if value.is_nan() || value == 0.0 {
+    if value.is_nan() {
         return String::new();
     }
     format!("{value:.2}{unit}")
@@ -326,4 +326,47 @@ fn unknown_background(name: &str) -> Error {
         "background",
         format!("\"{name}\", expected one of {BACKGROUNDS:?}"),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(method: DisplayMethod, errors: Option<[f64; BACKGROUNDS.len()]>) -> DisplayRow {
+        DisplayRow {
+            bottle: "a".into(),
+            method,
+            errors,
+            flow_errors: Vec::new(),
+            inside: 0,
+            refused: String::new(),
+        }
+    }
+
+    #[test]
+    fn a_method_does_not_fail_where_the_paper_s_does() {
+        let (paper, stripes) = (DisplayMethod::Paper, DisplayMethod::Stripes);
+        let rows = [
+            row(paper, None),
+            row(stripes, Some([0.1; BACKGROUNDS.len()])),
+        ];
+        let failed = [paper, stripes].map(|method| DisplaySummary::new(&rows, method).failed);
+        assert_eq!(failed, [1, 0]);
+    }
+
+    #[test]
+    fn a_share_of_0_is_told_and_what_was_not_measured_is_not() {
+        let stripes = DisplayMethod::Stripes;
+        let cells = |row: DisplayRow| {
+            let summary = DisplaySummary::new(&[row], stripes);
+            table_of(&SUMMARY_COLUMNS, [&summary]).rows[0][7..].to_vec()
+        };
+        let wrong = DisplayRow {
+            flow_errors: vec![GOOD_FLOW_PX + 1.0],
+            inside: 4,
+            ..row(stripes, None)
+        };
+        assert_eq!(cells(wrong), ["0.25", "0.00", "3.00 px"]);
+        assert_eq!(cells(row(stripes, None)), ["", "", ""]);
+    }
 }

@@ -203,7 +203,7 @@ const DETAIL_COLUMNS: [Column<FlagRow>; 6] = [
         number_or_empty(r.judged.errors.map(|e| e[1]), 4)
     }),
     ("end", |r| r.judged.end.name().into()),
-    ("doubts", |r| r.judged.reasons.join("; ")),
+    ("warnings", |r| r.judged.reasons.join("; ")),
 ];
 
 /// Measures and writes `flags.csv` and `flags.md` into a folder.
@@ -341,6 +341,8 @@ mod tests {
                 &["2", "1", "0", "0", "0", "1"].map(String::from)[..]
             )
         );
-        assert_eq!(table_of(&DETAIL_COLUMNS, &rows).rows.len(), 2);
+        let details = table_of(&DETAIL_COLUMNS, &rows);
+        assert_eq!(details.rows.len(), 2);
+        assert_eq!(details.columns[5], "warnings", "as in matte.csv");
     }
 }

@@ -33,8 +33,11 @@ fn properties(date: &str) -> [(&'static str, Option<String>); 8] {
 
 fn memory() -> Option<String> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let gib = bytes_in(&text, "MemTotal")? / BYTES_PER_GIB;
-    Some(format!("{gib:.1} GiB"))
+    bytes_in(&text, "MemTotal").map(gib_text)
+}
+
+fn gib_text(bytes: f64) -> String {
+    format!("{:.1} GiB", bytes / BYTES_PER_GIB)
 }
 
 fn system_name() -> Option<String> {
@@ -65,8 +68,7 @@ fn value_of<'a>(line: &'a str, name: &str) -> Option<&'a str> {
 
 /// What a line `Name:   123 kB` of a file of Linux's `/proc` says, bytes.
 pub(crate) fn bytes_in(text: &str, name: &str) -> Option<f64> {
-    let mut words = value_in(text, name)?.split_whitespace();
-    let kib: f64 = words.next()?.parse().ok()?;
+    let kib: f64 = value_in(text, name)?.strip_suffix(" kB")?.parse().ok()?;
     Some(kib * BYTES_PER_KIB)
 }
 
@@ -86,9 +88,10 @@ mod tests {
             (None, None)
         );
         assert_eq!(
-            ["MemTotal", "VmHWM", "VmRSS", "PRETTY_NAME"].map(|name| bytes_in(text, name)),
+            ["MemTotal", "VmHWM", "VmRSS", "MemTotalFoo"].map(|name| bytes_in(text, name)),
             [Some(2.0 * BYTES_PER_GIB), Some(12288.0), None, None]
         );
+        assert_eq!(gib_text(2.0 * BYTES_PER_GIB), "2.0 GiB");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use petcomp::Camera;
 use petcomp::Image;
 use petcomp::asset::Texture;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
-use petcomp::scene::{AreaLight, Card, LightShape, Shot};
+use petcomp::scene::{AreaLight, Card, Shot};
 use petcomp::{LinearRgb, ObjectId, PremulRgba};
 use std::f64::consts::PI;
 
@@ -38,12 +38,8 @@ fn pose_looking_down(height_m: f64) -> Pose {
 /// A square lamp that shines at the origin from above its right.
 pub(super) fn lamp(color: LinearRgb) -> AreaLight {
     AreaLight {
-        shape: LightShape::Rectangle,
-        position: [0.5, 0.3, 1.2],
-        target: [0.0; 3],
-        size: [0.35; 2],
-        power: 9.0,
         color,
+        ..AreaLight::new([0.5, 0.3, 1.2], [0.35; 2], 9.0)
     }
 }
 

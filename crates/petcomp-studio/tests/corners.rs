@@ -389,8 +389,28 @@ fn a_label_that_has_no_camera_keeps_no_other_from_its_own() {
     let mut label: Value = io::read_json(&path).unwrap();
     label["surface"]["corners_px"] = Value::Null;
     io::write_json(&path, &label).unwrap();
+    let camera = dir.path().join("bg0001.camera.json");
+    std::fs::write(&camera, "of another label").unwrap();
     let studio = Studio::over(dir.path());
     assert_only_the_first_is_solved(&studio);
+    assert!(!camera.exists());
+}
+
+#[test]
+fn a_label_that_no_camera_fits_is_told_why_and_keeps_no_camera_of_before() {
+    let dir = photos(&["bg0000", "bg0001"]);
+    let path = dir.path().join("bg0001.label.json");
+    let mut label: Value = io::read_json(&path).unwrap();
+    (label["surface"]["width_m"], label["surface"]["height_m"]) = (json!(0.37), json!(0.56));
+    io::write_json(&path, &label).unwrap();
+    let camera = dir.path().join("bg0001.camera.json");
+    std::fs::write(&camera, "of another label").unwrap();
+    let studio = Studio::over(dir.path());
+    let asked = r#"{ "photos": ["bg0001.jpg"] }"#;
+    let solved = body(&studio.post("api/corners/joint", asked));
+    let why = solved[0]["why"].as_str().unwrap();
+    assert!(why.contains("exchange width_m and height_m"), "{why}");
+    assert!(!camera.exists());
 }
 
 #[test]

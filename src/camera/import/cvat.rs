@@ -1,6 +1,7 @@
 //! CVAT: the export "CVAT for images 1.1", an XML file for many pictures.
 
 use super::{AnnotatedShape, Annotation, ShapeKind, turned_about, upright_corners, with_shapes};
+use crate::bounds;
 use crate::error::{Error, Result};
 use roxmltree::{Document, Node};
 
@@ -27,11 +28,11 @@ pub(super) fn annotations(text: &str) -> Result<Option<Vec<Annotation>>> {
 
 /// CVAT's pixels are ours: 0 is the edge of the picture.
 fn annotation(image: Node<'_, '_>) -> Result<Annotation> {
-    let (width, height) = (number(image, "width")?, number(image, "height")?);
+    let (width, height) = (side_px(image, "width")?, side_px(image, "height")?);
     let name = image.attribute("name").unwrap_or_default();
     Ok(Annotation {
         files: vec![name.replace('\\', "/")],
-        size: Some([width as u32, height as u32]),
+        size: Some([width, height]),
         shapes: shapes(image)?,
         source: PROGRAM,
     })
@@ -90,6 +91,19 @@ fn number(node: Node<'_, '_>, name: &str) -> Result<f64> {
         .ok_or_else(|| Error::value(name, "missing, expected a number"))?;
     text.parse()
         .map_err(|_| Error::value(name, format!("\"{text}\", expected a number")))
+}
+
+/// A side of a picture.
+fn side_px(image: Node<'_, '_>, name: &str) -> Result<u32> {
+    let side = number(image, name)?;
+    if (1.0..=f64::from(u32::MAX)).contains(&side) && side.fract() == 0.0 {
+        return Ok(side as u32);
+    }
+    let what = format!(
+        "{}, expected whole pixels, at least 1",
+        bounds::number(side)
+    );
+    Err(Error::value(name, what))
 }
 
 /// The corners of a rectangle that was turned clockwise about its middle.
@@ -154,6 +168,21 @@ mod tests {
             (x - 6.0).abs() < 1e-12 && (y - 3.0).abs() < 1e-12,
             "{x} {y}"
         );
+    }
+
+    #[test]
+    fn a_side_that_no_picture_has_is_named() {
+        for (side, shown) in [
+            ("-5", "-5"),
+            ("NaN", "NaN"),
+            ("1e99", "1e99"),
+            ("0.5", "0.5"),
+        ] {
+            let text = XML.replacen("width=\"200\"", &format!("width=\"{side}\""), 1);
+            let told = annotations(&text).unwrap_err().to_string();
+            let expected = format!("image[0].width: {shown}, expected whole pixels, at least 1");
+            assert_eq!(told, expected);
+        }
     }
 
     #[test]

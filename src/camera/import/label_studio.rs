@@ -74,8 +74,9 @@ fn annotation(task: &Value) -> Result<Annotation> {
         ..Default::default()
     };
     for (i, result) in results.iter().enumerate().filter(|(_, r)| has_size(r)) {
-        let result = read_result(result).map_err(|e| Error::value(format!("result[{i}]"), e))?;
-        annotation.size = Some([result.original_width, result.original_height]);
+        let in_result = |e: String| Error::value(format!("result[{i}]"), e);
+        let result = read_result(result).map_err(in_result)?;
+        annotation.set_size(&result).map_err(in_result)?;
         if let Some(shape) = result.shape() {
             annotation.add_region(shape);
         }
@@ -84,6 +85,18 @@ fn annotation(task: &Value) -> Result<Annotation> {
 }
 
 impl Annotation {
+    /// The picture's size is that of each result.
+    fn set_size(&mut self, result: &AnnotationResult) -> std::result::Result<(), String> {
+        let size @ [width, height] = [result.original_width, result.original_height];
+        let [w, h] = *self.size.get_or_insert(size);
+        if [w, h] == size {
+            return Ok(());
+        }
+        Err(format!(
+            "original_width and original_height: {width} x {height}, expected {w} x {h} as before it"
+        ))
+    }
+
     /// A region has a result for each control that says something of it, all with its geometry:
     /// they are one shape, with the first name that any of them gives.
     fn add_region(&mut self, shape: AnnotatedShape) {
@@ -367,6 +380,18 @@ mod tests {
             let shapes = only(&both).shapes;
             assert_eq!((shapes.len(), shapes[0].name.as_str()), (1, "tray"));
         }
+    }
+
+    #[test]
+    fn results_of_pictures_of_two_sizes_are_refused() {
+        let other = r#"{"original_width": 400, "original_height": 100, "type": "choices"}, "#;
+        let both = JSON.replace(
+            "{\"type\": \"choices\"",
+            &format!("{other}{{\"type\": \"choices\""),
+        );
+        let told = super::super::annotations(&both).unwrap_err().to_string();
+        let expected = "[0].result[1]: original_width and original_height: 400 x 100, expected 200 x 100 as before it";
+        assert_eq!(told, expected);
     }
 
     #[test]

@@ -96,10 +96,7 @@ impl Annotation {
 
     /// Name and corners of the only shape that can be the surface.
     fn rectangle(&self) -> Result<NamedCorners> {
-        let mut numbers = self.shapes.iter().flat_map(|s| s.points.as_flattened());
-        if !numbers.all(|v| v.is_finite()) {
-            return Err(Error::value("shapes", "a point is not finite"));
-        }
+        self.check_finite()?;
         let mut quads = self.four_cornered(ShapeKind::Polygon);
         let mut boxes = self.four_cornered(ShapeKind::Rectangle);
         let points = self.named_points();
@@ -108,6 +105,14 @@ impl Annotation {
             [0, 1, _] => Ok(boxes.remove(0)),
             [0, 0, 4] => Ok(corners_from_points([0, 1, 2, 3].map(|i| points[i]))),
             counts => Err(self.unclear(counts)),
+        }
+    }
+
+    fn check_finite(&self) -> Result<()> {
+        let mut numbers = self.shapes.iter().flat_map(|s| s.points.as_flattened());
+        match numbers.all(|v| v.is_finite()) {
+            true => Ok(()),
+            false => Err(Error::value("shapes", "a point is not finite")),
         }
     }
 

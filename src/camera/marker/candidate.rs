@@ -65,9 +65,7 @@ fn take_region(dark: &mut Mask, start: usize) -> (usize, RowEnds) {
     let mut stack = vec![start];
     while let Some(at) = stack.pop() {
         pixels += 1;
-        let (x, y) = (at % width, at / width);
-        let (first, last) = ends.entry(y).or_insert((x, x));
-        (*first, *last) = ((*first).min(x), (*last).max(x));
+        extend_row(&mut ends, at % width, at / width);
         for neighbour in neighbours(at, [width, height]) {
             if std::mem::take(&mut dark.pixels_mut()[neighbour]) {
                 stack.push(neighbour);
@@ -75,6 +73,11 @@ fn take_region(dark: &mut Mask, start: usize) -> (usize, RowEnds) {
         }
     }
     (pixels, ends)
+}
+
+fn extend_row(ends: &mut RowEnds, x: usize, y: usize) {
+    let (first, last) = ends.entry(y).or_insert((x, x));
+    (*first, *last) = ((*first).min(x), (*last).max(x));
 }
 
 /// The pixels beside, above and below one that are in the picture.
@@ -110,9 +113,11 @@ fn quad(outline: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
     let corners = [a, b, c, d];
     let area = (c - a).perp(&(d - b)) / 2.0;
     let fills_hull = area >= MIN_HULL_SHARE * hull_area(outline);
-    let mut sides = (0..4).map(|i| corners[(i + 1) % 4] - corners[i]);
-    let are_long = sides.all(|side| side.norm() >= MIN_SIDE_PX);
-    (are_long && fills_hull).then_some(corners)
+    (has_long_sides(&corners) && fills_hull).then_some(corners)
+}
+
+fn has_long_sides(corners: &[Point2<f64>; 4]) -> bool {
+    (0..4).all(|i| (corners[(i + 1) % 4] - corners[i]).norm() >= MIN_SIDE_PX)
 }
 
 fn farthest(points: &[Point2<f64>], from: Point2<f64>) -> Option<Point2<f64>> {

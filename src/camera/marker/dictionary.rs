@@ -170,12 +170,13 @@ mod tests {
     }
 
     #[test]
-    fn markers_differ_in_at_least_four_bits_in_every_rotation() {
+    fn markers_differ_in_at_least_four_bits_from_others_and_themselves_in_every_rotation() {
         for (i, &a) in DICT_4X4_50.iter().enumerate() {
-            for &b in &DICT_4X4_50[i + 1..] {
+            for (j, &b) in DICT_4X4_50.iter().enumerate().skip(i) {
                 let mut b = b;
-                for _ in 0..4 {
-                    assert!((a ^ b).count_ones() >= 3, "{i}: {a:x} {b:x}");
+                for turns in 0..4 {
+                    let is_itself = i == j && turns == 0;
+                    assert!(is_itself || (a ^ b).count_ones() >= 4, "{a:x} {b:x}");
                     b = turned(b);
                 }
             }

@@ -12,6 +12,7 @@ use crate::pixel::LinearRgb;
 use crate::quantile::median;
 use crate::scene::{Blur, Noise};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -116,7 +117,7 @@ impl PixelMeasures {
         let read = io::read::<LinearRgb>(&picture.path);
         let read = read.inspect_err(|error| log::warn!("{error}")).ok()?;
         let boxes = picture.boxes.as_deref().unwrap_or_default();
-        Self::around(&shrunk(&read, width), boxes)
+        Self::around(&shrunk(Cow::Owned(read), width), boxes)
     }
 
     /// Of a picture and its surroundings of boxes.

@@ -13,6 +13,7 @@ use crate::pixel::LinearRgb;
 use crate::plot::{Page, Table, escaped, heat::heat_map};
 use crate::quantile::quantile;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -159,7 +160,7 @@ impl PixelStatistics {
     }
 
     pub(in crate::dataset) fn of_whole(picture: &Image<LinearRgb>) -> Self {
-        let codes = shrunk(picture, MEASURED_WIDTH_PX).map(codes_of);
+        let codes = shrunk(Cow::Borrowed(picture), MEASURED_WIDTH_PX).map(codes_of);
         let luma = codes.map(|[r, g, b]| 0.299 * r + 0.587 * g + 0.114 * b);
         let spread = codes.map(channel_spread);
         let brightness = mean(luma.pixels().iter().copied());

@@ -370,7 +370,7 @@ pub fn scores_table(all: &[Metrics]) -> Table {
     table
 }
 
-/// Of the mAP by YOLOv5's definition.
+/// The row of the spread of the mAP by YOLOv5's definition.
 fn spread_row(spread: &Spread) -> [String; 7] {
     // The normal distribution knows no ends, a mAP does.
     let interval = spread

@@ -155,15 +155,18 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     if is_xyz && let Some(matrix) = to_rec709(&XYZ_SPACE)? {
         convert_primaries(&mut light, 3, &matrix);
     }
-    let raster = Raster {
+    Ok(light_raster((width, height), light).upright(orientation))
+}
+
+fn light_raster((width, height): (usize, usize), light: Vec<f32>) -> Raster {
+    Raster {
         width,
         height,
         names: default_names(3).unwrap_or_default(),
         samples: Samples::F32(light),
         display_encoded: false,
         premultiplied: false,
-    };
-    Ok(raster.upright(orientation))
+    }
 }
 
 /// The header ends in time: its lines are kept, however many and long they are.

@@ -3,10 +3,16 @@
 use bytemuck::{Pod, zeroed_vec};
 use rayon::prelude::*;
 
-/// One of the eight values of the EXIF tag `Orientation`; anything else, as 0 by default, is
-/// treated as 1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// One of the eight values of the EXIF tag `Orientation`; anything else is treated as 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Orientation(pub(crate) u8);
+
+impl Default for Orientation {
+    /// Upright as it is stored.
+    fn default() -> Self {
+        Self(1)
+    }
+}
 
 impl Orientation {
     /// Rows of the file are columns of the picture.

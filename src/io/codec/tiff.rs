@@ -13,6 +13,7 @@ use crate::io::header::{Header, lines_of_notes, notes_of_lines};
 use crate::io::limits::{Demand, Limits};
 use std::collections::BTreeMap;
 use std::io::{BufRead, Cursor, Read, Seek};
+use std::ops::Range;
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::encoder::colortype::{self, Gray8, Gray16, Gray32Float, RGB8, RGB16, RGB32Float};
 use tiff::encoder::{TiffEncoder, TiffValue};
@@ -186,24 +187,65 @@ fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<BTreeMap<u16, u1
         true => TiffOrder::LittleEndian,
         false => TiffOrder::BigEndian,
     };
-    // Where the directory's place is, bytes of the number of entries and of an entry, and where its
-    // value begins.
-    let (place, count, entry, value) = match is_big_tiff(&start) {
-        true => (8..16, 8, 20, 12),
-        false => (4..8, 2, 12, 8),
+    let directory = match is_big_tiff(&start) {
+        true => BIG_DIRECTORY,
+        false => CLASSIC_DIRECTORY,
     };
-    let place = order.number(start.get(place).unwrap_or_default());
-    let entries = order.number(&read_at(file, place, count)?);
-    let length = entries.min(u16::MAX.into()) * entry as u64;
-    let bytes = read_at(file, place.saturating_add(count), length)?;
-    if bytes.len() as u64 != length {
-        return Ok(BTreeMap::new());
+    let place = order.number(start.get(directory.place.clone()).unwrap_or_default());
+    let bytes = directory.entries(file, place, order)?;
+    let entries = bytes.chunks(directory.entry);
+    Ok(entries.map(|entry| directory.tag(entry, order)).collect())
+}
+
+/// How a directory is laid out, in bytes.
+struct TiffDirectory {
+    /// Where the file says where its first directory is.
+    place: Range<usize>,
+    /// Length of the number of entries.
+    count: u64,
+    /// Length of an entry.
+    entry: usize,
+    /// Where in an entry its value begins.
+    value: usize,
+}
+
+const CLASSIC_DIRECTORY: TiffDirectory = TiffDirectory {
+    place: 4..8,
+    count: 2,
+    entry: 12,
+    value: 8,
+};
+const BIG_DIRECTORY: TiffDirectory = TiffDirectory {
+    place: 8..16,
+    count: 8,
+    entry: 20,
+    value: 12,
+};
+
+impl TiffDirectory {
+    /// The entries of the directory at a place; none where the file ends in them.
+    fn entries(
+        &self,
+        file: &mut (impl Read + Seek),
+        place: u64,
+        order: TiffOrder,
+    ) -> std::io::Result<Vec<u8>> {
+        let count = order.number(&read_at(file, place, self.count)?);
+        let length = count.min(u16::MAX.into()) * self.entry as u64;
+        let mut bytes = read_at(file, place.saturating_add(self.count), length)?;
+        // What follows a value of 16 bits in its field is not read.
+        let unused = (self.entry - self.value - 2) as u64;
+        if (bytes.len() as u64) < length.saturating_sub(unused) {
+            bytes.clear();
+        }
+        Ok(bytes)
     }
-    let tags = bytes.chunks_exact(entry).map(|tag| {
-        let [name, value] = [&tag[..2], &tag[value..][..2]];
+
+    /// The tag of an entry, and the first 16 bits of its value.
+    fn tag(&self, entry: &[u8], order: TiffOrder) -> (u16, u16) {
+        let [name, value] = [&entry[..2], &entry[self.value..][..2]];
         (order.number(name) as u16, order.number(value) as u16)
-    });
-    Ok(tags.collect())
+    }
 }
 
 /// What OpenImageIO reads in wrong colours: CIELab in another white, and a palette that is not
@@ -727,9 +769,12 @@ mod tests {
             file[46] = 0;
             file
         };
+        // The file ends behind the two bytes of its last value that count.
+        let cut = mosaic[..mosaic.len() - 6].to_vec();
         for raw in [
             mosaic,
             without_version,
+            cut,
             with_tag(kind, CFA),
             with_tag(kind, LINEAR_RAW),
         ] {

@@ -17,6 +17,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::ops::Range;
 use std::path::Path;
+use toml::Spanned;
 use toml::de::DeTable;
 
 const BYTE_ORDER_MARK: char = '\u{feff}';
@@ -235,15 +236,21 @@ pub fn write_text(path: impl AsRef<Path>, text: &str) -> Result<()> {
 /// [`Error::Value`] for what is not TOML, a key twice, a number that is not finite, and values that
 /// do not fit.
 pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
-    let document = DeTable::parse(text)
-        .map_err(|e| toml_mistake(text, e.span(), String::new(), e.message().into()))?;
-    if let Some((what, span)) = find_invalid_toml(&document, max_depth()) {
-        return Err(toml_mistake(text, Some(span), String::new(), what));
-    }
+    let document = checked_toml(text)?;
     serde_path_to_error::deserialize(toml::Deserializer::from(document)).map_err(|e| {
         let what = no_name::message::<T>(&e, || text.parse().ok().map(toml::Value::Table));
         toml_mistake(text, e.inner().span(), e.path().to_string(), what)
     })
+}
+
+/// A document in which nothing is wrong whatever it is read as.
+fn checked_toml(text: &str) -> Result<Spanned<DeTable<'_>>> {
+    let document = DeTable::parse(text)
+        .map_err(|e| toml_mistake(text, e.span(), String::new(), e.message().into()))?;
+    match find_invalid_toml(&document, max_depth()) {
+        Some((what, span)) => Err(toml_mistake(text, Some(span), String::new(), what)),
+        None => Ok(document),
+    }
 }
 
 fn toml_mistake(text: &str, span: Option<Range<usize>>, at: String, what: String) -> Error {

@@ -26,10 +26,18 @@ thread_local! {
 impl Syncing {
     /// Runs a job; the files that it writes on this thread are put on the disk so.
     pub(crate) fn during<T>(self, job: impl FnOnce() -> T) -> T {
-        let before = SYNCING.replace(self);
-        let done = job();
-        SYNCING.set(before);
-        done
+        let _before = SyncingBefore(SYNCING.replace(self));
+        job()
+    }
+}
+
+/// How a thread put files on the disk before a job, and does again when this is dropped: also where
+/// the job panics, which threads of a pool outlive.
+struct SyncingBefore(Syncing);
+
+impl Drop for SyncingBefore {
+    fn drop(&mut self) {
+        SYNCING.set(self.0);
     }
 }
 
@@ -285,6 +293,13 @@ pub fn create_folder(path: impl AsRef<Path>) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_job_that_panics_leaves_its_thread_as_it_was() {
+        let job = || Syncing::Together.during::<()>(|| panic!("on purpose"));
+        assert!(std::panic::catch_unwind(job).is_err());
+        assert_eq!(SYNCING.get(), Syncing::Alone);
+    }
 
     #[test]
     fn a_failed_write_leaves_nothing_behind() {

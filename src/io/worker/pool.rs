@@ -14,6 +14,8 @@ use crate::io::codec::refusal::Refusal;
 use crate::io::limits::Limits;
 use crate::io::source::SourceFile;
 use std::io::{BufReader, ErrorKind};
+use std::os::fd::OwnedFd;
+use std::os::unix::net::UnixStream;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -189,12 +191,13 @@ impl Worker {
 
     /// A process that has sent nothing yet.
     fn launch(program: &Path, limits: &Limits) -> std::io::Result<Self> {
-        let mut child = spawn_program(program, limits)?;
-        let pipes = child.stdin.take().zip(child.stdout.take());
-        let (stdin, stdout) = pipes.ok_or_else(|| std::io::Error::other("no pipe to it"))?;
+        let (to, stdin) = UnixStream::pair()?;
+        let mut child = spawn_program(program, limits, stdin.into())?;
+        let stdout = child.stdout.take();
+        let stdout = stdout.ok_or_else(|| std::io::Error::other("no pipe to it"))?;
         Ok(Self {
             child,
-            to: TimedPipe::new(stdin.into())?,
+            to: TimedPipe::new(to.into())?,
             from: BufReader::new(TimedPipe::new(stdout.into())?),
             limits: limits.clone(),
             greeting: Greeting::default(),
@@ -312,7 +315,7 @@ fn ending_of(status: ExitStatus) -> String {
     }
 }
 
-fn spawn_program(program: &Path, limits: &Limits) -> std::io::Result<Child> {
+fn spawn_program(program: &Path, limits: &Limits, stdin: OwnedFd) -> std::io::Result<Child> {
     let environment = ENVIRONMENT
         .iter()
         .filter_map(|name| Some((name, std::env::var_os(name)?)));
@@ -320,7 +323,7 @@ fn spawn_program(program: &Path, limits: &Limits) -> std::io::Result<Child> {
         .arg(serde_json::to_string(limits)?)
         .env_clear()
         .envs(environment)
-        .stdin(Stdio::piped())
+        .stdin(stdin)
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn()
@@ -333,7 +336,8 @@ fn not_started(program: &Path, how: &str) -> Refusal {
 
 /// The other end of a pipe is gone.
 fn is_closed(e: &std::io::Error) -> bool {
-    matches!(e.kind(), ErrorKind::UnexpectedEof | ErrorKind::BrokenPipe)
+    use ErrorKind::{BrokenPipe, ConnectionReset, UnexpectedEof};
+    matches!(e.kind(), UnexpectedEof | BrokenPipe | ConnectionReset)
 }
 
 fn timeout_for_pixels(shape: &Shape) -> Duration {

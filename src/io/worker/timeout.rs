@@ -1,7 +1,8 @@
-//! Pipes that are waited for until a deadline.
+//! Pipes and sockets that are waited for until a deadline.
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+use rustix::net::{SendFlags, send};
 use std::fs::File;
 use std::io::{Error, ErrorKind, Read, Result, Write};
 use std::os::fd::{AsFd, OwnedFd};
@@ -11,7 +12,11 @@ use std::time::Instant;
 /// (`pipe(7)`).
 const PIPE_BYTES: usize = 1 << 20;
 
-/// One end of a pipe. Reading or writing past the deadline fails with [`ErrorKind::TimedOut`].
+/// One end of a pipe that is read, or of a socket that is written. Both fail with
+/// [`ErrorKind::TimedOut`] past the deadline.
+///
+/// What is written to a pipe that nobody reads any more ends the process where it did not ask for
+/// anything else (SIGPIPE), as a program in C; what is sent to a socket need not.
 pub(super) struct TimedPipe {
     file: File,
     pub(super) deadline: Instant,
@@ -62,7 +67,9 @@ impl Read for TimedPipe {
 
 impl Write for TimedPipe {
     fn write(&mut self, buf: &[u8]) -> Result<usize> {
-        self.when_ready(PollFlags::OUT, |mut file| file.write(buf))
+        self.when_ready(PollFlags::OUT, |file| {
+            Ok(send(file, buf, SendFlags::NOSIGNAL)?)
+        })
     }
 
     fn flush(&mut self) -> Result<()> {
@@ -73,6 +80,7 @@ impl Write for TimedPipe {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::os::unix::net::UnixStream;
     use std::time::Duration;
 
     #[test]
@@ -88,7 +96,7 @@ mod tests {
 
     #[test]
     fn a_pipe_that_nobody_reads_is_not_written_for_ever() {
-        let (_reader, writer) = std::io::pipe().unwrap();
+        let (_reader, writer) = UnixStream::pair().unwrap();
         let mut pipe = TimedPipe::new(writer.into()).unwrap();
         pipe.deadline = Instant::now() + Duration::from_millis(20);
         assert_eq!(

@@ -35,16 +35,20 @@ pub(super) fn make_opaque(
     let interior = interior(object.inside, object.longer_side);
     let mut paint = softened(&painted.zip_map(&interior, |p, i| p && i));
     claimed::clear_paint(&mut paint, object.claims);
-    for (factor, paint) in factors.pixels_mut().iter_mut().zip(paint.pixels()) {
-        factor.value *= 1.0 - paint;
-        factor.raise_sigma(*paint);
-    }
+    cover_with_paint(factors, &paint);
     let of_hue = paint
         .pixels()
         .iter()
         .zip(bright.pixels())
         .map(|(paint, bright)| *bright && *paint > 0.5);
     share(of_hue, object.inside)
+}
+
+fn cover_with_paint(factors: &mut Image<Factor>, paint: &Image<f32>) {
+    for (factor, paint) in factors.pixels_mut().iter_mut().zip(paint.pixels()) {
+        factor.value *= 1.0 - paint;
+        factor.raise_sigma(*paint);
+    }
 }
 
 /// The pixels that are brighter in the screen's hue than plastic in front of it can be.

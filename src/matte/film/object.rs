@@ -38,9 +38,11 @@ pub(super) fn side_px(inside: &Image<Coverage>) -> f32 {
 /// The share of the object's area that a set of pixels has.
 pub(super) fn share(set: impl Iterator<Item = bool>, inside: &Image<Coverage>) -> f32 {
     let object = area(inside);
-    if object <= 0.0 {
-        return 0.0;
-    }
     let covered = set.zip(inside.pixels()).filter(|(set, _)| *set);
-    (covered.map(|(_, c)| f64::from(c.0)).sum::<f64>() / object) as f32
+    // No object, and one whose area is no number, is none of it.
+    if object > 0.0 {
+        (covered.map(|(_, c)| f64::from(c.0)).sum::<f64>() / object) as f32
+    } else {
+        0.0
+    }
 }

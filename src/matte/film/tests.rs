@@ -119,14 +119,14 @@ impl World {
     /// Mean absolute error inside, over a grey background in the object's shadow, of what a
     /// function chooses.
     fn error(&self, found: &FilmMatte, of: impl Fn(usize) -> bool) -> f32 {
-        let shaded = shaded(&found.film, &found.transmittance);
+        let on_screen = shaded(&found.film, &found.transmittance);
         let behind = LinearRgb::new(0.5, 0.35, 0.3);
         let (mut sum, mut count) = (0.0, 0.0);
         for y in 0..SIZE.1 {
             for x in (0..SIZE.0).filter(|&x| is_inside(x, y) && of(x)) {
                 let (f, t) = self.truth(x, y);
                 let (told, real): ([f32; 3], [f32; 3]) = (
-                    shaded[(x, y)].over_color(behind).into(),
+                    on_screen[(x, y)].over_color(behind).into(),
                     (f + t * behind).into(),
                 );
                 sum += told
@@ -550,7 +550,7 @@ fn clear_plastic_beside_a_large_label_is_no_print() {
 #[test]
 fn a_print_of_the_screens_hue_on_something_opaque_is_told() {
     let screen = [0.10, 0.45, 0.12];
-    let solved = |print: [f32; 3]| {
+    let printed = |print: [f32; 3]| {
         let inside = Image::from_fn(120, 120, |x, _| Coverage(f32::from((10..110).contains(&x))));
         let photo = Image::from_fn(120, 120, |x, y| {
             let color = match (x, y) {
@@ -563,11 +563,11 @@ fn a_print_of_the_screens_hue_on_something_opaque_is_told() {
         let plate = ScreenPlate::even(screen.into(), (120, 120));
         film(&photo, &plate, &inside, &FilmOptions::default()).unwrap()
     };
-    let is_told = |print| is_warned(&solved(print), Code::KeyedAway);
+    let is_noticed = |print| is_warned(&printed(print), Code::KeyedAway);
     for shade in [0.3, 0.5, 0.8, 1.0] {
-        assert!(is_told(screen.map(|c| shade * c)), "{shade}");
+        assert!(is_noticed(screen.map(|c| shade * c)), "{shade}");
     }
-    assert!(!is_told([0.5, 0.05, 0.05]) && !is_told([0.02; 3]) && !is_told([0.8; 3]));
+    assert!(!is_noticed([0.5, 0.05, 0.05]) && !is_noticed([0.02; 3]) && !is_noticed([0.8; 3]));
 }
 
 /// A lattice of opaque bars whose holes are too small for the outline, with the screen in its
@@ -642,8 +642,8 @@ fn dark_paint_that_may_be_dark_plastic_is_told() {
             }
             .solved();
             let [bar, hole] = Lattice::opacities(&found);
-            let is_told = is_warned(&found, Code::TintUncertain);
-            assert!(bar > 0.9 || is_told, "{bars:?}: {bar}");
+            let is_uncertain = is_warned(&found, Code::TintUncertain);
+            assert!(bar > 0.9 || is_uncertain, "{bars:?}: {bar}");
             assert!(hole < 0.35, "{bars:?}: {hole}");
         }
     }

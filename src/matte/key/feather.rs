@@ -84,6 +84,7 @@ fn gaussian_table(distance: usize, behaviour: Behaviour) -> Vec<f32> {
 /// Offsets in the order in which the profile visits samples.
 fn visiting_order(radius: usize, behaviour: Behaviour) -> Vec<isize> {
     match behaviour {
+        // At each distance the one behind first.
         Behaviour::V45 => from_the_middle(radius).map(|ahead| -ahead).collect(),
         Behaviour::V34 | Behaviour::V42 => (-(radius as isize)..=radius as isize).collect(),
     }

@@ -85,11 +85,7 @@ pub(super) struct FilledPlate {
 /// [`Error::Value`] where no pixel of the plate is usable.
 pub(super) fn fill_plate(plate: &Image<LinearRgb>, options: &KeyOptions) -> Result<FilledPlate> {
     let channel = primary_channel(usable_mean(plate));
-    // Holes are transparent.
-    let known = plate.map(|c| match is_usable_key(c, channel, options) {
-        true => c.opaque(),
-        false => PremulRgba::TRANSPARENT,
-    });
+    let known = usable_keys(plate, channel, options);
     let count = known.pixels().par_iter().filter(|p| p.a == 0.0).count();
     if count == plate.pixels().len() && count > 0 {
         return Err(no_usable_key(channel));
@@ -102,6 +98,18 @@ pub(super) fn fill_plate(plate: &Image<LinearRgb>, options: &KeyOptions) -> Resu
         plate,
         channel,
         count,
+    })
+}
+
+/// The plate with its holes transparent.
+fn usable_keys(
+    plate: &Image<LinearRgb>,
+    channel: usize,
+    options: &KeyOptions,
+) -> Image<PremulRgba> {
+    plate.map(|c| match is_usable_key(c, channel, options) {
+        true => c.opaque(),
+        false => PremulRgba::TRANSPARENT,
     })
 }
 

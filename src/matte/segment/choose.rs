@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
 use crate::matte::prepared::{longer_side, scaled_sides};
-use crate::matte::stroke::StrokesOnPhoto;
+use crate::matte::stroke::{Claims, StrokesOnPhoto};
 use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -20,7 +20,12 @@ pub(super) struct ChosenSearch<'a> {
     pub(super) pass: Pass,
     /// The picture that it searched.
     pub(super) picture: Cow<'a, Image<LinearRgb>>,
-    search: Search,
+    /// Its finest band.
+    finest: Image<f32>,
+    /// Where that is above its threshold.
+    finest_binary: Mask,
+    /// What a person says of the outline, in the picture that it searched.
+    claims: Option<Claims>,
     /// The band that served as the coarsest one.
     pub(super) levels: usize,
     /// How well it agrees.
@@ -247,7 +252,10 @@ impl SearchRun {
         Ok(ChosenSearch {
             pass: self.pass?,
             picture: scale.picture,
-            search: scale.search,
+            // The rest of the search goes at once: it is as large as several photos.
+            finest: scale.search.bands.finest,
+            finest_binary: scale.search.finest_binary,
+            claims: scale.search.claims,
             levels: self.levels,
             confidence,
         })
@@ -314,17 +322,17 @@ impl ChosenSearch<'_> {
     /// What the edges enclose, without holes, as a person corrected it.
     pub(super) fn object_area(&self) -> ObjectArea {
         let found = holes::object_area(&self.picture, &self.pass.inside);
-        found.corrected(self.search.claims.as_ref())
+        found.corrected(self.claims.as_ref())
     }
 
     /// The pictures (a) to (e) of the paper's Figure 2, and what lies between; `whole` is the
     /// picture at full search size.
     pub(super) fn into_steps(self, whole: &Image<LinearRgb>) -> Vec<SegmentStep> {
-        let (pass, finest_binary) = (self.pass, self.search.finest_binary);
+        let (pass, finest_binary) = (self.pass, self.finest_binary);
         let both = finest_binary.zip_map(&pass.coarsest_binary, |a, b| a && b);
         let steps = [
             ("grey", band::luma_root(whole, [1.0; 3])),
-            ("first_band", self.search.bands.finest),
+            ("first_band", self.finest),
             ("last_band", pass.coarsest),
             ("first_binary", as_plane(&finest_binary)),
             ("last_binary", as_plane(&pass.coarsest_binary)),

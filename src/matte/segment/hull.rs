@@ -63,9 +63,14 @@ pub(super) fn farthest_side(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
 }
 
 /// By how much the side of one polygon's box that lies farthest beyond another's does so; 0 where
-/// none does.
+/// none does, and the box's longer side where the other has no corner.
 pub(super) fn growth(from: &[Point2<f64>], to: &[Point2<f64>]) -> f64 {
-    let ([l, t, r, b], [left, top, right, bottom]) = (sides(from), sides(to));
+    let [left, top, right, bottom] = sides(to);
+    let [l, t, r, b] = if from.is_empty() {
+        [right, bottom, left, top]
+    } else {
+        sides(from)
+    };
     [l - left, t - top, right - r, bottom - b]
         .into_iter()
         .fold(0.0, f64::max)
@@ -107,6 +112,14 @@ mod tests {
             |x: f64, w: f64| [[x, 1.0], [x + w, 1.0], [x + w, 5.0], [x, 5.0]].map(Point2::from);
         assert_eq!(sides(&square(2.0, 3.0)), [2.0, 1.0, 5.0, 5.0]);
         assert_eq!(farthest_side(&square(2.0, 3.0), &square(1.0, 7.0)), 3.0);
+    }
+
+    #[test]
+    fn all_of_a_box_lies_beyond_nothing() {
+        let tall = [[2.0, 1.0], [5.0, 1.0], [5.0, 8.0], [2.0, 8.0]].map(Point2::from);
+        let inner = [[3.0, 1.0], [5.0, 1.0], [5.0, 6.0], [3.0, 6.0]].map(Point2::from);
+        let beyond = [growth(&[], &tall), growth(&inner, &tall), growth(&[], &[])];
+        assert_eq!(beyond, [7.0, 2.0, 0.0]);
     }
 
     #[test]

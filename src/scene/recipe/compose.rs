@@ -20,6 +20,18 @@ pub(super) struct SceneNumber {
     pub(super) place: SequencePlace,
 }
 
+impl SceneNumber {
+    /// The draws of its sequence.
+    fn draws(self, log: &DrawLog) -> Draws<'_> {
+        Draws::new(self.seed, self.place.first).logged(log)
+    }
+
+    /// What is drawn anew for each picture of a sequence.
+    fn own_draws(self, log: &DrawLog) -> Draws<'_> {
+        Draws::new(self.seed, self.k).logged(log)
+    }
+}
+
 /// The backgrounds that a scene may have.
 #[derive(Clone, Copy)]
 pub(super) struct Places<'a> {
@@ -27,6 +39,15 @@ pub(super) struct Places<'a> {
     pub(super) viewpoints: &'a [Background],
     /// Without.
     pub(super) negatives: &'a [Background],
+}
+
+impl<'a> Places<'a> {
+    fn of(&self, is_negative: bool) -> &'a [Background] {
+        match is_negative {
+            true => self.negatives,
+            false => self.viewpoints,
+        }
+    }
 }
 
 impl Recipe {
@@ -38,13 +59,12 @@ impl Recipe {
         places: Places<'_>,
         catalog: &[AssetVariant],
     ) -> Result<Scene> {
-        let draws = Draws::new(number.seed, number.place.first).logged(log);
-        let own_draws = Draws::new(number.seed, number.k).logged(log);
-        let (background, mut objects) = if Range::chance(self.negatives, &draws, "negative") {
-            (pick_background(&draws, places.negatives)?, Vec::new())
-        } else {
-            let background = pick_background(&draws, places.viewpoints)?;
-            (background, self.select_objects(number, log, catalog)?)
+        let draws = number.draws(log);
+        let is_negative = Range::chance(self.negatives, &draws, "negative");
+        let background = pick_background(&draws, places.of(is_negative))?;
+        let mut objects = match is_negative {
+            true => Vec::new(),
+            false => self.select_objects(number, log, catalog)?,
         };
         self.vary_objects(&mut objects, &draws);
         let surface = self.draw_surface(&draws, background);
@@ -52,7 +72,7 @@ impl Recipe {
             .stack(&mut objects)?;
         let scene = Scene {
             belt: self.belt.map(|belt| belt.draw(&draws, number.place)),
-            finish: self.finish.draw(&draws, &own_draws),
+            finish: self.finish.draw(&draws, &number.own_draws(log)),
             ..self.lit_scene(&draws, background, surface, objects)
         };
         scene.check()?;

@@ -93,28 +93,44 @@ const VARIANTS: [Variant; 5] = [
 /// other classes or share an image to learn from; [`Error::File`] for an image, or a folder for the
 /// kit, whose name is not UTF-8.
 pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
-    let real = YoloSet::open(&whole_folder(&options.real)?)?;
-    let synthetic = open_for_training(&whole_folder(&options.synthetic)?)?;
-    check_sets([&real, &synthetic], [&options.real, &options.synthetic])?;
-    warn_of_known_validation([&real, &synthetic], &options.real);
+    let [real, synthetic] = open_sets(options)?;
     let counts = [real.train.len() as u64, synthetic.train.len() as u64];
     let balance = balance_document(&options.balance, counts)?;
     let (variants, left_out) = VARIANTS
         .iter()
         .partition::<Vec<_>, _>(|variant| variant.has_validation(&synthetic));
+    write_data(folder, [&real, &synthetic], &variants)?;
+    io::write_json(folder.join("balance.json"), &balance)?;
+    let commands = commands_head(options, counts) + &without_validation(&left_out);
+    write_scripts(folder, &(commands + &training_commands(options, &variants)))
+}
+
+/// The real and the synthetic images, which fit together.
+fn open_sets(options: &KitOptions) -> Result<[YoloSet; 2]> {
+    let real = YoloSet::open(&whole_folder(&options.real)?)?;
+    let synthetic = open_for_training(&whole_folder(&options.synthetic)?)?;
+    check_sets([&real, &synthetic], [&options.real, &options.synthetic])?;
+    warn_of_known_validation([&real, &synthetic], &options.real);
+    Ok([real, synthetic])
+}
+
+/// The lists of images, and what each variant is trained on, into a folder that is made for them.
+fn write_data(
+    folder: &Path,
+    [real, synthetic]: [&YoloSet; 2],
+    variants: &[&Variant],
+) -> Result<()> {
     let whole = io::absolute(folder)?;
-    let (place, lists) = (io::path_text(&whole)?, lists_of(&real, &synthetic)?);
+    let (place, lists) = (io::path_text(&whole)?, lists_of(real, synthetic)?);
     io::create_folder(folder)?;
     for (name, list) in lists {
         io::write_text(folder.join(format!("{name}.txt")), &list)?;
     }
-    for variant in &variants {
+    for variant in variants {
         let path = folder.join(format!("{}.yaml", variant.name));
         io::write_text(path, &variant.to_yaml(place, &real.classes))?;
     }
-    io::write_json(folder.join("balance.json"), &balance)?;
-    let commands = commands_head(options, counts) + &without_validation(&left_out);
-    write_scripts(folder, &(commands + &training_commands(options, &variants)))
+    Ok(())
 }
 
 fn write_scripts(folder: &Path, commands: &str) -> Result<()> {

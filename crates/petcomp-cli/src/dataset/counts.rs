@@ -37,12 +37,13 @@ fn images_line(counts: &DatasetCounts) -> String {
 
 fn objects_line(counts: &DatasetCounts) -> String {
     format!(
-        "objects      {}{}, {} labelled, {} obstructed ({})",
+        "objects      {}{}, {} labelled, {} obstructed ({}){}",
         counts.objects,
         counted_in(counts),
         counts.labelled,
         counts.obstructed,
-        obstructed_labels(counts.policy)
+        obstructed_labels(counts.policy),
+        left_out(counts)
     )
 }
 
@@ -64,11 +65,37 @@ fn obstructed_labels(policy: Obstructed) -> &'static str {
     }
 }
 
+/// Objects without a label that are not obstructed, where there are any.
+fn left_out(counts: &DatasetCounts) -> String {
+    match counts.left_out() {
+        0 => String::new(),
+        some => format!(", {some} cut off too much or not seen (without a label)"),
+    }
+}
+
 /// What a dataset's trainers are given: the files that name all others, or the folder where there
 /// are none.
 pub(crate) fn trainer_inputs(counts: &DatasetCounts, folder: &Path) -> Vec<PathBuf> {
     match counts.for_trainers.as_slice() {
         [] => vec![folder.into()],
         files => files.iter().map(|file| folder.join(file)).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_of_objects_adds_up() {
+        let counts = DatasetCounts {
+            objects: 10,
+            labelled: 5,
+            obstructed: 3,
+            ..DatasetCounts::default()
+        };
+        let expected = "objects      10, 5 labelled, 3 obstructed (without a label), \
+            2 cut off too much or not seen (without a label)";
+        assert_eq!(objects_line(&counts), expected);
     }
 }

@@ -86,22 +86,14 @@ pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()
 impl GenerateArgs {
     /// Has what is damaged made again.
     fn repair(&self, folder: &Path, range: SampleRange, archives: bool) -> petcomp::Result<()> {
-        if let Output::Store(_) = self.output {
-            let what = "an object store, expected a folder: what has a receipt there is whole";
-            return Err(Error::value("resume", what));
+        match &self.output {
+            Output::Folder(_) if archives => repair_archives(folder, range),
+            Output::Folder(_) => repair_folder(folder),
+            Output::Store(_) => Err(Error::value(
+                "resume",
+                "an object store, expected a folder: what has a receipt there is whole",
+            )),
         }
-        let ((good, bad), what) = match archives {
-            true => (
-                dataset::repair_archives(folder, range)?,
-                "archives are whole",
-            ),
-            false => (dataset::repair(folder)?, "images are as they were written"),
-        };
-        let folder = folder.display();
-        print::line(format_args!(
-            "{folder}: {good} {what}, {bad} are made again"
-        ));
-        Ok(())
     }
 
     /// The recipe for the pictures that are asked for.
@@ -142,6 +134,24 @@ impl GenerateArgs {
             None => Ok(self.only.map_or(SampleRange::All, SampleRange::One)),
         }
     }
+}
+
+fn repair_folder(folder: &Path) -> petcomp::Result<()> {
+    let (good, bad) = dataset::repair(folder)?;
+    print::line(format_args!(
+        "{}: {good} images are as they were written, {bad} are made again",
+        folder.display()
+    ));
+    Ok(())
+}
+
+fn repair_archives(folder: &Path, range: SampleRange) -> petcomp::Result<()> {
+    let (good, bad) = dataset::repair_archives(folder, range)?;
+    print::line(format_args!(
+        "{}: {good} archives are whole, {bad} are made again",
+        folder.display()
+    ));
+    Ok(())
 }
 
 fn write_preview_sheet(folder: &Path, count: u64) -> petcomp::Result<()> {

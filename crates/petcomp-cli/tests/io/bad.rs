@@ -107,7 +107,8 @@ fn headers_that_ask_for_too_much_are_refused_by_name() {
         "200,000 x 200,000"
     );
 
-    let grey = |width: u32, height: u32| tiff(&tags(width, height, &[]), &[7; 16]);
+    // Enough bytes for 4 x 4 pixels, so that the size alone is wrong in the others.
+    let grey = |width: u32, height: u32| tiff(&tags(width, height, &[(279, 4, 1, 16)]), &[7; 16]);
     assert!(io::read::<Coverage>(folder.with("good.tif", &grey(4, 4))).is_ok());
     assert!(refusal(&folder.with("bomb.tif", &grey(30_000, 30_000))).contains("Limits::pixels"));
     refusal(&folder.with("none.tif", &grey(0, 4)));

@@ -21,6 +21,12 @@ pub(crate) fn png(chunks: &[Chunk]) -> Vec<u8> {
     out
 }
 
+#[test]
+fn checksums_of_chunks_are_those_of_png() {
+    // The check value of CRC-32 (ISO 3309).
+    assert_eq!(crc32fast::hash(b"123456789"), 0xcbf4_3926);
+}
+
 /// `IHDR`: size, bits, colour kind, interlacing.
 pub(crate) fn ihdr(width: u32, height: u32, bits: u8, color: u8, interlace: u8) -> Chunk {
     let mut data = [width.to_be_bytes(), height.to_be_bytes()].concat();

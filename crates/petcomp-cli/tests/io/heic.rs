@@ -49,13 +49,15 @@ fn ten_bits_and_more_keep_their_steps() {
 #[test]
 fn alpha_is_straight() {
     let read = io::read::<StraightRgba>(file("alpha.heic")).unwrap();
-    for x in 0..48 {
-        let (p, red) = (read[(x, 9)], (255 * x / 47) as f32 / 255.0);
-        assert!((p.a - (1.0 - red)).abs() < 0.01, "{x}: {p:?}");
-        assert!(
-            (color::linear_to_srgb(p.r) - red).abs() < 0.02,
-            "{x}: {p:?}"
-        );
+    for (x, y) in (0..48).flat_map(|x| (0..32).map(move |y| (x, y))) {
+        let (p, red, green) = (read[(x, y)], 255 * x / 47, 255 * y / 31);
+        let alpha = (255 - red) as f32 / 255.0;
+        assert!((p.a - alpha).abs() < 1e-6, "{x} {y}: {p:?}, {alpha}");
+        // Brightness and differences of colour are rounded, to a code.
+        for (read, code) in [(p.r, red), (p.g, green), (p.b, 128)] {
+            let off = 255.0 * color::linear_to_srgb(read) - code as f32;
+            assert!(off.abs() < 1.1, "{x} {y}: {p:?}, {code}");
+        }
     }
 }
 

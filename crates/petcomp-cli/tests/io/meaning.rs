@@ -82,7 +82,7 @@ fn floats_come_back_bit_by_bit_and_halves_rounded() {
             .pixels()
             .iter()
             .zip(light(17, 5).into_vec())
-            .all(|(p, q)| near(p.r, q.r) && near(p.g, q.g));
+            .all(|(p, q)| near(p.r, q.r) && near(p.g, q.g) && near(p.b, q.b) && near(p.a, q.a));
         assert!(all, "{compression:?}");
         assert_eq!(io::read_header(&path).unwrap().bits, 16);
     }

@@ -13,7 +13,7 @@ pub(crate) fn all() -> Vec<File> {
     of_size(40, 30)
 }
 
-/// The same, those that are written of other pixels.
+/// The same files; those that are written have this size.
 pub(crate) fn of_size(w: usize, h: usize) -> Vec<File> {
     let matte = Image::from_fn(w, h, |x, y| Coverage((x * y) as f32 / (w * h) as f32));
     let depth = Image::from_fn(w, h, |x, y| Depth(1.0 + (x + y) as f32));

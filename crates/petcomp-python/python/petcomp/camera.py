@@ -244,8 +244,9 @@ class Solution:
 def solve(label: Mapping[str, Any], force: bool = False) -> Solution:
     """The camera of a label: plain data as ``NAME.label.json`` has it.
 
-    With ``force`` a camera that does not fit its label, or is too far away to see objects, is returned,
-    too. Raises ``CameraError``, and ``InvalidValueError`` for a size that is not in metres.
+    With ``force`` a camera that does not fit its label, is too far away to see objects, or has a lens that
+    folds the picture's corners over, is returned, too. Raises ``CameraError``, and ``InvalidValueError``
+    for a size that is not in metres and for such a lens.
     """
     camera, text = _petcomp.solve_camera(dumped("label", label), force)
     record = loaded(text)

@@ -63,6 +63,15 @@ class DatasetCounts:
     #: Files below the folder that trainers are given.
     for_trainers: list[str]
 
+    @property
+    def left_out(self) -> int:
+        """Objects without a label though nothing lies over them, or it would not matter.
+
+        Too much of them lies outside of the picture, or nothing of them is seen.
+        """
+        unlabelled = self.obstructed if self.policy in ("drop", "ignore") else 0
+        return max(0, self.objects - self.labelled - unlabelled)
+
 
 def generate(
     source: str | os.PathLike[str] | Mapping[str, Any] | Pipeline | Callable[[int], Sample],

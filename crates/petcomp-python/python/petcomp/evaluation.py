@@ -128,7 +128,7 @@ def _boxes(at: str, labels: Any, last: str) -> list[Any]:
     if not isinstance(labels, Mapping):
         raise ArgumentTypeError(f"{at}: {type(labels).__name__}, expected a dict of boxes, classes and {last}")
     for key in labels:
-        if key not in ("boxes", "classes", "scores", "ignored"):
+        if key not in ("boxes", "classes", last):
             raise InvalidValueError(f"{at}: unknown key {key!r}, expected boxes, classes and {last}")
     boxes = _numbers(f"{at}.boxes", labels.get("boxes"))
     if boxes.size and (boxes.ndim != 2 or boxes.shape[1] != 4):

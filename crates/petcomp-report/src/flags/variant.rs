@@ -177,20 +177,21 @@ impl<'a> VariantSource<'a> {
     }
 
     fn plain(&self) -> Trial {
-        Trial {
-            photo: self.known.photo.clone(),
-            mask: self.known.mask.clone(),
-            box_px: self.known.box_px,
-            expected: Right,
-        }
+        self.trial_of(self.known.photo.clone())
     }
 
     /// Another photo of the same outline.
     fn with(&self, photo: Image<LinearRgb>) -> Option<Trial> {
-        Some(Trial {
+        Some(self.trial_of(photo))
+    }
+
+    fn trial_of(&self, photo: Image<LinearRgb>) -> Trial {
+        Trial {
             photo,
-            ..self.plain()
-        })
+            mask: self.known.mask.clone(),
+            box_px: self.known.box_px,
+            expected: Right,
+        }
     }
 
     fn with_read_noise(&self, photo: &Image<LinearRgb>) -> Image<LinearRgb> {

@@ -4,7 +4,7 @@ use crate::pile::camera_above;
 use petcomp::Image;
 use petcomp::geom::{Plane, Point2, Point3, Pose, Quad, UnitQuaternion, Vector3};
 use petcomp::light::{frame, polygon_irradiance};
-use petcomp::scene::{AreaLight, Card, LightShape, Shot};
+use petcomp::scene::{AreaLight, Card, Shot};
 use petcomp::{LinearRgb, ObjectId, PremulRgba};
 use std::f64::consts::PI;
 
@@ -51,14 +51,7 @@ fn card_pose() -> Pose {
 }
 
 fn square_light() -> AreaLight {
-    AreaLight {
-        shape: LightShape::Rectangle,
-        position: [0.3, 0.2, 0.8],
-        target: [0.0; 3],
-        size: [0.3; 2],
-        power: 5.0,
-        color: LinearRgb::WHITE,
-    }
+    AreaLight::new([0.3, 0.2, 0.8], [0.3; 2], 5.0)
 }
 
 /// What the card leaves of the light at each pixel's centre; nothing where the card itself is seen,

@@ -41,15 +41,16 @@ struct MeasuredSearch {
     mean: SearchErrors,
 }
 
-/// Overlap of the outline, and the box, each against time, of four bottles, or fewer for a quick
-/// report.
-pub(crate) fn searches(bottles: usize) -> Result<Vec<Diagram>> {
+/// Overlap of the outline, and the box, each against time, of so many photos, as far as there are.
+pub(crate) fn searches(photos: usize) -> Result<Vec<Diagram>> {
+    let photos = photos.min(made::PHOTO_COUNT);
     let mut found = Vec::new();
     for scale in PHOTO_SCALES {
-        found.extend(measure_photos(bottles.min(made::PHOTO_COUNT), scale)?);
+        found.extend(measure_photos(photos, scale)?);
     }
-    let input =
-        format!("{bottles} see-through bottles on an uneven screen with noise, made in code");
+    let input = format!(
+        "{photos} photos of see-through bottles on an uneven screen with noise, made in code"
+    );
     Ok(vec![
         Diagram {
             file: "matte_search_outline".into(),
@@ -66,9 +67,9 @@ pub(crate) fn searches(bottles: usize) -> Result<Vec<Diagram>> {
     ])
 }
 
-/// Searches of all sizes in photos of one size.
-fn measure_photos(bottles: usize, photo_scale: usize) -> Result<Vec<MeasuredSearch>> {
-    let photos: Vec<Known> = (0..bottles)
+/// Searches of all sizes in so many photos of one size.
+fn measure_photos(count: usize, photo_scale: usize) -> Result<Vec<MeasuredSearch>> {
+    let photos: Vec<Known> = (0..count)
         .map(|i| made::enlarged_photo(i, photo_scale))
         .collect();
     let photo_width = largest_width(&photos);

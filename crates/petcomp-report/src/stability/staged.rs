@@ -5,7 +5,7 @@ use petcomp::asset::Texture;
 use petcomp::camera::Camera;
 use petcomp::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::render::{RenderOptions, render};
-use petcomp::scene::{AreaLight, CameraSource, Card, Exposure, LightShape, Scene, Shot, Surface};
+use petcomp::scene::{AreaLight, CameraSource, Card, Exposure, Scene, Shot, Surface};
 use petcomp::{DeepImage, DeepSample, Error, Image, LinearRgb, ObjectId, PremulRgba, Result};
 use tempfile::TempDir;
 
@@ -73,14 +73,7 @@ pub(super) fn grey(alpha: f32) -> PremulRgba {
 
 /// A square light of this side at `position`, turned to the origin.
 pub(super) fn lamp(position: [f64; 3], side: f64, power: f64) -> AreaLight {
-    AreaLight {
-        shape: LightShape::Rectangle,
-        position,
-        target: [0.0; 3],
-        size: [side; 2],
-        power,
-        color: LinearRgb::WHITE,
-    }
+    AreaLight::new(position, [side; 2], power)
 }
 
 /// A picture of `size` in which pixel (3, 2) alone has samples, front to back.

@@ -8,6 +8,7 @@ use petcomp::camera::{self, CameraFile, Label, LabelledPhoto, Solution, SolveErr
 use petcomp::{Error, io};
 use serde::Serialize;
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 
 /// What became of one of the photos.
 #[derive(Default, Serialize)]
@@ -70,21 +71,34 @@ fn solve_group(
     let labels = labels_of(members);
     let joint = match camera::solve_joint(&labels, &SolveOptions::default()) {
         Ok(joint) => joint,
-        Err(error) => return Ok(unsolved(names, &Error::from(error))),
+        Err(error) => return unsolved(folder, names, &Error::from(error)),
     };
     let mut solved = Vec::new();
     for ((name, member), outcome) in names.iter().zip(members).zip(joint.photos) {
         solved.push(written(folder, name, member, outcome, members)?);
     }
     for outlier in &joint.outliers {
-        solved[outlier.photo].why = Some(outlier.diagnostic().to_string());
+        // Why a photo has no camera at all says more.
+        let why = &mut solved[outlier.photo].why;
+        why.get_or_insert_with(|| outlier.diagnostic().to_string());
     }
     Ok(solved)
 }
 
-fn unsolved(names: &[String], error: &Error) -> Vec<JointPhoto> {
-    let unsolved = |name: &String| JointPhoto::without_camera(name, names.len(), error.to_string());
+fn unsolved(folder: &Folder, names: &[String], error: &Error) -> Answer<Vec<JointPhoto>> {
+    let unsolved = |name: &String| refused(folder, name, names.len(), error);
     names.iter().map(unsolved).collect()
+}
+
+/// A photo whose label has no camera; that of before is removed, as where the label is saved.
+fn refused(folder: &Folder, name: &str, together: usize, error: &Error) -> Answer<JointPhoto> {
+    let _ = std::fs::remove_file(camera_place(folder, name)?);
+    let why = error.to_string();
+    Ok(JointPhoto::without_camera(name, together, why))
+}
+
+fn camera_place(folder: &Folder, name: &str) -> Answer<PathBuf> {
+    folder.place(&beside(name, "camera.json"))
 }
 
 /// Writes the camera of a photo where it has one that fits.
@@ -95,18 +109,18 @@ fn written(
     outcome: Result<Solution, SolveError>,
     all: &[LabelledPhoto],
 ) -> Answer<JointPhoto> {
-    let outcome = usable(outcome);
-    if let Ok(solution) = &outcome {
-        let file = CameraFile::solved_together(member, solution, all);
-        io::write_json(folder.place(&beside(name, "camera.json"))?, &file)?;
-    }
-    let found = outcome.as_ref().ok();
+    let solution = match usable(outcome) {
+        Ok(solution) => solution,
+        Err(error) => return refused(folder, name, all.len(), &error),
+    };
+    let file = CameraFile::solved_together(member, &solution, all);
+    io::write_json(camera_place(folder, name)?, &file)?;
     Ok(JointPhoto {
         photo: name.into(),
         together: all.len(),
-        focal_px: found.map(|solution| solution.camera.focal_px.x),
-        focal_sigma: found.map(|solution| solution.sigma.ln_focal),
-        rms_px: found.map(|solution| solution.rms_px),
-        why: outcome.as_ref().err().map(ToString::to_string),
+        focal_px: Some(solution.camera.focal_px.x),
+        focal_sigma: Some(solution.sigma.ln_focal),
+        rms_px: Some(solution.rms_px),
+        why: None,
     })
 }

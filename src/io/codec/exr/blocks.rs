@@ -63,11 +63,7 @@ impl PartReader<'_> {
                 out.put_block(self.header(), block);
             }
         }
-        // Rows between samples are made from those around them.
-        if let Some(sampling) = self.sampling {
-            out.interpolate_rows(sampling);
-        }
-        Ok(out.samples)
+        Ok(out.finish(self.sampling))
     }
 
     /// Blocks that are decoded at a time.
@@ -159,6 +155,14 @@ impl<'a> SampleBuffer<'a> {
             to_floats(line.value, kind, &mut floats);
             self.put(channel, [at.x(), at.y()], &floats);
         }
+    }
+
+    /// All samples, those between rows made from them.
+    fn finish(mut self, sampling: Option<&Sampling>) -> Vec<f32> {
+        if let Some(sampling) = sampling {
+            self.interpolate_rows(sampling);
+        }
+        self.samples
     }
 
     /// A run of samples of a channel, cut to the window.
