@@ -116,7 +116,7 @@ codes! {
     SizeMismatch "asset.size_mismatch" "The given size has other proportions than the outline"
     ScreenSizeMismatch "asset.screen_size_mismatch" "The screen does not look like one of the given size"
     ScreenSidesAmbiguous "asset.screen_sides_ambiguous" "Width and height of the screen may be exchanged"
-    Concave "asset.concave" "The object fills little of its convex hull, which labels take for its outline"
+    Concave "asset.concave" "The object fills little of its convex hull, which labels take for its outline (`labels.outline`)"
     Uncoded "asset.uncoded" "A warning written by a version without codes"
     // Matte.
     LeftOut "matte.left_out" "Something beside the object was left out"

@@ -12,7 +12,7 @@ pub(super) fn concave_warning(outline: &Outline) -> Option<Diagnostic> {
     let solidity = outline.solidity();
     let message = format!(
         "fills {:.0} % of its convex hull, which labels take for its outline; what lies in its gaps counts as over or \
-         under it, but for `labels.outline = \"mask\"`",
+         under it; `labels.outline = \"mask\"` in the recipe takes the border of its mask",
         100.0 * solidity
     );
     (solidity < MIN_SOLIDITY).then(|| Diagnostic::warning(Code::Concave, message))
@@ -46,5 +46,7 @@ mod tests {
             "{}",
             warning.message
         );
+        let advice = "`labels.outline = \"mask\"` in the recipe takes the border of its mask";
+        assert!(warning.message.ends_with(advice), "{}", warning.message);
     }
 }

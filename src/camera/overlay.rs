@@ -211,9 +211,11 @@ fn round_step(least: f64) -> f64 {
 /// A picture that is drawn on.
 struct OverlayDrawing {
     picture: Image<LinearRgb>,
+    /// Camera and radial distortion of the solution, in the label's pixels.
     camera: Camera,
-    /// Radial distortion, as [`Solution::kappa`].
     kappa: f64,
+    /// The label's pixels to the picture's, whose shape may be another.
+    zoom: Matrix2<f64>,
     /// Width of a line, pixels.
     line_px: f64,
 }
@@ -222,10 +224,13 @@ impl OverlayDrawing {
     /// A solution drawn over a photo, of the label's size or another.
     fn new(photo: &Image<LinearRgb>, solution: &Solution) -> Self {
         let (width, height) = photo.size();
+        let [from_width, from_height] = solution.camera.image.map(|side| f64::from(side.max(1)));
+        let zoom = Vector2::new(width as f64 / from_width, height as f64 / from_height);
         let mut drawing = Self {
             picture: photo.clone(),
-            camera: solution.camera.resized([width as u32, height as u32]),
+            camera: solution.camera,
             kappa: solution.kappa,
+            zoom: Matrix2::from_diagonal(&zoom),
             line_px: (width.max(height) as f64 / SIDE_PER_LINE_WIDTH).max(1.0),
         };
         for line in grid(solution.size) {
@@ -238,9 +243,7 @@ impl OverlayDrawing {
 
     /// The labelled corners and their error ellipses.
     fn draw_corners(&mut self, solution: &Solution) {
-        let [from, to] = [&solution.camera, &self.camera]
-            .map(|camera| Vector2::from(camera.image.map(|side| f64::from(side.max(1)))));
-        let zoom = Matrix2::from_diagonal(&to.component_div(&from));
+        let zoom = self.zoom;
         for (corner, covariance) in solution.corners_px.iter().zip(&solution.sigma.corners_px) {
             self.cross(zoom * corner);
             self.ellipse(zoom * corner, &(zoom * covariance * zoom));
@@ -263,7 +266,8 @@ impl OverlayDrawing {
     fn line(&mut self, ends: [Point3<f64>; 2], color: LinearRgb, weight: f64) {
         let seen = distorted_line(&self.camera, self.kappa, ends).unwrap_or_default();
         for ends in seen.windows(2) {
-            self.stroke([ends[0], ends[1]], color, weight * self.line_px);
+            let ends = [self.zoom * ends[0], self.zoom * ends[1]];
+            self.stroke(ends, color, weight * self.line_px);
         }
     }
 
@@ -355,8 +359,8 @@ fn distance(p: Point2<f64>, [a, b]: [Point2<f64>; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::simulate::Scenario;
-    use crate::camera::{SolveOptions, solve};
+    use crate::camera::simulate::{Scenario, View};
+    use crate::camera::{SolveOptions, distorted, solve};
 
     fn small_picture() -> Scenario {
         Scenario {
@@ -393,18 +397,23 @@ mod tests {
         );
     }
 
-    #[test]
-    fn lines_are_drawn_where_the_lens_bends_them() {
+    /// A view through a lens that bends lines, and its k1, which the label states.
+    fn bent() -> (View, f64) {
         let scenario = Scenario {
             kappa: 0.2,
             ..small_picture()
         };
-        let view = scenario.tilted(20.0).view(1, 0);
-        let mut label = view.label;
+        let mut view = scenario.tilted(20.0).view(1, 0);
         // Kappa is in half diagonals, of 250 pixels here.
         let k1 = view.kappa * (320.0_f64 / 250.0).powi(2);
-        label.camera.k1 = Some(k1);
-        let solution = solve(&label, &SolveOptions::default()).unwrap();
+        view.label.camera.k1 = Some(k1);
+        (view, k1)
+    }
+
+    #[test]
+    fn lines_are_drawn_where_the_lens_bends_them() {
+        let (view, k1) = bent();
+        let solution = solve(&view.label, &SolveOptions::default()).unwrap();
         // A photo of half the size.
         let drawn = overlay(&Image::filled(200, 150, LinearRgb::BLACK), &solution);
         let corners = corner_points(view.size);
@@ -435,6 +444,19 @@ mod tests {
             let off_px = |(x, y): (usize, usize)| (Point2::new(x as f64, y as f64) - shown).norm();
             let near = marks.iter().filter(|&&at| off_px(at) < 6.0);
             assert!(near.count() >= 4, "{shown}: {marks:?}");
+        }
+    }
+
+    #[test]
+    fn a_lens_bends_lines_on_a_photo_of_another_shape_as_on_the_label_s() {
+        let solution = solve(&bent().0.label, &SolveOptions::default()).unwrap();
+        let drawn = overlay(&Image::filled(200, 300, LinearRgb::BLACK), &solution);
+        let corners = corner_points(solution.size);
+        for side in 0..4 {
+            let middle = nalgebra::center(&corners[side], &corners[(side + 1) % 4]);
+            let px = distorted(&solution.camera, solution.kappa, middle);
+            let seen = drawn[((px.x / 2.0) as usize, px.y as usize)];
+            assert!(seen.g > 2.0 * seen.r, "{side}: {seen:?}");
         }
     }
 

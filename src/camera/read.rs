@@ -150,46 +150,70 @@ fn labels_of(
 /// # Errors
 /// As [`read_labels`]; a folder that cannot be read; a photo that is labelled twice.
 pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<LabelledPhoto>> {
-    labels_or(folder, size, |_, error| Err(error))
+    labels_for(None, folder, size)
 }
 
 /// The same where one photo alone is asked for: files that cannot be used are left out, but for the
-/// one that is called as it is.
+/// one that is called as it is, and so is what labels another photo once more.
 pub(crate) fn labels_beside(
     name: &str,
     folder: &Path,
     size: Option<[f64; 2]>,
 ) -> Result<Vec<LabelledPhoto>> {
-    labels_or(folder, size, |path, error| {
-        if label_name(path) == name {
-            return Err(error);
-        }
-        log::info!("{error}; left out");
-        Ok(Some(Vec::new()))
-    })
+    labels_for(Some(name), folder, size)
 }
 
-/// The labels of a folder, and what is to be had in place of those of a file that cannot be used.
-fn labels_or(
+/// The labels of a folder, one for each photo; all have to be right, or what concerns the photo
+/// that is asked for alone.
+fn labels_for(
+    alone: Option<&str>,
     folder: &Path,
     size: Option<[f64; 2]>,
-    instead: impl Fn(&Path, Error) -> Result<Option<Vec<LabelledPhoto>>>,
 ) -> Result<Vec<LabelledPhoto>> {
-    let mut all: Vec<LabelledPhoto> = Vec::new();
-    for path in label_paths(folder)? {
-        match labels_if_any(&path, size).or_else(|error| instead(&path, error))? {
-            Some(labels) => all.extend(labels),
-            None => log::info!("{}: no label", path.display()),
-        }
-    }
+    let mut all = read_all(alone, folder, size)?;
     // Ours first: another program's does not replace it.
     all.sort_by_key(|labelled| !labelled.is_ours);
-    let mut found = Vec::with_capacity(all.len());
+    let mut found: Vec<LabelledPhoto> = Vec::with_capacity(all.len());
     for labelled in all {
-        push_new(&mut found, labelled)?;
+        let mut same = found.iter().filter(|other| labelled.repeats(other));
+        let concerned = is_asked_for(alone, &labelled.name)
+            || same.any(|other| is_asked_for(alone, &other.name));
+        match push_new(&mut found, labelled) {
+            Err(error) if !concerned => log::info!("{error}; left out"),
+            outcome => outcome?,
+        }
     }
     found.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(found)
+}
+
+/// All labels of the files of a folder.
+fn read_all(
+    alone: Option<&str>,
+    folder: &Path,
+    size: Option<[f64; 2]>,
+) -> Result<Vec<LabelledPhoto>> {
+    let mut all = Vec::new();
+    for path in label_paths(folder)? {
+        match labels_if_any(&path, size) {
+            Ok(Some(labels)) => all.extend(labels),
+            Ok(None) => log::info!("{}: no label", path.display()),
+            Err(error) if is_asked_for(alone, &label_name(&path)) => return Err(error),
+            // The photo that is asked for may be among those that it labels.
+            Err(error) if may_hold_several(&path) => log::warn!("{error}; left out"),
+            Err(error) => log::info!("{error}; left out"),
+        }
+    }
+    Ok(all)
+}
+
+fn is_asked_for(alone: Option<&str>, name: &str) -> bool {
+    alone.is_none_or(|alone| alone == name)
+}
+
+/// A file that begins as an array of labels does, or as CVAT's XML.
+fn may_hold_several(path: &Path) -> bool {
+    label_text(path).is_ok_and(|text| text.trim_start().starts_with(['[', '<']))
 }
 
 /// Adds a label of a photo that has none yet; leaves another program's out where one of ours is
@@ -656,6 +680,37 @@ pub(super) mod tests {
             let told = refused.unwrap_err().to_string();
             assert!(told.contains("b.label.json: "), "{told}");
         }
+    }
+
+    #[test]
+    fn a_photo_that_is_labelled_twice_stands_in_its_own_way_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b] = labels_of_photos(["a.jpg", "b.jpg"]);
+        io::write_json(folder.path().join("a.label.json"), &a).unwrap();
+        io::write_json(folder.path().join("b.label.json"), &b).unwrap();
+        // Of the same photo, with a name of its own.
+        io::write_json(folder.path().join("copy.json"), &b).unwrap();
+        io::write_json(folder.path().join("old.label.json"), &[&b]).unwrap();
+        let found = labels_beside("a", folder.path(), None).unwrap();
+        let names: Vec<&str> = found.iter().map(|one| one.name.as_str()).collect();
+        assert_eq!(names, ["a", "b"]);
+        let refusal = labels_beside("b", folder.path(), None).unwrap_err();
+        assert!(
+            refusal.to_string().contains("labels b once more"),
+            "{refusal}"
+        );
+    }
+
+    #[test]
+    fn a_broken_array_may_have_held_any_label() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("all.label.json");
+        let may_hold = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            may_hold_several(&path)
+        };
+        assert!(may_hold(" [{") && may_hold("<annotations>"));
+        assert!(!may_hold("{") && !may_hold(""));
     }
 
     #[test]

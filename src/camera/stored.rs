@@ -247,6 +247,13 @@ impl CameraFile {
         }
         file
     }
+
+    /// Whether it was solved from this label as it is, with the sides that were given then where it
+    /// has none.
+    pub fn is_of(&self, labelled: &LabelledPhoto) -> bool {
+        let labelled = with_stored_size(labelled, Some(self));
+        staleness(self, &labelled, &BTreeMap::new()).is_none()
+    }
 }
 
 #[cfg(test)]
@@ -323,6 +330,20 @@ mod tests {
                 .unwrap()
                 .contains("a.camera.json: solved from another version of its label")
         );
+    }
+
+    #[test]
+    fn a_camera_is_of_the_label_that_it_was_solved_from() {
+        let desk = Desk::new();
+        let labelled = desk.write(&desk.label(0));
+        let solution = solve(&labelled.label, &SolveOptions::default()).unwrap();
+        let file = CameraFile::new(&labelled.label, &solution);
+        let [mut without_sides, mut moved] = [labelled.clone(), labelled.clone()];
+        let surface = &mut without_sides.label.surface;
+        (surface.width_m, surface.height_m) = (None, None);
+        moved.label.surface.corners_px.as_mut().unwrap()[0][0] += 1.0;
+        let found = [&labelled, &without_sides, &moved].map(|label| file.is_of(label));
+        assert_eq!(found, [true, true, false]);
     }
 
     #[test]

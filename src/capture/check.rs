@@ -25,8 +25,7 @@ pub(super) fn clipping(photos: &[(String, Mask)], free: &Mask) -> Result<Vec<Dia
 }
 
 fn clipping_of(photo: &str, clipped: &Mask, free: &Mask) -> Result<Option<Diagnostic>> {
-    let clipped = clipped.zip_map(free, |clipped, free| clipped && free);
-    let share = clipped.count() as f64 / free.count().max(1) as f64;
+    let share = share_within(clipped, free);
     if share <= MAX_CLIPPED {
         return Ok(None);
     }
@@ -36,6 +35,50 @@ fn clipping_of(photo: &str, clipped: &Mask, free: &Mask) -> Result<Option<Diagno
         100.0 * MAX_CLIPPED
     );
     if share > REFUSED_CLIPPED {
+        return Err(refused(&what));
+    }
+    Ok(Some(Diagnostic::warning(Code::ClippedWhite, what)))
+}
+
+/// Share of an area that a mask is set in.
+fn share_within(mask: &Mask, area: &Mask) -> f64 {
+    let within = mask.zip_map(area, |set, inside| set && inside);
+    within.count() as f64 / area.count().max(1) as f64
+}
+
+/// Share of the object that may be clipped: glints, under which passes what passes around them.
+const MAX_CLIPPED_OBJECT: f64 = 0.03;
+/// From here on most of the object would be a guess.
+const REFUSED_CLIPPED_OBJECT: f64 = 0.5;
+
+/// The warnings about an object that clips where the display does not: in photos of the white
+/// frame, each with where it is clipped.
+///
+/// # Errors
+/// [`Error::Photo`](crate::Error::Photo) where most of the object is clipped in one.
+pub(super) fn clipped_object(
+    photos: &[(String, Mask)],
+    coverage: &Image<Coverage>,
+) -> Result<Vec<Diagnostic>> {
+    let object = coverage.map(|c| c.0 > 0.5);
+    let warnings = photos
+        .iter()
+        .map(|(name, clipped)| clipping_of_object(name, clipped, &object));
+    warnings.filter_map(Result::transpose).collect()
+}
+
+fn clipping_of_object(photo: &str, clipped: &Mask, object: &Mask) -> Result<Option<Diagnostic>> {
+    let share = share_within(clipped, object);
+    if share <= MAX_CLIPPED_OBJECT {
+        return Ok(None);
+    }
+    let what = format!(
+        "{photo}: {:.1} % of the object is clipped in the white frame, expected at most {:.0} %: \
+         its transmittance there can only be that of what lies around it; use a shorter exposure, or darken the room",
+        100.0 * share,
+        100.0 * MAX_CLIPPED_OBJECT
+    );
+    if share > REFUSED_CLIPPED_OBJECT {
         return Err(refused(&what));
     }
     Ok(Some(Diagnostic::warning(Code::ClippedWhite, what)))
@@ -60,7 +103,8 @@ pub(super) fn bands(frames: &BlackAndWhite<'_>, free: &Mask) -> Result<Option<Di
     }
     let what = format!(
         "around the object the white frame is uneven by {:.1} %, expected at most {:.1} %: bands of a flickering display, \
-         reflections or shadows; expose for 1/30 s or longer at full brightness of the display, and darken the room",
+         reflections, shadows, or moire (focus on the object, not on the display; another distance); \
+         expose for 1/30 s or longer at full brightness of the display, and darken the room",
         100.0 * deviation,
         100.0 * MAX_BANDS
     );
@@ -102,7 +146,7 @@ pub(super) fn color_change(empty_white: &Image<LinearRgb>, free: &Mask) -> Optio
     let change = changes[0].max(changes[1]);
     (change > MAX_COLOR_CHANGE).then(|| {
         let what = format!(
-            "white changes its colour across the display by {:.0} %, expected at most {:.0} %; \
+            "white changes its colour across the display by {:.1} %, expected at most {:.0} %; \
              photograph from straight above and from farther away",
             100.0 * change,
             100.0 * MAX_COLOR_CHANGE
@@ -211,4 +255,32 @@ fn root_mean_square(image: &Image<f32>, coverage: &Image<Coverage>) -> f64 {
 fn ratio_where(a: &Image<f32>, b: &Image<f32>, mask: &Mask) -> f32 {
     let [sum_a, sum_b] = [a, b].map(|v| where_set(v, mask).map(f64::from).sum::<f64>());
     (sum_a / sum_b.max(1e-9)) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_uneven_display_may_be_moire() {
+        let (w, h) = (4 * BLOCK_PX, 4 * BLOCK_PX);
+        let empty = Image::filled(w, h, LinearRgb::grey(0.8));
+        let white = Image::from_fn(w, h, |x, _| {
+            let is_bright = (x / BLOCK_PX).is_multiple_of(2);
+            LinearRgb::grey(if is_bright { 0.824 } else { 0.776 })
+        });
+        let frames = BlackAndWhite {
+            black: &empty,
+            white: &white,
+            empty_black: &empty,
+            empty_white: &empty,
+        };
+        let free = Image::filled(w, h, true);
+        let told = bands(&frames, &free).unwrap().unwrap().message;
+        assert!(
+            told.contains("uneven by 3.0 %")
+                && told.contains("moire (focus on the object, not on the display"),
+            "{told}"
+        );
+    }
 }

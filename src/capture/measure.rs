@@ -137,7 +137,9 @@ impl<'a> CaptureScene<'a> {
 
     fn solve(self, mut diagnostics: Vec<Diagnostic>) -> Result<Measured> {
         let frames = self.frames();
-        diagnostics.extend(check::clipping(&self.stack.clipped_white, &self.free)?);
+        let clipped = &self.stack.clipped_white;
+        diagnostics.extend(check::clipping(clipped, &self.free)?);
+        diagnostics.extend(check::clipped_object(clipped, &self.object.coverage)?);
         if self.empty_stack.is_some() {
             check::exchange(&frames, &self.object.coverage)?;
         }

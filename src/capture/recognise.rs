@@ -62,12 +62,24 @@ impl FramePhoto {
     }
 
     /// How far the display lies off where it is in another photo, pixels: at its worst corner.
+    pub(super) fn offset_px(&self, other: &Self, display: &Display) -> f64 {
+        let corners = [self, other].map(|photo| photo.display_corners_px(display));
+        farthest(&corners[0], &corners[1])
+    }
+
+    /// The same whichever way up the photos are: a camera that looks straight down does not know,
+    /// and may say so differently from photo to photo.
     pub(super) fn motion_px(&self, other: &Self, display: &Display) -> f64 {
-        let corners = self.display_corners_px(display).into_iter();
-        let moved = corners
-            .zip(other.display_corners_px(display))
-            .map(|(a, b)| (a - b).norm());
-        moved.fold(0.0, f64::max)
+        let corners = self.display_corners_px(display);
+        let upright = (
+            other.display_corners_px(display),
+            other.size_px.map(f64::from),
+        );
+        let turns = std::iter::successors(Some(upright), |&(corners, [w, h])| {
+            Some((corners.map(|p| Point2::new(h - p.y, p.x)), [h, w]))
+        });
+        let motions = turns.take(4).map(|(turned, _)| farthest(&corners, &turned));
+        motions.fold(f64::INFINITY, f64::min)
     }
 
     /// Factors that make the light of this photo that of another, by the paper that both show.
@@ -88,6 +100,12 @@ impl FramePhoto {
             }
         })
     }
+}
+
+/// The largest distance between corners.
+fn farthest(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> f64 {
+    let distances = a.iter().zip(b).map(|(a, b)| (a - b).norm());
+    distances.fold(0.0, f64::max)
 }
 
 /// The map that takes places on the display to those in the photo, which has them in front: the
@@ -170,4 +188,44 @@ fn paper_light(
 
 pub(super) fn refused(what: &str) -> Error {
     Error::Photo { what: what.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix3;
+
+    const DISPLAY: Display = Display {
+        size_px: [640, 400],
+        width: None,
+    };
+
+    fn photo(size_px: [u32; 2], photo_from_display: Matrix3<f64>) -> FramePhoto {
+        FramePhoto {
+            frame: Frame::White,
+            size_px,
+            photo_from_display: Homography(photo_from_display),
+            pairs: Vec::new(),
+            paper: [None; CORNERS],
+        }
+    }
+
+    #[test]
+    fn a_photo_that_is_flagged_another_way_up_has_not_moved() {
+        let seen = |dx| Matrix3::new(1.4, 0.0, 30.0 + dx, 0.0, 1.4, 50.0, 0.0, 0.0, 1.0);
+        let quarter_turn = |high: u32| {
+            let high = f64::from(high);
+            Matrix3::new(0.0, -1.0, high, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        };
+        let reference = photo([960, 660], seen(0.0));
+        let (mut size, mut turn) = ([960, 660], Matrix3::<f64>::identity());
+        for _ in 0..3 {
+            turn = quarter_turn(size[1]) * turn;
+            size = [size[1], size[0]];
+            let [still, moved] = [0.0, 3.0].map(|dx| photo(size, turn * seen(dx)));
+            assert!(still.offset_px(&reference, &DISPLAY) > 100.0);
+            assert!(still.motion_px(&reference, &DISPLAY) < 1e-9);
+            assert!((moved.motion_px(&reference, &DISPLAY) - 3.0).abs() < 1e-9);
+        }
+    }
 }

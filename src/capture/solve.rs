@@ -251,9 +251,15 @@ fn around(known: &Pyramid<PremulRgba>, [x, y]: [usize; 2]) -> LinearRgb {
         sample_bilinear_clamped(known.level(level), x, y)
     });
     let mut levels = levels.filter(|p| p.a >= MIN_AROUND);
-    levels.next().map_or(LinearRgb::BLACK, |p| {
+    // Far from all that is known there is but the mean of that.
+    let p = levels
+        .next()
+        .unwrap_or_else(|| known.level(known.levels())[(0, 0)]);
+    if p.a > 0.0 {
         LinearRgb::new(p.r, p.g, p.b).scale(p.a.recip())
-    })
+    } else {
+        LinearRgb::BLACK
+    }
 }
 
 /// A film where an object is.
@@ -389,6 +395,18 @@ mod tests {
             let off = got.add_scaled(-1.0, v).map(f32::abs).max_channel();
             assert!(off < 1e-4, "{got:?} at {exposure}");
         }
+    }
+
+    #[test]
+    fn what_clips_far_from_all_that_is_known_is_not_opaque() {
+        let is_inside = |x: usize, y: usize| (20..40).contains(&x) && (20..40).contains(&y);
+        let inside = Image::from_fn(64, 64, |x, y| {
+            Coverage(if is_inside(x, y) { 1.0 } else { 0.0 })
+        });
+        let clipped = Image::from_fn(64, 64, |x, y| is_inside(x, y) && x >= 22);
+        let transmittance = clipped.map(|clipped| LinearRgb::grey(if clipped { 0.0 } else { 0.9 }));
+        let v = filled(&transmittance, &clipped, &inside)[(38, 30)];
+        assert!((v.g - 0.9).abs() < 1e-5, "{v:?}");
     }
 
     #[test]

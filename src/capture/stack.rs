@@ -95,11 +95,15 @@ const STEADY_PX: f64 = 0.5;
 const MAX_DRIFT: f32 = 0.2;
 /// Photos of one frame that differ by more of its white show different things.
 const MAX_DIFFERENCE: f32 = 0.1;
+/// The same of black, which an object changes by what it reflects alone: noise of 4 % of white
+/// stays below.
+const MAX_BLACK_DIFFERENCE: f32 = 0.02;
 /// Blur of that difference, pixels: against noise, and edges that are aligned to a part of a pixel.
 const DIFFERENCE_BLUR_PX: f32 = 3.0;
 
 /// How photos are brought to the view.
 pub(super) struct Alignment<'a> {
+    display: &'a Display,
     view: View,
     /// The photo whose exposure all others get.
     reference: &'a FramePhoto,
@@ -119,11 +123,13 @@ impl<'a> Alignment<'a> {
     ) -> Self {
         let motions = all.iter().map(|photo| photo.motion_px(reference, display));
         let motion_px = motions.fold(0.0, f64::max);
+        // What was turned has another map, though the camera stood still.
+        let offsets = all.iter().map(|photo| photo.offset_px(reference, display));
+        let is_steady = offsets.fold(0.0, f64::max) <= STEADY_PX;
         let pairs: Vec<_> = all.iter().flat_map(|photo| &photo.pairs).copied().collect();
-        let steady = (motion_px <= STEADY_PX)
-            .then(|| map_in_front(&pairs))
-            .flatten();
+        let steady = is_steady.then(|| map_in_front(&pairs)).flatten();
         Self {
+            display,
             view,
             reference,
             steady,
@@ -158,8 +164,10 @@ impl<'a> Alignment<'a> {
         let mut sum = first_seen.clone();
         for &other in others {
             let (seen, mask) = self.aligned(photos, other)?;
-            if self.differ(&first_seen, &seen) {
-                return Err(differing([first, other].map(|i| &*photos.sources.names[i])));
+            let most = max_difference(frame);
+            if self.differ(&first_seen, &seen, most) {
+                let names = [first, other].map(|i| &*photos.sources.names[i]);
+                return Err(differing(names, most));
             }
             clipped.push((name(other), mask));
             sum = sum.zip_map(&seen, |a, b| a + b);
@@ -171,11 +179,14 @@ impl<'a> Alignment<'a> {
         }))
     }
 
-    /// Two photos of a frame differ as with an object and without.
-    fn differ(&self, a: &Image<LinearRgb>, b: &Image<LinearRgb>) -> bool {
+    /// Two photos of a frame differ as with an object and without: by more than a share of white.
+    fn differ(&self, a: &Image<LinearRgb>, b: &Image<LinearRgb>, most: f32) -> bool {
         let off = a.zip_map(b, |a, b| grey(a) - grey(b));
-        let most = MAX_DIFFERENCE * white_light(self.reference);
-        let differing = filter::gaussian_blur(&off, DIFFERENCE_BLUR_PX).map(|v| v.abs() > most);
+        let most = most * white_light(self.reference);
+        // The edges of markers differ most where photos are aligned to half a pixel only.
+        let free = self.view.free_area(self.display);
+        let differing = filter::gaussian_blur(&off, DIFFERENCE_BLUR_PX)
+            .zip_map(&free, |v, free| free && v.abs() > most);
         differing.count() as f64 > MIN_AREA * differing.pixels().len() as f64
     }
 
@@ -285,20 +296,42 @@ fn white_light(photo: &FramePhoto) -> f32 {
     sum / f32::max(count, 1.0) / PAPER_LIGHT
 }
 
-fn differing([a, b]: [&str; 2]) -> Error {
+/// By how much photos of a frame may differ, as a share of white.
+fn max_difference(frame: Frame) -> f32 {
+    match frame {
+        Frame::Black => MAX_BLACK_DIFFERENCE,
+        Frame::White | Frame::Stripes(_) => MAX_DIFFERENCE,
+    }
+}
+
+fn differing([a, b]: [&str; 2], most: f32) -> Error {
     refused(&format!(
         "{a} and {b} show the same frame but differ by more than {:.0} % of white; \
          photos without the object belong to empty (--empty)",
-        100.0 * MAX_DIFFERENCE
+        100.0 * most
     ))
 }
 
 fn drift_warning(photo: &str, drift: f32) -> Diagnostic {
     let what = format!(
-        "{photo}: its exposure or colour is {:.0} % off that of the white frame, expected at most {:.0} %; \
+        "{photo}: its exposure or colour is {:.1} % off that of the white frame, expected at most {:.0} %; \
          lock exposure and white balance, and switch the display's automatic brightness off",
         100.0 * drift,
         100.0 * MAX_DRIFT
     );
     Diagnostic::warning(Code::ExposureDrift, what)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drift_above_the_limit_is_told_as_one() {
+        let told = drift_warning("a.jpg", 0.204).message;
+        assert!(
+            told.contains("is 20.4 % off that of the white frame, expected at most 20 %"),
+            "{told}"
+        );
+    }
 }

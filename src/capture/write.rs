@@ -24,8 +24,8 @@ pub(super) const DISPLAY: &str = "display.toml";
 /// [`Error::Value`](crate::Error::Value) for a display that cannot be right; those of reading the
 /// `display.toml` that is there, and of writing.
 pub fn write_frames(folder: &Path, display: &Display, with_stripes: bool) -> Result<PathBuf> {
-    let display = &with_known_width(display, &folder.join(DISPLAY))?;
     display.check()?;
+    let display = &with_known_width(display, &folder.join(DISPLAY))?;
     io::create_folder(folder)?;
     let frames: Vec<Frame> = Frame::all(with_stripes).collect();
     let pngs: Vec<_> = frames
@@ -46,6 +46,7 @@ fn with_known_width(display: &Display, file: &Path) -> Result<Display> {
     }
     let known: Display = io::read_toml(file)?;
     if known.size_px == display.size_px {
+        known.check().map_err(|e| e.in_file(file))?;
         return Ok(known);
     }
     if let Some(width) = known.width {
@@ -128,5 +129,9 @@ mod tests {
             width.starts_with("width: 345, expected 0.01 to 50 m"),
             "{width}"
         );
+        let file = folder.path().join(DISPLAY);
+        std::fs::write(file, "size_px = [400, 400]\nwidth = 345.0\n").unwrap();
+        let known = told([400, 400], None);
+        assert!(known.contains("display.toml: width: 345"), "{known}");
     }
 }

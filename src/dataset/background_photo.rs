@@ -126,7 +126,7 @@ impl BackgroundPhoto {
     }
 
     /// All that the labelled photo of this name and the others of its folder are read from, those
-    /// too that were not opened.
+    /// too that were not opened, or whose labels cannot be used.
     pub(crate) fn files_beside(
         name: &str,
         folder: &Path,
@@ -139,7 +139,12 @@ impl BackgroundPhoto {
             let own = [labelled.source.clone(), labelled.beside("camera.json")];
             own.into_iter().chain(photo).chain(front)
         });
-        Ok(files.collect())
+        // Nobody knows which of them a label that cannot be used is of.
+        let others = match camera::labels_in(folder, size) {
+            Ok(_) => Vec::new(),
+            Err(_) => files_in(folder),
+        };
+        Ok(files.chain(others).collect())
     }
 
     fn open(
@@ -395,9 +400,7 @@ fn warn_of_unlabelled(folder: &Path, places: &[BackgroundPhoto]) {
 /// Names of the photos of a folder, in order, that have another name before their extension than
 /// the labelled ones, and are not made for these.
 fn unlabelled_photos(folder: &Path, labelled: &BTreeSet<&OsStr>) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let paths = entries.map(|entry| entry.path());
-    let photos = paths.filter(|path| path.is_file() && is_photo(path));
+    let photos = files_in(folder).into_iter().filter(|path| is_photo(path));
     let is_labelled = |path: &PathBuf| path.file_stem().is_some_and(|s| labelled.contains(s));
     let unlabelled = photos.filter(|path| !is_labelled(path));
     let names =
@@ -405,6 +408,12 @@ fn unlabelled_photos(folder: &Path, labelled: &BTreeSet<&OsStr>) -> Vec<String> 
     let mut names: Vec<String> = names.collect();
     names.sort();
     names
+}
+
+fn files_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let paths = entries.map(|entry| entry.path());
+    paths.filter(|path| path.is_file()).collect()
 }
 
 /// A picture that is neither hidden, nor an overlay or a mask of a photo, nor of a kind that
@@ -486,7 +495,7 @@ fn cropped(camera: Camera, kept: Roi) -> Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::tilted_camera;
+    use crate::camera::{Label, tilted_camera};
     use std::sync::Weak;
 
     const TAKEN: [usize; 2] = [16, 12];
@@ -571,6 +580,22 @@ mod tests {
             assert_eq!(front(zoom).size(), plate(&place, zoom).size());
         }
         assert_eq!(*front(4.0), mask);
+    }
+
+    #[test]
+    fn a_photo_whose_label_cannot_be_used_is_among_the_inputs() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut label = Label::new([16, 12], [[0.0; 2]; 4], [0.6, 0.4]);
+        label.image.file = "a.png".into();
+        io::write_json(folder.path().join("a.label.json"), &label).unwrap();
+        let others = ["b.jpg", "b.label.json"].map(|name| folder.path().join(name));
+        others
+            .iter()
+            .for_each(|path| std::fs::write(path, "{").unwrap());
+        let inputs = BackgroundPhoto::files_beside("a", folder.path(), None).unwrap();
+        for path in others {
+            assert!(inputs.contains(&path), "{}: {inputs:?}", path.display());
+        }
     }
 
     #[test]

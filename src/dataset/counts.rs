@@ -49,13 +49,14 @@ pub struct ClassCount {
 }
 
 impl DatasetCounts {
-    /// Objects that got no label.
+    /// Objects that got no label, or one to be ignored.
     pub fn dropped(&self) -> u64 {
         self.objects.saturating_sub(self.labelled)
     }
 
-    /// Objects that got no label though nothing lies over them, or it would not matter: too much of
-    /// them lies outside of the picture, or nothing of them is seen.
+    /// Objects that got no label, or under `ignore` one to be ignored, but not for being obstructed:
+    /// too much of them lies outside of the picture, or nothing of them is seen. Where obstructed
+    /// ones are labelled (`keep`, `class`), they may be among them.
     pub fn left_out(&self) -> u64 {
         let accounted = match self.policy {
             Obstructed::Drop | Obstructed::Ignore => self.labelled + self.obstructed,

@@ -144,8 +144,9 @@ impl DataYaml {
             "test" => self.test = value.texts(key)?,
             "nc" => self.nc = Some(value.count(key)?),
             "names" => return self.set_names(value),
-            "kpt_shape" if !matches!(value, Value::Null) => {
-                self.keypoints = Some((line, value.keypoint_numbers(key)));
+            "kpt_shape" => {
+                let is_given = !matches!(value, Value::Null);
+                self.keypoints = is_given.then(|| (line, value.keypoint_numbers(key)));
             }
             _ => {}
         }
@@ -547,6 +548,8 @@ mod tests {
         let numbers = DataYaml::read_keypoint_numbers;
         assert_eq!(numbers(text), Ok(8));
         assert_eq!(numbers("names: 3\nkpt_shape:\n"), Ok(0));
+        // Of a key that stands twice trainers take the last value.
+        assert_eq!(numbers("kpt_shape: [4, 3]\nkpt_shape:\n"), Ok(0));
         let expected = "kpt_shape: expected [number of points, 2 or 3]";
         for bad in ["17", "[17]", "[17, 4]", "[0, 3]"] {
             let told = numbers(&format!("kpt_shape: {bad}\n"));

@@ -43,10 +43,10 @@
 //!   that the system does not give is not attempted.
 //! * **Who decodes.** Decoders in Rust, in this process; one that panics has met a damaged file.
 //!   What they do not know goes to OpenImageIO, HEIC to libheif, in a worker process, which gets the
-//!   file's bytes and gives samples through pipes. It may open no file (Landlock, seccomp, file size
-//!   0), start nothing but threads, connect nowhere, has memory for the current file only, and is killed when it takes
-//!   more than [`Limits::seconds`]. A file on which two workers die is named with the signal. The
-//!   worker is not trusted either.
+//!   file's bytes through a socket and gives samples through a pipe. It may open no file (Landlock,
+//!   seccomp, file size 0), start nothing but threads, connect nowhere, has memory for the current
+//!   file only, and is killed when it takes more than [`Limits::seconds`]. A file on which two
+//!   workers die is named with the signal. The worker is not trusted either.
 //! * **What is written** goes to a temporary file beside its place, is synced, and moved there:
 //!   whole or not at all. (The samples of a dataset are synced many at once, after they are moved;
 //!   what a power cut tears of the last ones is made again.) A link in its place is replaced, not

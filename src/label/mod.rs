@@ -65,7 +65,7 @@ use serde::{Deserialize, Serialize};
 use visibility::ObjectVisibility;
 
 /// How far the outline that is written may be from the border of a mask, pixels: the stairs of a
-/// slanting border become a line.
+/// slanting border become a line. What lies over what goes by the border itself.
 const MASK_OUTLINE_TOLERANCE_PX: f64 = 1.0;
 
 /// Everything known of the objects in one picture.
@@ -96,7 +96,8 @@ pub struct ObjectLabel {
     /// Index into the class list.
     pub class: u32,
     /// Outline in the picture, pixels, by [`LabelOptions::outline`]: one ring per part (the clipping
-    /// leaves one of a convex outline), none for a card seen edge-on.
+    /// leaves one of a convex outline), none for a card seen edge-on. That of a mask is simplified by
+    /// up to 1 pixel; what lies over what goes by the mask, to the pixel.
     pub outline_px: Vec<Vec<Point2<f64>>>,
     /// Box around the whole object.
     pub amodal_box: BBox,

@@ -170,7 +170,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_gain_that_is_taken_makes_an_infinite_matte() {
+    fn the_least_gain_makes_a_finite_matte_and_0_is_refused() {
         let of_gain = |gain: f32| ChromaKeyOptions {
             threshold: 0.0,
             gain,

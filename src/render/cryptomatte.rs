@@ -1,10 +1,4 @@
 //! Cryptomatte: which objects are in a pixel, and how much of each is seen, in channels of floats.
-//!
-//! # Method
-//! Friedman and Jones, "Cryptomatte Specification" 1.2.0 (2019): an object's id is the MurmurHash3
-//! of its name, made a float that is neither a NaN nor subnormal; a pixel's objects are ranked by
-//! coverage, two ranks to a set of four channels; text attributes name the layer, the hash and the
-//! objects. Readers need the floats exactly: no half, and no compression with loss.
 
 use crate::deep::{DeepImage, DeepSample};
 use crate::pixel::ObjectId;
@@ -19,6 +13,14 @@ const SET_CHANNELS: [&str; 4] = ["R", "G", "B", "A"];
 const KEY_DIGITS: usize = 7;
 
 /// The channels and attributes of one layer.
+///
+/// # Method
+/// [Friedman and Jones, "Cryptomatte Specification" 1.2.0 (2019)][specification]: an object's id is
+/// the MurmurHash3 of its name, made a float that is neither a NaN nor subnormal; a pixel's objects
+/// are ranked by coverage, two ranks to a set of four channels; text attributes name the layer, the
+/// hash and the objects. Readers need the floats exactly: no half, and no compression with loss.
+///
+/// [specification]: https://github.com/Psyop/Cryptomatte
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cryptomatte {
     /// Names and samples, row by row: `CryptoObject00.R`, ...
@@ -194,14 +196,37 @@ mod tests {
         }
     }
 
-    #[test]
-    fn objects_are_ranked_by_what_is_seen_of_them() {
-        let sample = |id, visible| DeepSample {
+    fn sample(id: u32, visible: f32) -> DeepSample {
+        DeepSample {
             object: ObjectId(id),
             visible,
             alpha: 1.0,
             ..DeepSample::default()
-        };
+        }
+    }
+
+    #[test]
+    fn equal_coverages_are_ranked_by_id_in_either_order_of_depth() {
+        let ids = [1, 2].map(|id| (ObjectId(id), id_of_name(&format!("object{id}"))));
+        let mut expected = ids.map(|(_, id)| (id, 0.25));
+        expected.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for [front, back] in [[1, 2], [2, 1]] {
+            let samples = [sample(front, 0.25), sample(back, 0.25)];
+            assert_eq!(ranked_objects(&samples, &ids, 2), expected);
+        }
+    }
+
+    #[test]
+    fn objects_of_one_name_share_a_rank() {
+        let bottle = id_of_name("bottle");
+        let ids = [1, 2].map(|id| (ObjectId(id), bottle));
+        let samples = [sample(1, 0.25), sample(2, 0.5)];
+        let ranks = ranked_objects(&samples, &ids, 2);
+        assert_eq!(ranks, [(bottle, 0.75), (0.0, 0.0)]);
+    }
+
+    #[test]
+    fn objects_are_ranked_by_what_is_seen_of_them() {
         let pixel = vec![
             sample(1, 0.25),
             sample(2, 0.5),

@@ -77,25 +77,26 @@ fn judge(
     let count = differences.len() as f64;
     let bias = differences.iter().sum::<f64>() / count;
     let error = (differences.iter().map(|d| d * d).sum::<f64>() / count).sqrt();
-    let number = |key: &str| {
-        case.table["tolerance"]
-            .get(key)
-            .and_then(toml::Value::as_float)
-            .unwrap_or(0.0)
-    };
+    let fail = bound(case, "fail")?;
     let worst = differences.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
-    let over = 100.0
-        * differences
-            .iter()
-            .filter(|d| d.abs() > number("fail"))
-            .count() as f64
-        / count;
+    let over = 100.0 * differences.iter().filter(|d| d.abs() > fail).count() as f64 / count;
     let measured =
         format!("{name}: rmse {error:.5}, bias {bias:+.6}, {over:.2} % over, worst {worst:.3}");
     if std::env::var_os("PETCOMP_GOLDEN_VERBOSE").is_some() {
         eprintln!("{}: {measured}", case.name);
     }
-    let fine = error <= rmse && bias.abs() <= number("bias");
-    let fine = fine && over <= number("fail_percent") && worst <= number("hard_fail");
+    let fine = error <= rmse && bias.abs() <= bound(case, "bias")?;
+    let fine = fine && over <= bound(case, "fail_percent")?;
+    let fine = fine && worst <= bound(case, "hard_fail")?;
     fine.then_some(()).ok_or(measured)
+}
+
+/// A bound of a case; each of them must be there.
+fn bound(case: &Case, key: &str) -> Result<f64, String> {
+    let table = case.table.get("tolerance");
+    let value = table.and_then(|table| table.get(key));
+    value.and_then(toml::Value::as_float).ok_or_else(|| {
+        let found = value.map_or("missing".into(), toml::Value::to_string);
+        format!("tolerance.{key}: {found}, expected a number like 0.02")
+    })
 }

@@ -3,6 +3,7 @@
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
 use crate::values::parse_pixel_size;
+use anyhow::Context;
 use petcomp::capture::{Display, Frame, write_frames};
 use std::path::PathBuf;
 
@@ -42,19 +43,32 @@ pub(crate) fn run(command: &CaptureCommand, global: &GlobalArgs) -> anyhow::Resu
 
 impl FramesArgs {
     fn write(&self, global: &GlobalArgs) -> anyhow::Result<()> {
-        let page = write_frames(&self.output, &self.display(), self.stripes)?;
+        let page = write_frames(&self.output, &self.display()?, self.stripes)?;
         let frames = Frame::all(self.stripes).count();
         global.print_written(&self.output, format_args!("{frames} frames"));
         global.print_look_at(&page);
         Ok(())
     }
 
-    fn display(&self) -> Display {
-        let of_diagonal =
-            |inches: f64| Display::width_of_diagonal(self.size, METRES_IN_INCH * inches);
-        Display {
+    fn display(&self) -> anyhow::Result<Display> {
+        let display = Display {
             size_px: self.size,
-            width: self.width.or(self.diagonal.map(of_diagonal)),
-        }
+            width: self.width,
+        };
+        display.check()?;
+        self.diagonal.map_or(Ok(display), |inches| {
+            with_diagonal(display, inches).with_context(|| format!("--diagonal {inches}"))
+        })
     }
+}
+
+/// A display of known pixels whose picture has this diagonal.
+fn with_diagonal(display: Display, inches: f64) -> petcomp::Result<Display> {
+    let width = Display::width_of_diagonal(display.size_px, METRES_IN_INCH * inches);
+    let display = Display {
+        width: Some(width),
+        ..display
+    };
+    display.check()?;
+    Ok(display)
 }

@@ -2020,7 +2020,17 @@ fn a_capture_that_cannot_be_measured_says_why() {
     let frames = |size: &'static str| ["capture", "frames", "-o", "frames", "--size", size];
     let small = desk.refused(&frames("640x200"));
     assert!(small.contains("size_px: 200, expected 400 to"), "{small}");
+    let flat = desk.refused(&[&frames("640x400")[..], &["--diagonal", "0"]].concat());
+    assert!(
+        flat.contains("--diagonal 0: width: 0, expected 0.01 to 50 m"),
+        "{flat}"
+    );
     desk.ok(&[&frames("640x400")[..], &["--diagonal", "20"]].concat());
+    let narrow = text(&desk.run(&frames("300x1600")).stderr);
+    assert!(
+        narrow.contains("size_px: 300, expected 400 to") && !narrow.contains("is gone"),
+        "{narrow}"
+    );
     photos_of_frames(&desk, &["01_white"]);
     let add = "asset add photo_01_white.png --class cup -o assets --captured";
     let one = desk.refused(&words(add));

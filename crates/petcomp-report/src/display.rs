@@ -13,7 +13,6 @@ mod window;
 
 use crate::columns::{Column, number_or_empty, table_of};
 use crate::files::write_texts;
-use crate::statistics::mean_of;
 use method::{DisplayMethod, SeenFilm};
 use petcomp::geom::Point2;
 use petcomp::matte::LightPath;
@@ -51,12 +50,13 @@ struct DisplaySummary {
     method: DisplayMethod,
     bottles: usize,
     failed: usize,
-    /// Mean absolute error over all backgrounds.
+    /// Mean absolute error over all backgrounds; not a number without a cut-out.
     error: f64,
     /// The same as a share of the paper's on the same bottles: over all backgrounds, the plain one,
     /// and those with a pattern.
     shares: [f64; 3],
-    /// Of the pixels inside, how many have a displacement; not a number where the truth has none.
+    /// Of the pixels inside, how many have a displacement; not a number where the truth has none or
+    /// the method measures none.
     known: f64,
     /// Of those, how many have the right one, and the median error; not numbers without any.
     good_flow: f64,
@@ -211,6 +211,7 @@ fn absolute_difference(a: LinearRgb, b: LinearRgb) -> f64 {
 impl DisplaySummary {
     fn new(rows: &[DisplayRow], method: DisplayMethod) -> Self {
         let own: Vec<&DisplayRow> = rows.iter().filter(|row| row.method == method).collect();
+        let errors: Vec<f64> = own.iter().filter_map(|row| row.errors).flatten().collect();
         let pairs: Vec<_> = own
             .iter()
             .filter_map(|row| Some((row.errors?, paper_errors(rows, &row.bottle)?)))
@@ -222,15 +223,16 @@ impl DisplaySummary {
         };
         let mut flow: Vec<f64> = own.iter().flat_map(|row| row.flow_errors.clone()).collect();
         flow.sort_by(f64::total_cmp);
-        let inside: usize = own.iter().map(|row| row.inside).sum();
+        let inside: usize = match method.measures_displacement() {
+            true => own.iter().map(|row| row.inside).sum(),
+            false => 0,
+        };
         let good = flow.iter().filter(|error| **error <= GOOD_FLOW_PX).count();
         Self {
             method,
             bottles: own.len(),
             failed: own.iter().filter(|row| row.errors.is_none()).count(),
-            error: mean_of(&pairs, |(own, _)| {
-                own.iter().sum::<f64>() / own.len() as f64
-            }),
+            error: errors.iter().sum::<f64>() / errors.len() as f64,
             shares: [share(0..5), share(4..5), share(0..4)],
             known: flow.len() as f64 / inside as f64,
             good_flow: good as f64 / flow.len() as f64,
@@ -252,12 +254,17 @@ fn shown(value: f64, unit: &str) -> String {
     format!("{value:.2}{unit}")
 }
 
+/// A mean error; nothing where there is none.
+fn shown_error(value: f64) -> String {
+    number_or_empty((!value.is_nan()).then_some(value), 5)
+}
+
 /// The table method x error.
 const SUMMARY_COLUMNS: [Column<DisplaySummary>; 10] = [
     ("method", |s| s.method.name().into()),
     ("bottles", |s| s.bottles.to_string()),
     ("no cut-out", |s| s.failed.to_string()),
-    ("MAE", |s| format!("{:.5}", s.error)),
+    ("MAE", |s| shown_error(s.error)),
     ("of the paper's", |s| shown(s.shares[0], "")),
     ("over plain", |s| shown(s.shares[1], "")),
     ("over patterns", |s| shown(s.shares[2], "")),
@@ -355,10 +362,33 @@ mod tests {
     }
 
     #[test]
+    fn errors_are_of_every_cut_out_and_shares_of_those_that_the_paper_has_too() {
+        let (paper, stripes) = (DisplayMethod::Paper, DisplayMethod::Stripes);
+        let of = |bottle: &str, method, error: Option<f64>| DisplayRow {
+            bottle: bottle.into(),
+            ..row(method, error.map(|e| [e; BACKGROUNDS.len()]))
+        };
+        let rows = [
+            of("a", paper, Some(0.4)),
+            of("a", stripes, Some(0.1)),
+            of("b", paper, None),
+            of("b", stripes, Some(0.3)),
+        ];
+        let cells = |rows: &[DisplayRow], method| {
+            let summary = DisplaySummary::new(rows, method);
+            table_of(&SUMMARY_COLUMNS, [&summary]).rows[0][3..5].to_vec()
+        };
+        assert_eq!(cells(&rows, stripes), ["0.20000", "0.25"]);
+        assert_eq!(cells(&rows[2..], stripes), ["0.30000", ""]);
+        assert_eq!(cells(&rows[2..], paper), ["", ""]);
+    }
+
+    #[test]
     fn a_share_of_0_is_told_and_what_was_not_measured_is_not() {
         let stripes = DisplayMethod::Stripes;
         let cells = |row: DisplayRow| {
-            let summary = DisplaySummary::new(&[row], stripes);
+            let method = row.method;
+            let summary = DisplaySummary::new(&[row], method);
             table_of(&SUMMARY_COLUMNS, [&summary]).rows[0][7..].to_vec()
         };
         let wrong = DisplayRow {
@@ -368,5 +398,11 @@ mod tests {
         };
         assert_eq!(cells(wrong), ["0.25", "0.00", "3.00 px"]);
         assert_eq!(cells(row(stripes, None)), ["", "", ""]);
+        // The true displacement is known, and the paper's keyer measures none.
+        let of_paper = DisplayRow {
+            inside: 4,
+            ..row(DisplayMethod::Paper, None)
+        };
+        assert_eq!(cells(of_paper), ["", "", ""]);
     }
 }

@@ -283,11 +283,8 @@ fn a_photo_of_another_size_than_its_label_says_is_not_shown() {
     assert_eq!(is_disabled, true);
 }
 
-#[test]
-fn photos_of_one_camera_are_solved_together() {
-    let Some(mut browser) = Browser::open(1360, 860) else {
-        return;
-    };
+/// Two sample photos, whose labels name one camera.
+fn photos_of_one_camera() -> TempDir {
     let dir = photos(&["bg0000", "bg0003"]);
     for stem in ["bg0000", "bg0003"] {
         let path = dir.path().join(format!("{stem}.label.json"));
@@ -295,6 +292,15 @@ fn photos_of_one_camera_are_solved_together() {
         let shared = text.replace(&stem.replace("bg", "cam-"), "shared");
         io::write_text(&path, &shared).unwrap();
     }
+    dir
+}
+
+#[test]
+fn photos_of_one_camera_are_solved_together() {
+    let Some(mut browser) = Browser::open(1360, 860) else {
+        return;
+    };
+    let dir = photos_of_one_camera();
     let studio = Studio::over(dir.path());
     open_photo(&mut browser, &studio, "bg0000.jpg");
     browser.click_on("#joint");
@@ -399,10 +405,7 @@ fn a_label_that_has_no_camera_keeps_no_other_from_its_own() {
 #[test]
 fn a_label_that_no_camera_fits_is_told_why_and_keeps_no_camera_of_before() {
     let dir = photos(&["bg0000", "bg0001"]);
-    let path = dir.path().join("bg0001.label.json");
-    let mut label: Value = io::read_json(&path).unwrap();
-    (label["surface"]["width_m"], label["surface"]["height_m"]) = (json!(0.37), json!(0.56));
-    io::write_json(&path, &label).unwrap();
+    exchange_sides(&dir.path().join("bg0001.label.json"));
     let camera = dir.path().join("bg0001.camera.json");
     std::fs::write(&camera, "of another label").unwrap();
     let studio = Studio::over(dir.path());
@@ -411,6 +414,52 @@ fn a_label_that_no_camera_fits_is_told_why_and_keeps_no_camera_of_before() {
     let why = solved[0]["why"].as_str().unwrap();
     assert!(why.contains("exchange width_m and height_m"), "{why}");
     assert!(!camera.exists());
+}
+
+/// No camera fits the label any more.
+fn exchange_sides(path: &Path) {
+    let mut label: Value = io::read_json(path).unwrap();
+    (label["surface"]["width_m"], label["surface"]["height_m"]) = (json!(0.37), json!(0.56));
+    io::write_json(path, &label).unwrap();
+}
+
+#[test]
+fn a_camera_that_was_forced_stays_beside_its_label() {
+    let dir = photos(&["bg0001"]);
+    let path = dir.path().join("bg0001.label.json");
+    exchange_sides(&path);
+    let label = camera::read_label(&path).unwrap();
+    let forced = CameraFile::new(&label, &camera::solve(&label, &Default::default()).unwrap());
+    assert!(forced.forced);
+    let camera = dir.path().join("bg0001.camera.json");
+    io::write_json(&camera, &forced).unwrap();
+    let studio = Studio::over(dir.path());
+    let asked = r#"{ "photos": ["bg0001.jpg"] }"#;
+    let solved = body(&studio.post("api/corners/joint", asked));
+    assert!(solved[0]["why"].is_string(), "{solved}");
+    let stored: CameraFile = io::read_json(&camera).unwrap();
+    assert_eq!(stored, forced);
+}
+
+#[test]
+fn each_photo_without_a_camera_is_told_what_is_wrong_with_its_own_label() {
+    let dir = photos_of_one_camera();
+    let corners = truth("bg0003");
+    let coincident = [corners[0], corners[0], corners[2], corners[3]];
+    for (stem, corners) in [("bg0000", Value::Null), ("bg0003", json!(coincident))] {
+        let path = dir.path().join(format!("{stem}.label.json"));
+        let mut label: Value = io::read_json(&path).unwrap();
+        label["surface"]["corners_px"] = corners;
+        io::write_json(&path, &label).unwrap();
+    }
+    let studio = Studio::over(dir.path());
+    let asked = r#"{ "photos": ["bg0000.jpg", "bg0003.jpg"] }"#;
+    let solved = body(&studio.post("api/corners/joint", asked));
+    let expected = ["corners_px is missing", "corner are 0.0 px apart"];
+    for (photo, expected) in solved.as_array().unwrap().iter().zip(expected) {
+        let why = photo["why"].as_str().unwrap();
+        assert!(why.contains(expected) && photo["together"] == 2, "{solved}");
+    }
 }
 
 #[test]

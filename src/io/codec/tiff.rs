@@ -771,10 +771,14 @@ mod tests {
         };
         // The file ends behind the two bytes of its last value that count.
         let cut = mosaic[..mosaic.len() - 6].to_vec();
+        // A BigTIFF, of which the last 6 bytes of an entry do not count.
+        let mut cut_big = b"II+\0\x08\0\0\0\x10\0\0\0\0\0\0\0\x01\0\0\0\0\0\0\0".to_vec();
+        cut_big.extend(b"\x06\x01\x03\0\x01\0\0\0\0\0\0\0\x23\x80");
         for raw in [
             mosaic,
             without_version,
             cut,
+            cut_big,
             with_tag(kind, CFA),
             with_tag(kind, LINEAR_RAW),
         ] {

@@ -243,7 +243,7 @@ pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
     })
 }
 
-/// A document in which nothing is wrong whatever it is read as.
+/// Parses TOML; refuses numbers that are not finite and nesting that is too deep.
 fn checked_toml(text: &str) -> Result<Spanned<DeTable<'_>>> {
     let document = DeTable::parse(text)
         .map_err(|e| toml_mistake(text, e.span(), String::new(), e.message().into()))?;

@@ -8,7 +8,7 @@
 use super::protocol::{
     Greeting, Request, Response, Shape, receive_line, receive_samples, receive_shape, send_request,
 };
-use super::timeout::TimedPipe;
+use super::timeout::TimedStream;
 use crate::error::{Error, Result};
 use crate::io::codec::refusal::Refusal;
 use crate::io::limits::Limits;
@@ -37,8 +37,11 @@ const MAX_ATTEMPTS: usize = 2;
 /// How often a worker is started that ends before it greets: it has seen no file yet, so none is to
 /// blame.
 const MAX_STARTS: usize = 3;
-/// A worker that closed its pipes is ending, and is waited for so long before it is killed.
+/// A worker that closed its streams is ending, and is waited for so long before it is killed.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
+/// A large pipe saves turns between the two processes; a larger one takes a privilege (`pipe(7)`).
+#[cfg(target_os = "linux")]
+const PIPE_BYTES: usize = 1 << 20;
 
 /// The workers of this program that have nothing to do.
 static IDLE: WorkerPool = WorkerPool {
@@ -158,8 +161,8 @@ fn timed_out(library: &str, timeout: Duration) -> Refusal {
 /// A running worker program; killed when it is dropped.
 struct Worker {
     child: Child,
-    to: TimedPipe,
-    from: BufReader<TimedPipe>,
+    to: TimedStream,
+    from: BufReader<TimedStream>,
     limits: Limits,
     greeting: Greeting,
 }
@@ -194,11 +197,14 @@ impl Worker {
         let (to, stdin) = UnixStream::pair()?;
         let mut child = spawn_program(program, limits, stdin.into())?;
         let stdout = child.stdout.take();
-        let stdout = stdout.ok_or_else(|| std::io::Error::other("no pipe to it"))?;
+        let stdout = stdout.ok_or_else(|| std::io::Error::other("no pipe from it"))?;
+        // A smaller pipe is a slower one.
+        #[cfg(target_os = "linux")]
+        let _ = rustix::pipe::fcntl_setpipe_size(&stdout, PIPE_BYTES);
         Ok(Self {
             child,
-            to: TimedPipe::new(to.into())?,
-            from: BufReader::new(TimedPipe::new(stdout.into())?),
+            to: TimedStream::new(to.into())?,
+            from: BufReader::new(TimedStream::new(stdout.into())?),
             limits: limits.clone(),
             greeting: Greeting::default(),
         })
@@ -289,7 +295,7 @@ impl Worker {
         let _ = self.child.kill();
         match status {
             Some(status) => ending_of(status),
-            None if is_closed(e) => "closed its pipes and did not exit".into(),
+            None if is_closed(e) => "closed its streams and did not exit".into(),
             None => format!("garbled response: {e}"),
         }
     }
@@ -334,7 +340,7 @@ fn not_started(program: &Path, how: &str) -> Refusal {
     format!("needs OpenImageIO, and {program} does not start: {how}").into()
 }
 
-/// The other end of a pipe is gone.
+/// The other end of a stream is gone.
 fn is_closed(e: &std::io::Error) -> bool {
     use ErrorKind::{BrokenPipe, ConnectionReset, UnexpectedEof};
     matches!(e.kind(), UnexpectedEof | BrokenPipe | ConnectionReset)
@@ -500,10 +506,10 @@ mod tests {
     }
 
     #[test]
-    fn a_worker_that_closes_its_pipes_and_stays_is_killed() {
+    fn a_worker_that_closes_its_streams_and_stays_is_killed() {
         let start = Instant::now();
         let e = asked("exec <&- >&- sleep 600", &Limits::default()).unwrap_err();
-        assert!(e.contains("closed its pipes"), "{e}");
+        assert!(e.contains("closed its streams"), "{e}");
         let took = start.elapsed();
         assert!(took < Duration::from_secs(120), "{took:?}");
     }

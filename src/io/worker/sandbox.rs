@@ -74,7 +74,7 @@ fn limit_resource(resource: Resource, current: u64, maximum: u64) {
     );
 }
 
-/// Gives up everything but memory, the pipes that are open, and some CPU time. Returns what the
+/// Gives up everything but memory, the streams that are open, and some CPU time. Returns what the
 /// system could not do.
 pub(super) fn enter_sandbox(limits: &Limits) -> (MemoryLimit, Vec<String>) {
     let memory = MemoryLimit::new(limits);
@@ -132,8 +132,8 @@ mod linux {
         }
     }
 
-    /// What a decoder that opens nothing calls: its own memory, its pipes, the clock, and its end.
-    /// And what a thread calls before its first line (`rseq`, `set_robust_list`): libraries
+    /// What a decoder that opens nothing calls: its own memory, its streams, the clock, and its
+    /// end. And what a thread calls before its first line (`rseq`, `set_robust_list`): libraries
     /// start theirs when they are loaded, and on a busy machine those have not run yet when the
     /// filter falls; the C library ends the process where `rseq` is refused.
     const ALLOWED_CALLS: [i64; 36] = [

@@ -39,7 +39,7 @@ pub(super) fn side_px(inside: &Image<Coverage>) -> f32 {
 pub(super) fn share(set: impl Iterator<Item = bool>, inside: &Image<Coverage>) -> f32 {
     let object = area(inside);
     let covered = set.zip(inside.pixels()).filter(|(set, _)| *set);
-    // No object, and one whose area is no number, is none of it.
+    // 0 where the object's area is 0 or NaN.
     if object > 0.0 {
         (covered.map(|(_, c)| f64::from(c.0)).sum::<f64>() / object) as f32
     } else {

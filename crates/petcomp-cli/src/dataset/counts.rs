@@ -55,21 +55,28 @@ fn counted_in(counts: &DatasetCounts) -> String {
     }
 }
 
+const WITHOUT_LABEL: &str = "without a label";
+const TO_BE_IGNORED: &str = "to be ignored, in YOLO without a label";
+
 /// What became of the labels of obstructed objects.
 fn obstructed_labels(policy: Obstructed) -> &'static str {
     match policy {
-        Obstructed::Drop => "without a label",
+        Obstructed::Drop => WITHOUT_LABEL,
         Obstructed::Keep => "labelled like the others",
-        Obstructed::Ignore => "to be ignored, in YOLO without a label",
+        Obstructed::Ignore => TO_BE_IGNORED,
         Obstructed::Class => "labelled as a class of their own",
     }
 }
 
-/// Objects without a label that are not obstructed, where there are any.
+/// Objects that were left out, where there are any, and what became of their labels.
 fn left_out(counts: &DatasetCounts) -> String {
+    let labels = match counts.policy {
+        Obstructed::Ignore => TO_BE_IGNORED,
+        Obstructed::Drop | Obstructed::Keep | Obstructed::Class => WITHOUT_LABEL,
+    };
     match counts.left_out() {
         0 => String::new(),
-        some => format!(", {some} cut off too much or not seen (without a label)"),
+        some => format!(", {some} cut off too much or not seen ({labels})"),
     }
 }
 
@@ -88,14 +95,24 @@ mod tests {
 
     #[test]
     fn the_line_of_objects_adds_up() {
-        let counts = DatasetCounts {
-            objects: 10,
-            labelled: 5,
-            obstructed: 3,
-            ..DatasetCounts::default()
-        };
-        let expected = "objects      10, 5 labelled, 3 obstructed (without a label), \
-            2 cut off too much or not seen (without a label)";
-        assert_eq!(objects_line(&counts), expected);
+        for (policy, labels) in [
+            (Obstructed::Drop, "(without a label)"),
+            (
+                Obstructed::Ignore,
+                "(to be ignored, in YOLO without a label)",
+            ),
+        ] {
+            let counts = DatasetCounts {
+                objects: 10,
+                labelled: 5,
+                obstructed: 3,
+                policy,
+                ..DatasetCounts::default()
+            };
+            let expected = format!(
+                "objects      10, 5 labelled, 3 obstructed {labels}, 2 cut off too much or not seen {labels}"
+            );
+            assert_eq!(objects_line(&counts), expected);
+        }
     }
 }

@@ -48,7 +48,7 @@ class DatasetCounts:
     counted: int
     #: Objects in these images, labelled or not.
     objects: int
-    #: Objects that have a label.
+    #: Objects that have a label; those that are to be ignored do not count.
     labelled: int
     #: Objects that are obstructed, labelled or not.
     obstructed: int
@@ -65,9 +65,10 @@ class DatasetCounts:
 
     @property
     def left_out(self) -> int:
-        """Objects without a label though nothing lies over them, or it would not matter.
+        """Objects that got no label, or under ``ignore`` one to be ignored, but not for being obstructed.
 
-        Too much of them lies outside of the picture, or nothing of them is seen.
+        Too much of them lies outside of the picture, or nothing of them is seen. Where obstructed ones are
+        labelled (``keep``, ``class``), they may be among them.
         """
         unlabelled = self.obstructed if self.policy in ("drop", "ignore") else 0
         return max(0, self.objects - self.labelled - unlabelled)
@@ -96,7 +97,8 @@ def generate(
     from several threads, in no fixed order, and must depend on nothing but ``k``; ``classes`` are then
     needed, beginning with those of its samples, and ``labels``, ``pictures`` and ``split`` are the tables of
     a recipe, but for what acts when labels are made: ``overlap_iou``, ``min_visible``, ``max_truncation``,
-    ``amodal``, ``outline`` and, but for layers, ``alpha_threshold`` belong to the recipe or the ``Shot`` of the samples.
+    ``amodal``, ``outline`` and, but for layers, ``alpha_threshold`` belong to the recipe or the ``Shot`` of
+    the samples.
 
     ``only`` makes image ``only`` alone, ``shard=(i, n)`` every ``n``-th from the ``i``-th (1 to ``n``), in a
     folder of its own below. ``progress`` is called in the calling thread, at the start and after each

@@ -58,10 +58,15 @@ impl DisplayMethod {
         self != Self::Stripes || bottle.with_stripes
     }
 
+    /// It measures where the light comes from.
+    pub(super) fn measures_displacement(self) -> bool {
+        self == Self::Stripes
+    }
+
     pub(super) fn run(self, stage: &Stage<'_>, place: &Place, bottle: &Bottle) -> Result<SeenFilm> {
         match self.painted() {
             Some(method) => on_paint(method, place, bottle),
-            None => on_display(self == Self::Stripes, stage, place, bottle),
+            None => on_display(self.measures_displacement(), stage, place, bottle),
         }
     }
 }

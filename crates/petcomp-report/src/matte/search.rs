@@ -41,16 +41,14 @@ struct MeasuredSearch {
     mean: SearchErrors,
 }
 
-/// Overlap of the outline, and the box, each against time, of so many photos, as far as there are.
+/// Overlap of the outline, and the box, each against time, of `photos` photos, as far as there are.
 pub(crate) fn searches(photos: usize) -> Result<Vec<Diagram>> {
     let photos = photos.min(made::PHOTO_COUNT);
     let mut found = Vec::new();
     for scale in PHOTO_SCALES {
         found.extend(measure_photos(photos, scale)?);
     }
-    let input = format!(
-        "{photos} photos of see-through bottles on an uneven screen with noise, made in code"
-    );
+    let input = input_of(photos);
     Ok(vec![
         Diagram {
             file: "matte_search_outline".into(),
@@ -67,7 +65,16 @@ pub(crate) fn searches(photos: usize) -> Result<Vec<Diagram>> {
     ])
 }
 
-/// Searches of all sizes in so many photos of one size.
+/// What is searched.
+fn input_of(photos: usize) -> String {
+    let photos = match photos {
+        1 => "1 photo of a see-through bottle".into(),
+        _ => format!("{photos} photos of see-through bottles"),
+    };
+    format!("{photos} on an uneven screen with noise, made in code")
+}
+
+/// Searches of all sizes in `count` photos of one size.
 fn measure_photos(count: usize, photo_scale: usize) -> Result<Vec<MeasuredSearch>> {
     let photos: Vec<Known> = (0..count)
         .map(|i| made::enlarged_photo(i, photo_scale))
@@ -178,6 +185,19 @@ mod tests {
             Quality::ALL
                 .iter()
                 .all(|q| SEARCH_SIDES_PX.contains(&search_side(*q)))
+        );
+    }
+
+    #[test]
+    fn one_photo_is_told_as_one() {
+        let [one, two] = [1, 2].map(input_of);
+        assert!(
+            one.starts_with("1 photo of a see-through bottle on"),
+            "{one}"
+        );
+        assert!(
+            two.starts_with("2 photos of see-through bottles on"),
+            "{two}"
         );
     }
 

@@ -34,8 +34,8 @@ impl JointPhoto {
     }
 }
 
-/// Solves the labels of photos, those of each camera together and each once, and writes the cameras,
-/// as `petcomp camera joint` does. A label that cannot be read keeps no other from its camera.
+/// Solves the labels of photos, those of each camera together and each once, and writes the cameras
+/// that `petcomp camera joint` writes. A label that cannot be read keeps no other from its camera.
 pub(super) fn solve(folder: &Folder, photos: &[String]) -> Answer<Vec<JointPhoto>> {
     let (mut names, mut all, mut solved) = (Vec::new(), Vec::new(), Vec::new());
     for photo in photos.iter().collect::<BTreeSet<_>>() {
@@ -71,7 +71,7 @@ fn solve_group(
     let labels = labels_of(members);
     let joint = match camera::solve_joint(&labels, &SolveOptions::default()) {
         Ok(joint) => joint,
-        Err(error) => return unsolved(folder, names, &Error::from(error)),
+        Err(error) => return unsolved(folder, names, members, &error),
     };
     let mut solved = Vec::new();
     for ((name, member), outcome) in names.iter().zip(members).zip(joint.photos) {
@@ -85,16 +85,44 @@ fn solve_group(
     Ok(solved)
 }
 
-fn unsolved(folder: &Folder, names: &[String], error: &Error) -> Answer<Vec<JointPhoto>> {
-    let unsolved = |name: &String| refused(folder, name, names.len(), error);
-    names.iter().map(unsolved).collect()
+/// Photos of which none has a camera, each with the reason that its own label gives where that has
+/// one.
+fn unsolved(
+    folder: &Folder,
+    names: &[String],
+    members: &[LabelledPhoto],
+    error: &SolveError,
+) -> Answer<Vec<JointPhoto>> {
+    let photos = names.iter().zip(members).map(|(name, member)| {
+        let own = camera::solve(&member.label, &SolveOptions::default()).err();
+        let why = Error::from(own.unwrap_or_else(|| error.clone()));
+        refused(folder, name, member, members.len(), &why)
+    });
+    photos.collect()
 }
 
-/// A photo whose label has no camera; that of before is removed, as where the label is saved.
-fn refused(folder: &Folder, name: &str, together: usize, error: &Error) -> Answer<JointPhoto> {
-    let _ = std::fs::remove_file(camera_place(folder, name)?);
+/// A photo whose label has no camera that fits; no camera of another label stays beside it.
+fn refused(
+    folder: &Folder,
+    name: &str,
+    member: &LabelledPhoto,
+    together: usize,
+    error: &Error,
+) -> Answer<JointPhoto> {
+    remove_anothers(folder, name, member)?;
     let why = error.to_string();
     Ok(JointPhoto::without_camera(name, together, why))
+}
+
+/// Removes the camera beside a label unless it was solved from that: alone, or with `--force`.
+fn remove_anothers(folder: &Folder, name: &str, member: &LabelledPhoto) -> Answer<()> {
+    let place = camera_place(folder, name)?;
+    let stored = folder.file(&beside(name, "camera.json")).ok();
+    let stored = stored.and_then(|path| io::read_json::<CameraFile>(path).ok());
+    if stored.is_none_or(|file| !file.is_of(member)) {
+        let _ = std::fs::remove_file(place);
+    }
+    Ok(())
 }
 
 fn camera_place(folder: &Folder, name: &str) -> Answer<PathBuf> {
@@ -111,7 +139,7 @@ fn written(
 ) -> Answer<JointPhoto> {
     let solution = match usable(outcome) {
         Ok(solution) => solution,
-        Err(error) => return refused(folder, name, all.len(), &error),
+        Err(error) => return refused(folder, name, member, all.len(), &error),
     };
     let file = CameraFile::solved_together(member, &solution, all);
     io::write_json(camera_place(folder, name)?, &file)?;
