@@ -283,7 +283,7 @@ impl<'a> Placed<'a> {
             unevenness: measured.unevenness.into(),
             outline_confidence: measured.distinct,
             color_confidence: Some(confidence(captured.transmittance_sigma)),
-            diagnostics: self.all_diagnostics(measured, captured.transmittance_sigma),
+            diagnostics: self.all_diagnostics(measured),
             captured: Some(captured),
             ..placed
         }
@@ -317,10 +317,9 @@ impl<'a> Placed<'a> {
         }
     }
 
-    fn all_diagnostics(&self, measured: &Measured, sigma: f64) -> Vec<Diagnostic> {
+    fn all_diagnostics(&self, measured: &Measured) -> Vec<Diagnostic> {
         let all = self.diagnostics.iter().chain(&measured.diagnostics);
         all.cloned()
-            .chain(uncertainty_warning(sigma))
             .chain(concave_warning(&measured.outline))
             .collect()
     }
@@ -342,18 +341,6 @@ fn confidence(sigma: f64) -> f64 {
         ..ColorUncertainty::default()
     };
     uncertainty.confidence()
-}
-
-/// The warning about a transmittance with this standard error.
-fn uncertainty_warning(sigma: f64) -> Option<Diagnostic> {
-    let limit = ColorUncertainty::NEEDS_REVIEW.tint;
-    (sigma > f64::from(limit)).then(|| {
-        let what = format!(
-            "its transmittance is uncertain by +- {sigma:.3} on average, expected at most {limit}: the photos are noisy, \
-             or it is clipped; use a brighter display, a lower ISO, or several photos of each frame"
-        );
-        Diagnostic::warning(Code::TintUncertain, what)
-    })
 }
 
 fn pose_warning(pose: &ScreenPose) -> Option<Diagnostic> {
@@ -389,22 +376,4 @@ fn mean_sigma(sigma: &Image<f32>) -> f64 {
     let inside = sigma.pixels().iter().filter(|s| **s > 0.0);
     let (sum, count) = inside.fold((0.0, 0.0), |(sum, n), s| (sum + f64::from(*s), n + 1.0));
     sum / f64::max(count, 1.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_confidence_below_a_half_has_a_warning() {
-        assert!(confidence(0.03) > 0.5 && uncertainty_warning(0.03).is_none());
-        let warning = uncertainty_warning(0.052).unwrap();
-        assert!(confidence(0.052) < 0.5 && warning.code == Code::TintUncertain);
-        assert!(
-            warning
-                .message
-                .contains("uncertain by +- 0.052 on average, expected at most 0.04"),
-            "{warning}"
-        );
-    }
 }

@@ -248,9 +248,13 @@ impl CameraFile {
         file
     }
 
-    /// Whether it was solved from this label as it is, with the sides that were given then where it
-    /// has none.
+    /// Whether it was solved from this label alone, as it is, with the sides that were given then
+    /// where it has none.
     pub fn is_of(&self, labelled: &LabelledPhoto) -> bool {
+        let from = self.solved_from.as_ref();
+        if from.is_some_and(|from| !from.together.is_empty()) {
+            return false;
+        }
         let labelled = with_stored_size(labelled, Some(self));
         staleness(self, &labelled, &BTreeMap::new()).is_none()
     }

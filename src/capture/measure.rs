@@ -168,6 +168,7 @@ impl<'a> CaptureScene<'a> {
             noise: self.noise(),
             least_light: self.frames().least_light(&self.free),
             free: &self.free,
+            clipped_white: &self.stack.clipped_white,
         }
     }
 

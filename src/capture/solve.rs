@@ -73,6 +73,9 @@ pub(super) struct FilmInput<'a> {
     pub(super) least_light: f32,
     /// Pixels that surely show the empty display.
     pub(super) free: &'a Mask,
+    /// Where each photo of the white frame is clipped. Their mean, of photos of several exposures,
+    /// does not tell.
+    pub(super) clipped_white: &'a [(String, Mask)],
 }
 
 /// Film of an object, and the standard deviation of its transmittance in the least certain channel;
@@ -123,7 +126,7 @@ const CLIPPED_RIM_PX: f64 = 1.0;
 impl FilmInput<'_> {
     pub(super) fn solve(&self, inside: &Image<Coverage>) -> SolvedFilm {
         let frames = &self.frames;
-        let clipped = filter::dilate(&clipped(frames.white), CLIPPED_RIM_PX);
+        let clipped = filter::dilate(&self.clipped(), CLIPPED_RIM_PX);
         let level = self.level_of_stripes();
         let (w, h) = frames.black.size();
         let lines = Image::from_fn(w, h, |x, y| self.lines((x, y), level, clipped[(x, y)]));
@@ -144,6 +147,13 @@ impl FilmInput<'_> {
     }
 
     /// Of each channel.
+    fn clipped(&self) -> Mask {
+        let photos = self.clipped_white.iter().map(|(_, mask)| mask);
+        photos.fold(clipped(self.frames.white), |all, mask| {
+            all.zip_map(mask, |all, here| all || here)
+        })
+    }
+
     fn lines(&self, at: (usize, usize), level: LinearRgb, clipped: bool) -> [LevelLine; 3] {
         let frames = &self.frames;
         let [black, white] =
@@ -340,6 +350,7 @@ mod tests {
             noise: frames.noise(free),
             least_light: frames.least_light(free),
             free,
+            clipped_white: &[],
         };
         input.solve(inside)
     }

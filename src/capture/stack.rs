@@ -95,9 +95,6 @@ const STEADY_PX: f64 = 0.5;
 const MAX_DRIFT: f32 = 0.2;
 /// Photos of one frame that differ by more of its white show different things.
 const MAX_DIFFERENCE: f32 = 0.1;
-/// The same of black, which an object changes by what it reflects alone: noise of 4 % of white
-/// stays below.
-const MAX_BLACK_DIFFERENCE: f32 = 0.02;
 /// Blur of that difference, pixels: against noise, and edges that are aligned to a part of a pixel.
 const DIFFERENCE_BLUR_PX: f32 = 3.0;
 
@@ -164,10 +161,8 @@ impl<'a> Alignment<'a> {
         let mut sum = first_seen.clone();
         for &other in others {
             let (seen, mask) = self.aligned(photos, other)?;
-            let most = max_difference(frame);
-            if self.differ(&first_seen, &seen, most) {
-                let names = [first, other].map(|i| &*photos.sources.names[i]);
-                return Err(differing(names, most));
+            if self.differ(&first_seen, &seen) {
+                return Err(differing([first, other].map(|i| &*photos.sources.names[i])));
             }
             clipped.push((name(other), mask));
             sum = sum.zip_map(&seen, |a, b| a + b);
@@ -179,10 +174,10 @@ impl<'a> Alignment<'a> {
         }))
     }
 
-    /// Two photos of a frame differ as with an object and without: by more than a share of white.
-    fn differ(&self, a: &Image<LinearRgb>, b: &Image<LinearRgb>, most: f32) -> bool {
+    /// Two photos of a frame differ as with an object and without.
+    fn differ(&self, a: &Image<LinearRgb>, b: &Image<LinearRgb>) -> bool {
         let off = a.zip_map(b, |a, b| grey(a) - grey(b));
-        let most = most * white_light(self.reference);
+        let most = MAX_DIFFERENCE * white_light(self.reference);
         // The edges of markers differ most where photos are aligned to half a pixel only.
         let free = self.view.free_area(self.display);
         let differing = filter::gaussian_blur(&off, DIFFERENCE_BLUR_PX)
@@ -296,19 +291,11 @@ fn white_light(photo: &FramePhoto) -> f32 {
     sum / f32::max(count, 1.0) / PAPER_LIGHT
 }
 
-/// By how much photos of a frame may differ, as a share of white.
-fn max_difference(frame: Frame) -> f32 {
-    match frame {
-        Frame::Black => MAX_BLACK_DIFFERENCE,
-        Frame::White | Frame::Stripes(_) => MAX_DIFFERENCE,
-    }
-}
-
-fn differing([a, b]: [&str; 2], most: f32) -> Error {
+fn differing([a, b]: [&str; 2]) -> Error {
     refused(&format!(
         "{a} and {b} show the same frame but differ by more than {:.0} % of white; \
-         photos without the object belong to empty (--empty)",
-        100.0 * most
+         photos without the object belong to empty (--empty), and neither it nor the light may move",
+        100.0 * MAX_DIFFERENCE
     ))
 }
 

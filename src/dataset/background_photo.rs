@@ -142,7 +142,7 @@ impl BackgroundPhoto {
         // Nobody knows which of them a label that cannot be used is of.
         let others = match camera::labels_in(folder, size) {
             Ok(_) => Vec::new(),
-            Err(_) => files_in(folder),
+            Err(_) => photos_and_labels(folder).collect(),
         };
         Ok(files.chain(others).collect())
     }
@@ -408,6 +408,14 @@ fn unlabelled_photos(folder: &Path, labelled: &BTreeSet<&OsStr>) -> Vec<String> 
     let mut names: Vec<String> = names.collect();
     names.sort();
     names
+}
+
+/// The photos of a folder, and what may be their labels and cameras.
+fn photos_and_labels(folder: &Path) -> impl Iterator<Item = PathBuf> {
+    let is_label = |path: &Path| ["json", "xml"].iter().any(|e| io::has_extension(path, e));
+    files_in(folder)
+        .into_iter()
+        .filter(move |path| is_photo(path) || is_label(path))
 }
 
 fn files_in(folder: &Path) -> Vec<PathBuf> {

@@ -212,33 +212,45 @@ impl DisplaySummary {
     fn new(rows: &[DisplayRow], method: DisplayMethod) -> Self {
         let own: Vec<&DisplayRow> = rows.iter().filter(|row| row.method == method).collect();
         let errors: Vec<f64> = own.iter().filter_map(|row| row.errors).flatten().collect();
-        let pairs: Vec<_> = own
-            .iter()
-            .filter_map(|row| Some((row.errors?, paper_errors(rows, &row.bottle)?)))
-            .collect();
-        let share = |part: std::ops::Range<usize>| {
-            let sum = |errors: &[f64]| errors[part.clone()].iter().sum::<f64>();
-            let own: f64 = pairs.iter().map(|(own, _)| sum(own)).sum();
-            own / pairs.iter().map(|(_, paper)| sum(paper)).sum::<f64>()
-        };
-        let mut flow: Vec<f64> = own.iter().flat_map(|row| row.flow_errors.clone()).collect();
-        flow.sort_by(f64::total_cmp);
-        let inside: usize = match method.measures_displacement() {
-            true => own.iter().map(|row| row.inside).sum(),
-            false => 0,
-        };
+        let flow = sorted_flow_errors(&own);
         let good = flow.iter().filter(|error| **error <= GOOD_FLOW_PX).count();
         Self {
             method,
             bottles: own.len(),
             failed: own.iter().filter(|row| row.errors.is_none()).count(),
             error: errors.iter().sum::<f64>() / errors.len() as f64,
-            shares: [share(0..5), share(4..5), share(0..4)],
-            known: flow.len() as f64 / inside as f64,
+            shares: shares_of_paper(&own, rows),
+            known: flow.len() as f64 / measured_pixels(&own, method) as f64,
             good_flow: good as f64 / flow.len() as f64,
             median_flow_px: flow.get(flow.len() / 2).copied().unwrap_or(f64::NAN),
         }
     }
+}
+
+fn sorted_flow_errors(own: &[&DisplayRow]) -> Vec<f64> {
+    let mut errors: Vec<f64> = own.iter().flat_map(|row| row.flow_errors.clone()).collect();
+    errors.sort_by(f64::total_cmp);
+    errors
+}
+
+/// Pixels inside whose displacement the method might have found.
+fn measured_pixels(own: &[&DisplayRow], method: DisplayMethod) -> usize {
+    match method.measures_displacement() {
+        true => own.iter().map(|row| row.inside).sum(),
+        false => 0,
+    }
+}
+
+/// Errors over all backgrounds, the plain one, and those with a pattern, as shares of the paper's on
+/// the same bottles.
+fn shares_of_paper(own: &[&DisplayRow], rows: &[DisplayRow]) -> [f64; 3] {
+    let both = |row: &&DisplayRow| Some((row.errors?, paper_errors(rows, &row.bottle)?));
+    let pairs: Vec<_> = own.iter().filter_map(both).collect();
+    [0..5, 4..5, 0..4].map(|part| {
+        let sum = |errors: &[f64]| errors[part.clone()].iter().sum::<f64>();
+        let own: f64 = pairs.iter().map(|(own, _)| sum(own)).sum();
+        own / pairs.iter().map(|(_, paper)| sum(paper)).sum::<f64>()
+    })
 }
 
 fn paper_errors(rows: &[DisplayRow], bottle: &str) -> Option<[f64; BACKGROUNDS.len()]> {

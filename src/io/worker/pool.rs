@@ -195,6 +195,8 @@ impl Worker {
     /// A process that has sent nothing yet.
     fn launch(program: &Path, limits: &Limits) -> std::io::Result<Self> {
         let (to, stdin) = UnixStream::pair()?;
+        #[cfg(target_vendor = "apple")]
+        rustix::net::sockopt::set_socket_nosigpipe(&to, true)?;
         let mut child = spawn_program(program, limits, stdin.into())?;
         let stdout = child.stdout.take();
         let stdout = stdout.ok_or_else(|| std::io::Error::other("no pipe from it"))?;

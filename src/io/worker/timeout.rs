@@ -8,7 +8,7 @@ use std::io::{Error, ErrorKind, Read, Result, Write};
 use std::os::fd::{AsFd, OwnedFd};
 use std::time::Instant;
 
-/// No SIGPIPE where nobody reads any more; Apple's systems have no such flag.
+/// No SIGPIPE where nobody reads any more; on Apple's systems the socket has that option.
 #[cfg(not(target_vendor = "apple"))]
 const SEND_FLAGS: SendFlags = SendFlags::NOSIGNAL;
 #[cfg(target_vendor = "apple")]

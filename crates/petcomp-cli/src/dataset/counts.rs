@@ -71,7 +71,7 @@ fn obstructed_labels(policy: Obstructed) -> &'static str {
 /// Objects that were left out, where there are any, and what became of their labels.
 fn left_out(counts: &DatasetCounts) -> String {
     let labels = match counts.policy {
-        Obstructed::Ignore => TO_BE_IGNORED,
+        Obstructed::Ignore => "to be ignored, or without a label",
         Obstructed::Drop | Obstructed::Keep | Obstructed::Class => WITHOUT_LABEL,
     };
     match counts.left_out() {
