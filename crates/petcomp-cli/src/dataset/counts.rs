@@ -95,11 +95,13 @@ mod tests {
 
     #[test]
     fn the_line_of_objects_adds_up() {
-        for (policy, labels) in [
-            (Obstructed::Drop, "(without a label)"),
+        let to_be_ignored = "(to be ignored, in YOLO without a label)";
+        for (policy, obstructed, left_out) in [
+            (Obstructed::Drop, "(without a label)", "(without a label)"),
             (
                 Obstructed::Ignore,
-                "(to be ignored, in YOLO without a label)",
+                to_be_ignored,
+                "(to be ignored, or without a label)",
             ),
         ] {
             let counts = DatasetCounts {
@@ -110,7 +112,7 @@ mod tests {
                 ..DatasetCounts::default()
             };
             let expected = format!(
-                "objects      10, 5 labelled, 3 obstructed {labels}, 2 cut off too much or not seen {labels}"
+                "objects      10, 5 labelled, 3 obstructed {obstructed}, 2 cut off too much or not seen {left_out}"
             );
             assert_eq!(objects_line(&counts), expected);
         }
