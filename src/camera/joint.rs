@@ -647,13 +647,20 @@ mod tests {
         );
     }
 
-    #[test]
-    fn photos_that_contradict_their_exif_value_are_solved_without_it() {
+    /// Six photos whose EXIF data state one and a half times their focal length, which is the second
+    /// value.
+    fn labels_with_wrong_exif() -> (Vec<Label>, f64) {
         let (mut labels, focal) = labels(1, 6, [10.0, 30.0]);
         let equivalent = 1.5 * focal / 5000.0 * 36f64.hypot(24.0);
         labels
             .iter_mut()
             .for_each(|l| l.camera.focal_35mm = Some(equivalent));
+        (labels, focal)
+    }
+
+    #[test]
+    fn photos_that_contradict_their_exif_value_are_solved_without_it() {
+        let (labels, focal) = labels_with_wrong_exif();
         let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
         assert!(joint.outliers.is_empty(), "{:?}", joint.outliers);
         for solution in joint.photos.iter().flatten() {
@@ -677,11 +684,7 @@ mod tests {
 
     #[test]
     fn a_warning_about_photos_of_several_sizes_is_in_the_pixels_of_each() {
-        let (mut labels, focal) = labels(1, 6, [10.0, 30.0]);
-        let equivalent = 1.5 * focal / 5000.0 * 36f64.hypot(24.0);
-        labels
-            .iter_mut()
-            .for_each(|l| l.camera.focal_35mm = Some(equivalent));
+        let (mut labels, focal) = labels_with_wrong_exif();
         labels[3..].iter_mut().for_each(reduce);
         let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
         let shares = [1.5, 1.5, 1.5, 0.375, 0.375, 0.375];

@@ -8,48 +8,41 @@ use crate::error::Result;
 use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb};
 
-/// Share of the display that may be clipped: glints.
-const MAX_CLIPPED: f64 = 0.001;
-/// From here on nothing can be measured.
-const REFUSED_CLIPPED: f64 = 0.05;
+/// How much of an area may be clipped in photos of the white frame.
+struct ClippingLimits {
+    /// Share of it that glints may clip.
+    max: f64,
+    /// Share from which on it is refused.
+    refused: f64,
+    /// What is clipped.
+    what: &'static str,
+    advice: &'static str,
+}
+
+/// Of the display: from the refused share on nothing can be measured.
+const DISPLAY_CLIPPING: ClippingLimits = ClippingLimits {
+    max: 0.001,
+    refused: 0.05,
+    what: "of the white frame is clipped",
+    advice: "; use a shorter exposure or a darker display",
+};
+
+/// Of an object, under whose glints passes what passes around them: from the refused share on most
+/// of it would be a guess.
+const OBJECT_CLIPPING: ClippingLimits = ClippingLimits {
+    max: 0.03,
+    refused: 0.5,
+    what: "of the object is clipped in the white frame",
+    advice: ": its transmittance there can only be that of what lies around it; use a shorter exposure, or darken the room",
+};
 
 /// The warnings about photos of the white frame, each with where it is clipped.
 ///
 /// # Errors
 /// [`Error::Photo`](crate::Error::Photo) where much of one is clipped.
 pub(super) fn clipping(photos: &[(String, Mask)], free: &Mask) -> Result<Vec<Diagnostic>> {
-    let warnings = photos
-        .iter()
-        .map(|(name, clipped)| clipping_of(name, clipped, free));
-    warnings.filter_map(Result::transpose).collect()
+    DISPLAY_CLIPPING.warnings(photos, free)
 }
-
-fn clipping_of(photo: &str, clipped: &Mask, free: &Mask) -> Result<Option<Diagnostic>> {
-    let share = share_within(clipped, free);
-    if share <= MAX_CLIPPED {
-        return Ok(None);
-    }
-    let what = format!(
-        "{photo}: {:.1} % of the white frame is clipped, expected at most {:.1} %; use a shorter exposure or a darker display",
-        100.0 * share,
-        100.0 * MAX_CLIPPED
-    );
-    if share > REFUSED_CLIPPED {
-        return Err(refused(&what));
-    }
-    Ok(Some(Diagnostic::warning(Code::ClippedWhite, what)))
-}
-
-/// Share of an area that a mask is set in.
-fn share_within(mask: &Mask, area: &Mask) -> f64 {
-    let within = mask.zip_map(area, |set, inside| set && inside);
-    within.count() as f64 / area.count().max(1) as f64
-}
-
-/// Share of the object that may be clipped: glints, under which passes what passes around them.
-const MAX_CLIPPED_OBJECT: f64 = 0.03;
-/// From here on most of the object would be a guess.
-const REFUSED_CLIPPED_OBJECT: f64 = 0.5;
 
 /// The warnings about an object that clips where the display does not: in photos of the white
 /// frame, each with where it is clipped.
@@ -60,28 +53,43 @@ pub(super) fn clipped_object(
     photos: &[(String, Mask)],
     coverage: &Image<Coverage>,
 ) -> Result<Vec<Diagnostic>> {
-    let object = coverage.map(|c| c.0 > 0.5);
-    let warnings = photos
-        .iter()
-        .map(|(name, clipped)| clipping_of_object(name, clipped, &object));
-    warnings.filter_map(Result::transpose).collect()
+    OBJECT_CLIPPING.warnings(photos, &coverage.map(|c| c.0 > 0.5))
 }
 
-fn clipping_of_object(photo: &str, clipped: &Mask, object: &Mask) -> Result<Option<Diagnostic>> {
-    let share = share_within(clipped, object);
-    if share <= MAX_CLIPPED_OBJECT {
-        return Ok(None);
+impl ClippingLimits {
+    fn warnings(&self, photos: &[(String, Mask)], area: &Mask) -> Result<Vec<Diagnostic>> {
+        let warnings = photos
+            .iter()
+            .map(|(name, clipped)| self.warning(name, share_within(clipped, area)));
+        warnings.filter_map(Result::transpose).collect()
     }
-    let what = format!(
-        "{photo}: {:.1} % of the object is clipped in the white frame, expected at most {:.0} %: \
-         its transmittance there can only be that of what lies around it; use a shorter exposure, or darken the room",
-        100.0 * share,
-        100.0 * MAX_CLIPPED_OBJECT
-    );
-    if share > REFUSED_CLIPPED_OBJECT {
-        return Err(refused(&what));
+
+    fn warning(&self, photo: &str, share: f64) -> Result<Option<Diagnostic>> {
+        let Self {
+            max,
+            refused: too_much,
+            what,
+            advice,
+        } = self;
+        if share <= *max {
+            return Ok(None);
+        }
+        let what = format!(
+            "{photo}: {:.1} % {what}, expected at most {} %{advice}",
+            100.0 * share,
+            100.0 * max
+        );
+        if share > *too_much {
+            return Err(refused(&what));
+        }
+        Ok(Some(Diagnostic::warning(Code::ClippedWhite, what)))
     }
-    Ok(Some(Diagnostic::warning(Code::ClippedWhite, what)))
+}
+
+/// Share of an area that a mask is set in.
+fn share_within(mask: &Mask, area: &Mask) -> f64 {
+    let within = mask.zip_map(area, |set, inside| set && inside);
+    within.count() as f64 / area.count().max(1) as f64
 }
 
 /// Side of the blocks whose means show bands, pixels.

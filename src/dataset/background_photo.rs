@@ -132,18 +132,20 @@ impl BackgroundPhoto {
         folder: &Path,
         size: Option<[f64; 2]>,
     ) -> Result<Vec<PathBuf>> {
-        let labels = camera::labels_beside(name, folder, size)?;
+        let (labels, others) = match camera::labels_in(folder, size) {
+            Ok(labels) => (labels, Vec::new()),
+            // Nobody knows which of the photos a label that cannot be used is of.
+            Err(_) => (
+                camera::labels_beside(name, folder, size)?,
+                photos_and_labels(folder).collect(),
+            ),
+        };
         let files = labels.iter().flat_map(|labelled| {
             let photo = labelled.photo();
             let front = photo.as_deref().and_then(front_beside);
             let own = [labelled.source.clone(), labelled.beside("camera.json")];
             own.into_iter().chain(photo).chain(front)
         });
-        // Nobody knows which of them a label that cannot be used is of.
-        let others = match camera::labels_in(folder, size) {
-            Ok(_) => Vec::new(),
-            Err(_) => photos_and_labels(folder).collect(),
-        };
         Ok(files.chain(others).collect())
     }
 
