@@ -127,6 +127,12 @@ impl std::fmt::Display for Bounds {
     }
 }
 
+/// A number above a limit, with one decimal: it is not told as the limit itself.
+pub(crate) fn above(value: impl Into<f64>, limit: impl Into<f64>) -> String {
+    let [value, limit]: [f64; 2] = [value.into(), limit.into()];
+    format!("{:.1}", value.max(limit + 0.1))
+}
+
 /// A number without hundreds of zeros.
 pub(crate) fn number(value: f64) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-4..1e7).contains(&value.abs());
@@ -160,6 +166,13 @@ mod tests {
             checked(Bounds::new(1e-5, 1e9, ""), 1e-300),
             "x: 1e-300, expected 1e-5 to 1e9"
         );
+    }
+
+    #[test]
+    fn a_number_above_a_limit_is_not_told_as_that() {
+        let told = [20.001, 20.14, 20.4].map(|value| above(value, 20.0));
+        assert_eq!(told, ["20.1", "20.1", "20.4"]);
+        assert_eq!(above(5.501_f32, 5.5_f32), "5.6");
     }
 
     #[test]

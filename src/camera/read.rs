@@ -238,9 +238,7 @@ fn push_new(found: &mut Vec<LabelledPhoto>, labelled: LabelledPhoto) -> Result<(
 
 /// The files of a folder that may hold labels, in order of name.
 fn label_paths(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
-    let entries = entries.map_err(|e| Error::file(folder, e))?;
-    let mut paths: Vec<PathBuf> = entries
+    let mut paths: Vec<PathBuf> = io::entries(folder)?
         .iter()
         .map(|entry| entry.path())
         .filter(|path| may_be_label(path))

@@ -2,11 +2,15 @@
 
 use super::recognise::refused;
 use super::solve::BlackAndWhite;
+use super::stack::DIFFERENCE_BLUR_PX;
 use super::view::{grey, where_set};
+use crate::bounds::above;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
+use crate::filter;
 use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb};
+use crate::quantile::median;
 
 /// How much of an area may be clipped in photos of the white frame.
 struct ClippingLimits {
@@ -75,8 +79,8 @@ impl ClippingLimits {
             return Ok(None);
         }
         let what = format!(
-            "{photo}: {:.1} % {what}, expected at most {} %{advice}",
-            100.0 * share,
+            "{photo}: {} % {what}, expected at most {} %{advice}",
+            above(100.0 * share, 100.0 * max),
             100.0 * max
         );
         if share > *too_much {
@@ -110,10 +114,10 @@ pub(super) fn bands(frames: &BlackAndWhite<'_>, free: &Mask) -> Result<Option<Di
         return Ok(None);
     }
     let what = format!(
-        "around the object the white frame is uneven by {:.1} %, expected at most {:.1} %: bands of a flickering display, \
+        "around the object the white frame is uneven by {} %, expected at most {:.1} %: bands of a flickering display, \
          reflections, shadows, or moire (focus on the object, not on the display; another distance); \
          expose for 1/30 s or longer at full brightness of the display, and darken the room",
-        100.0 * deviation,
+        above(100.0 * deviation, 100.0 * MAX_BANDS),
         100.0 * MAX_BANDS
     );
     if deviation > REFUSED_BANDS {
@@ -154,9 +158,9 @@ pub(super) fn color_change(empty_white: &Image<LinearRgb>, free: &Mask) -> Optio
     let change = changes[0].max(changes[1]);
     (change > MAX_COLOR_CHANGE).then(|| {
         let what = format!(
-            "white changes its colour across the display by {:.1} %, expected at most {:.0} %; \
+            "white changes its colour across the display by {} %, expected at most {:.0} %; \
              photograph from straight above and from farther away",
-            100.0 * change,
+            above(100.0 * change, 100.0 * MAX_COLOR_CHANGE),
             100.0 * MAX_COLOR_CHANGE
         );
         Diagnostic::warning(Code::ColorByAngle, what)
@@ -190,6 +194,58 @@ pub(super) fn exchange(frames: &BlackAndWhite<'_>, coverage: &Image<Coverage>) -
     ))
 }
 
+/// A black photo that differs from the empty display by less than this share of white shows noise.
+const MIN_DIFFERENCE: f32 = 0.001;
+/// A photo whose difference inside an object is less than this many times that around it shows
+/// nothing of it: lamps and shadows change how bright an object is, not whether it is seen.
+const UNSEEN: f32 = 2.0;
+/// From here on it surely shows it.
+const SEEN: f32 = 6.0;
+
+/// # Errors
+/// [`Error::Photo`](crate::Error::Photo) where most photos of the black frame, each with its grey
+/// light, surely show the object, and one of them nothing of it.
+pub(super) fn black_without_object(
+    photos: &[(String, Image<f32>)],
+    frames: &BlackAndWhite<'_>,
+    coverage: &Image<Coverage>,
+    free: &Mask,
+) -> Result<()> {
+    let object = coverage.map(|c| c.0 > 0.5);
+    let all = photos
+        .iter()
+        .map(|(_, black)| visibility(black, frames, &object, free));
+    let all: Vec<f32> = all.collect();
+    let middle = median(all.iter().copied(), f32::total_cmp).unwrap_or_default();
+    let unseen = all.iter().position(|seen| *seen < UNSEEN);
+    match unseen.filter(|_| middle >= SEEN) {
+        None => Ok(()),
+        Some(i) => Err(refused(&format!(
+            "{}: shows the black frame without the object, which other photos of it show; \
+             photos without the object belong to empty (--empty)",
+            photos[i].0
+        ))),
+    }
+}
+
+/// How much a black photo differs from the empty display inside an object, in units of what it does
+/// around it.
+fn visibility(black: &Image<f32>, frames: &BlackAndWhite<'_>, object: &Mask, free: &Mask) -> f32 {
+    let off = black.zip_map(frames.empty_black, |p, e| p - grey(e));
+    let off = filter::gaussian_blur(&off, DIFFERENCE_BLUR_PX).map(f32::abs);
+    let typical = |image: &Image<f32>| median(where_set(image, free), f32::total_cmp);
+    let white = typical(&frames.light().map(grey)).unwrap_or_default();
+    let around = typical(&off)
+        .unwrap_or_default()
+        .max(MIN_DIFFERENCE * white);
+    mean_where(&off, object) / around.max(f32::MIN_POSITIVE)
+}
+
+fn mean_where(image: &Image<f32>, mask: &Mask) -> f32 {
+    let sum: f64 = where_set(image, mask).map(f64::from).sum();
+    (sum / mask.count().max(1) as f64) as f32
+}
+
 /// What is seen more of white than of black.
 fn passed(frames: &BlackAndWhite<'_>) -> Image<f32> {
     frames.white.zip_map(frames.black, |w, k| grey(w) - grey(k))
@@ -202,8 +258,9 @@ const MAX_MOTION_PX: f64 = 2.0;
 pub(super) fn camera_motion(motion_px: f64) -> Option<Diagnostic> {
     (motion_px > MAX_MOTION_PX).then(|| {
         let what = format!(
-            "the camera moved by up to {motion_px:.1} px between photos, expected at most {MAX_MOTION_PX}: \
-             the display is aligned, what rises above it is not; put the camera on a stand"
+            "the camera moved by up to {} px between photos, expected at most {MAX_MOTION_PX}: \
+             the display is aligned, what rises above it is not; put the camera on a stand",
+            above(motion_px, MAX_MOTION_PX)
         );
         Diagnostic::warning(Code::CameraMoved, what)
     })
@@ -223,9 +280,9 @@ pub(super) fn object_motion(
     let change = change_of_stripes(frames, stripes, coverage, free);
     (change > MAX_CHANGE).then(|| {
         let what = format!(
-            "inside the object the stripes are on average {:.1} % of white off black and white, expected at most {:.1} %: \
+            "inside the object the stripes are on average {} % of white off black and white, expected at most {:.1} %: \
              did it move, or did the room's light change?",
-            100.0 * change,
+            above(100.0 * change, 100.0 * MAX_CHANGE),
             100.0 * MAX_CHANGE
         );
         Diagnostic::warning(Code::ObjectMoved, what)

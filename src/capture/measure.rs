@@ -50,7 +50,8 @@ const RIM_SOFTNESS_PX: f32 = 0.6;
 /// # Errors
 /// Those of reading photos; [`Error::Photo`](crate::Error::Photo) where the black or the white
 /// frame is missing, photos of a frame show different things, white is clipped or uneven, no object
-/// or more than one lies within the display, or photos with it and without are exchanged.
+/// or more than one lies within the display, one of several black photos lacks it, or photos with
+/// it and without are exchanged.
 pub fn measure(
     display: &Display,
     view: &View,
@@ -137,6 +138,8 @@ impl<'a> CaptureScene<'a> {
 
     fn solve(self, mut diagnostics: Vec<Diagnostic>) -> Result<Measured> {
         let frames = self.frames();
+        let each_black = &self.stack.each_black;
+        check::black_without_object(each_black, &frames, &self.object.coverage, &self.free)?;
         let clipped = &self.stack.clipped_white;
         diagnostics.extend(check::clipping(clipped, &self.free)?);
         diagnostics.extend(check::clipped_object(clipped, &self.object.coverage)?);

@@ -2,6 +2,7 @@
 
 use super::recognise::refused;
 use super::view::{grey, where_set};
+use crate::bounds::above;
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::{Image, Mask};
@@ -130,8 +131,9 @@ fn nothing_found(threshold: f32) -> Error {
     let [typical, most] = [threshold, MIN_EVIDENCE].map(|t| 100.0 * t / EVIDENCE_MEDIANS);
     refused(&format!(
         "nothing lies on the display, or nothing that stands out: \
-         the display is uneven or changes its colour, typically by {typical:.1} % of white, or the photos are noisy \
-         (expected: at most {most:.1} %); photograph it empty, too, from the same place and in the same light (--empty)"
+         the display is uneven or changes its colour, typically by {} % of white, or the photos are noisy \
+         (expected: at most {most:.1} %); photograph it empty, too, from the same place and in the same light (--empty)",
+        above(typical, most)
     ))
 }
 

@@ -6,6 +6,7 @@ use super::frame::{Frame, SHIFTS, Stripes};
 use super::object::MIN_AREA;
 use super::recognise::{FramePhoto, map_in_front, refused};
 use super::view::{View, clipped, grey};
+use crate::bounds::above;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
@@ -56,6 +57,8 @@ pub struct Photos<'a> {
 pub(super) struct Stack {
     pub(super) black: Image<LinearRgb>,
     pub(super) white: Image<LinearRgb>,
+    /// Grey light of each photo of black, after its name.
+    pub(super) each_black: Vec<(String, Image<f32>)>,
     /// Where each photo of white is clipped, after its name.
     pub(super) clipped_white: Vec<(String, Mask)>,
     /// Nothing where photos of some are missing.
@@ -96,7 +99,7 @@ const MAX_DRIFT: f32 = 0.2;
 /// Photos of one frame that differ by more of its white show different things.
 const MAX_DIFFERENCE: f32 = 0.1;
 /// Blur of that difference, pixels: against noise, and edges that are aligned to a part of a pixel.
-const DIFFERENCE_BLUR_PX: f32 = 3.0;
+pub(super) const DIFFERENCE_BLUR_PX: f32 = 3.0;
 
 /// How photos are brought to the view.
 pub(super) struct Alignment<'a> {
@@ -158,6 +161,7 @@ impl<'a> Alignment<'a> {
         let name = |i: usize| photos.sources.names[i].clone();
         let (first_seen, mask) = self.aligned(photos, first)?;
         let mut clipped = vec![(name(first), mask)];
+        let mut each = vec![(name(first), first_seen.map(grey))];
         let mut sum = first_seen.clone();
         for &other in others {
             let (seen, mask) = self.aligned(photos, other)?;
@@ -165,11 +169,13 @@ impl<'a> Alignment<'a> {
                 return Err(differing([first, other].map(|i| &*photos.sources.names[i])));
             }
             clipped.push((name(other), mask));
+            each.push((name(other), seen.map(grey)));
             sum = sum.zip_map(&seen, |a, b| a + b);
         }
         let share = 1.0 / numbers.len() as f32;
         Ok(Some(SeenFrame {
             light: sum.map(|p| p.scale(share)),
+            each,
             clipped,
         }))
     }
@@ -196,6 +202,7 @@ impl<'a> Alignment<'a> {
         Ok(Stack {
             black: black.light,
             white: white.light,
+            each_black: black.each,
             clipped_white: white.clipped,
             stripes: self.stripes(photos)?,
         })
@@ -229,6 +236,8 @@ impl<'a> Alignment<'a> {
 struct SeenFrame {
     /// Their mean.
     light: Image<LinearRgb>,
+    /// Grey light of each of them, by its name.
+    each: Vec<(String, Image<f32>)>,
     /// Where each of them is clipped, by its name.
     clipped: Vec<(String, Mask)>,
 }
@@ -301,9 +310,9 @@ fn differing([a, b]: [&str; 2]) -> Error {
 
 fn drift_warning(photo: &str, drift: f32) -> Diagnostic {
     let what = format!(
-        "{photo}: its exposure or colour is {:.1} % off that of the white frame, expected at most {:.0} %; \
+        "{photo}: its exposure or colour is {} % off that of the white frame, expected at most {:.0} %; \
          lock exposure and white balance, and switch the display's automatic brightness off",
-        100.0 * drift,
+        above(100.0 * drift, 100.0 * MAX_DRIFT),
         100.0 * MAX_DRIFT
     );
     Diagnostic::warning(Code::ExposureDrift, what)
@@ -315,10 +324,10 @@ mod tests {
 
     #[test]
     fn a_drift_above_the_limit_is_told_as_one() {
-        let told = drift_warning("a.jpg", 0.204).message;
-        assert!(
-            told.contains("is 20.4 % off that of the white frame, expected at most 20 %"),
-            "{told}"
-        );
+        for (drift, off) in [(0.204, "20.4"), (0.2001, "20.1")] {
+            let told = drift_warning("a.jpg", drift).message;
+            let expected = format!("is {off} % off that of the white frame, expected at most 20 %");
+            assert!(told.contains(&expected), "{told}");
+        }
     }
 }

@@ -467,6 +467,52 @@ fn photos_of_a_frame_with_the_object_and_without_are_refused() {
     assert!(with(shots(&frames(false), again)).is_ok());
 }
 
+#[test]
+fn a_black_photo_without_the_object_is_named_where_others_show_it() {
+    let [black, white] = [Frame::Black, Frame::White].map(|frame| photo(frame, STILL));
+    let bare = photo(Frame::Black, BARE);
+    // Photos of a frame may differ by more than this object reflects.
+    let dim = black.zip_map(&bare, |p, e| p.scale(0.5).add_scaled(0.5, e));
+    let with = |other: Image<LinearRgb>| {
+        let measured = measured_of(&[dim.clone(), other, white.clone()], &[]);
+        measured.map(drop).map_err(|e| e.to_string())
+    };
+    let error = with(bare).unwrap_err();
+    assert!(
+        error.contains("photo 1: shows the black frame without the object"),
+        "{error}"
+    );
+    let lamp = lit(&dim, 0.02, 1.0);
+    assert_eq!([dim.clone(), lamp].map(with), [Ok(()), Ok(())]);
+}
+
+/// A photo of an object with a glint in its middle that clips.
+fn glinting(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
+    let map = display_from_photo([0.0; 2]);
+    let bright = Image::from_fn(PHOTO.0, PHOTO.1, |x, y| {
+        let at = map.map(Point2::new(x as f64 + 0.5, y as f64 + 0.5));
+        let [a, b] = across([at.x, at.y]);
+        let light = if a * a + b * b < 0.002 { 0.8 } else { 0.0 };
+        photo[(x, y)].map(|v| v + light)
+    });
+    limited(&bright)
+}
+
+#[test]
+fn what_clips_in_one_of_several_white_photos_has_no_part_in_the_film() {
+    let [black, white] = [Frame::Black, Frame::White].map(|frame| photo(frame, STILL));
+    let photos = [black, white.clone(), glinting(&white)];
+    let (view, measured) = measured_of(&photos, &[]).unwrap();
+    let mut places = inner_places(&view);
+    places.retain(|(_, at)| across(*at).iter().map(|v| v * v).sum::<f64>() < 0.0005);
+    let off = places
+        .iter()
+        .map(|(pixel, at)| measured.film[*pixel].transmittance().b - transmittance(*at).b);
+    let off = off.sum::<f32>() / places.len() as f32;
+    // The mean of both photos would pass all light here, 0.28 more.
+    assert!(off.abs() < 0.1, "{off}");
+}
+
 /// A photo whose camera says that it was held a quarter turn otherwise.
 fn turned(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
     let (w, h) = photo.size();

@@ -7,7 +7,7 @@ use crate::io;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 use std::ffi::OsStr;
-use std::fs::{File, TryLockError};
+use std::fs::{DirEntry, File, TryLockError};
 use std::path::{Path, PathBuf};
 
 /// Name of the file that says what a dataset was made from.
@@ -206,8 +206,8 @@ fn holds_something(folder: &Path) -> Result<bool> {
     if !folder.exists() {
         return Ok(false);
     }
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    let mut names = entries.flatten().map(|entry| entry.file_name());
+    let entries = io::entries(folder)?;
+    let mut names = entries.iter().map(DirEntry::file_name);
     Ok(names.any(|name| !name.to_string_lossy().starts_with('.')))
 }
 
@@ -226,8 +226,7 @@ fn lock(folder: &Path) -> Result<File> {
 
 /// Deletes what a killed run left half-written.
 fn sweep(folder: &Path) -> Result<()> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    for entry in entries.flatten() {
+    for entry in io::entries(folder)? {
         match entry.file_type() {
             Ok(kind) if kind.is_dir() => sweep(&entry.path())?,
             Ok(kind) if kind.is_file() && is_half_written(&entry.file_name()) => {

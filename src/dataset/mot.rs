@@ -164,8 +164,8 @@ impl Mot {
 
 /// Takes the tracks of a part's sequences away; their pictures stay, and what others put there.
 fn remove_tracks(folder: &Path) -> Result<()> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    let mut sequences = entries.flatten().filter(|entry| {
+    let entries = io::entries(folder)?;
+    let mut sequences = entries.iter().filter(|entry| {
         let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
         is_folder && is_number(&entry.file_name())
     });

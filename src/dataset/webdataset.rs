@@ -175,8 +175,7 @@ fn header_of(file: &File) -> std::io::Result<tar::Header> {
 /// Removes the archives of a dataset that had other samples before.
 fn remove_archives_but(kept: &BTreeSet<PathBuf>, folder: &Path, part: Part) -> Result<()> {
     let folder = folder.join(KIND);
-    let entries = std::fs::read_dir(&folder).map_err(|e| Error::file(&folder, e))?;
-    for entry in entries.flatten() {
+    for entry in io::entries(&folder)? {
         let path = entry.path();
         if is_archive(&entry.file_name().to_string_lossy(), part) && !kept.contains(&path) {
             std::fs::remove_file(&path).map_err(|e| Error::file(&path, e))?;

@@ -119,8 +119,8 @@ pub use document::{read_document, write_document};
 pub use format::Format;
 #[doc(hidden)]
 pub use fs::{
-    Checksum, absolute, below, check_distinct, check_folder_of, copy, create_folder, inside,
-    path_text, relative, relative_on_disk,
+    Checksum, absolute, below, check_distinct, check_folder_of, copy, create_folder, entries,
+    inside, path_text, relative, relative_on_disk,
 };
 pub(crate) use fs::{
     Syncing, absolute_folder, files_below, is_apple_double, length_inside, natural_key, open_own,

@@ -62,6 +62,7 @@ use crate::pixel::ObjectId;
 use crate::scene::{Card, Shot};
 use geo::MultiPolygon;
 use serde::{Deserialize, Serialize};
+use std::cell::LazyCell;
 use visibility::ObjectVisibility;
 
 /// How far the outline that is written may be from the border of a mask, pixels: the stairs of a
@@ -329,15 +330,10 @@ fn check_size(deep: &DeepImage, [width, height]: [u32; 2]) {
     );
 }
 
-fn with_rings(region: MultiPolygon<f64>) -> (MultiPolygon<f64>, Vec<Vec<Point2<f64>>>) {
-    let rings = outline::rings(&region);
-    (region, rings)
-}
-
 /// What a mask covers, to the pixel, and its border with fewer corners.
 fn mask_outline(mask: &RleMask) -> (MultiPolygon<f64>, Vec<Vec<Point2<f64>>>) {
-    let region = outline::inside(&trace::polygons(mask, 0.0));
-    (region, trace::polygons(mask, MASK_OUTLINE_TOLERANCE_PX))
+    let [exact, simplified] = trace::exact_and_simplified(mask, MASK_OUTLINE_TOLERANCE_PX);
+    (outline::inside(&exact), simplified)
 }
 
 /// All cards of a shot as its camera sees them, in order of id.
@@ -368,12 +364,13 @@ impl<'a> Silhouette<'a> {
         visibility: ObjectVisibility,
         options: &LabelOptions,
     ) -> Self {
-        let hull = outline::region(card, &shot.camera, &shot.distortion());
+        // Where the mask's border is the outline, truncation alone asks for it.
+        let hull = LazyCell::new(|| outline::region(card, &shot.camera, &shot.distortion()));
         let truncation = options
             .max_truncation
             .map(|max| Truncation::new(card, shot, &hull, max));
         let (region, outline_px) = match options.outline {
-            OutlineKind::Hull => with_rings(hull),
+            OutlineKind::Hull => (hull.clone(), outline::rings(&hull)),
             OutlineKind::Mask => mask_outline(&visibility.amodal),
         };
         Self {

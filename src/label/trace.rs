@@ -23,26 +23,36 @@ const STEPS: [[i64; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
 /// `tolerance_px` from the polygons, and no side crosses another. 0 keeps all corners; parts and
 /// holes are kept at any tolerance.
 pub fn polygons(mask: &RleMask, tolerance_px: f64) -> Vec<Vec<Point2<f64>>> {
-    joined_parts(mask, tolerance_px)
-        .into_iter()
-        .map(points)
-        .collect()
+    as_polygons(simplified(Grid::new(mask).rings(), tolerance_px))
+}
+
+/// [`polygons`] with all corners, and with those of a tolerance: the mask is traced once for both.
+pub(super) fn exact_and_simplified(
+    mask: &RleMask,
+    tolerance_px: f64,
+) -> [Vec<Vec<Point2<f64>>>; 2] {
+    let rings = Grid::new(mask).rings();
+    [rings.clone(), simplified(rings, tolerance_px)].map(as_polygons)
 }
 
 /// The whole mask as one closed polygon, parts and holes joined by slits, simplified as
 /// [`polygons`] are; without points for an empty mask.
 pub fn polygon(mask: &RleMask, tolerance_px: f64) -> Vec<Point2<f64>> {
-    let mut parts = joined_parts(mask, tolerance_px).into_iter();
+    let rings = simplified(Grid::new(mask).rings(), tolerance_px);
+    let mut parts = joined_parts(rings).into_iter();
     let first = parts.next().unwrap_or_default();
     points(parts.fold(first, join_part))
+}
+
+fn as_polygons(rings: Vec<Ring>) -> Vec<Vec<Point2<f64>>> {
+    joined_parts(rings).into_iter().map(points).collect()
 }
 
 fn points(ring: Ring) -> Vec<Point2<f64>> {
     ring.into_iter().map(Point2::from).collect()
 }
 
-fn joined_parts(mask: &RleMask, tolerance_px: f64) -> Vec<Ring> {
-    let rings = simplified(Grid::new(mask).rings(), tolerance_px);
+fn joined_parts(rings: Vec<Ring>) -> Vec<Ring> {
     let (mut parts, mut holes): (Vec<_>, Vec<_>) =
         rings.into_iter().partition(|r| doubled_area(r) > 0.0);
     // What lies left of a hole is then joined before it.
@@ -355,6 +365,8 @@ mod tests {
             let sum: f64 = fewer.iter().map(doubled_area).sum();
             prop_assert!((2.0 * area(&whole) - sum).abs() < 1e-9, "slits have no area");
             let parts = polygons(&mask, tolerance);
+            let both = [polygons(&mask, 0.0), parts.clone()];
+            prop_assert_eq!(exact_and_simplified(&mask, tolerance), both);
             for (x, y) in (0..12).flat_map(|x| (0..9).map(move |y| (x, y))) {
                 let windings: i32 = parts.iter().map(|ring| winding(ring, x, y)).sum();
                 prop_assert!([0, 1].contains(&windings) && winding(&whole, x, y) == windings);

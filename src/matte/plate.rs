@@ -7,6 +7,7 @@ use super::check::{check_length, check_photo, check_share, check_value, refused}
 use super::prepared::check_finite_photo;
 use super::register;
 use super::screen::{mean_color, screen_pixels, strongest_channel};
+use crate::bounds::above;
 use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask, Roi};
@@ -240,8 +241,8 @@ impl PlateOptions {
     fn check_mismatch(&self, mismatch: f32) -> Result<()> {
         check_photo(mismatch <= self.max_mismatch, || {
             format!(
-                "the empty screen differs from the photo's by {:.0} %, expected at most {:.0} %; did the light change?",
-                100.0 * mismatch,
+                "the empty screen differs from the photo's by {} %, expected at most {:.0} %; did the light change?",
+                above(100.0 * mismatch, 100.0 * self.max_mismatch),
                 100.0 * self.max_mismatch
             )
         })

@@ -14,6 +14,7 @@ use super::film::{ColorUncertainty, covered, view};
 use super::plate::ScreenPlate;
 use super::prepared::check_finite_photo;
 use super::register::{self, Registered};
+use crate::bounds::above;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::filter;
@@ -359,8 +360,9 @@ impl Aligner<'_> {
     fn turned(&self, photo: &Image<LinearRgb>, weights: [f32; 3]) -> Option<String> {
         let apart = self.turned_px(photo, weights)?;
         Some(format!(
-            "the two ends of the object moved {apart:.1} px apart from the first, expected at most \
-             {MAX_END_SHIFT_PX}; did it turn?"
+            "the two ends of the object moved {} px apart from the first, expected at most \
+             {MAX_END_SHIFT_PX}; did it turn?",
+            above(apart, MAX_END_SHIFT_PX)
         ))
     }
 

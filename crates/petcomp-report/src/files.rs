@@ -1,6 +1,7 @@
 //! The files that a report consists of.
 
-use petcomp::{Error, Result, io};
+use petcomp::{Result, io};
+use std::fs::DirEntry;
 use std::path::{Path, PathBuf};
 
 /// Writes texts into a folder, which is made if it is not there.
@@ -17,11 +18,8 @@ pub(crate) fn write_texts<const N: usize>(folder: &Path, files: [(&str, &str); N
 
 /// The files `*.json` of a folder, sorted.
 pub(crate) fn json_files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    let mut paths = Vec::new();
-    for entry in entries {
-        paths.push(entry.map_err(|e| Error::file(folder, e))?.path());
-    }
+    let entries = io::entries(folder)?;
+    let mut paths: Vec<PathBuf> = entries.iter().map(DirEntry::path).collect();
     paths.retain(|path| path.extension().is_some_and(|e| e == "json"));
     paths.sort();
     Ok(paths)

@@ -423,22 +423,46 @@ fn exchange_sides(path: &Path) {
     io::write_json(path, &label).unwrap();
 }
 
-#[test]
-fn a_camera_that_was_forced_stays_beside_its_label() {
-    let dir = photos(&["bg0001"]);
-    let path = dir.path().join("bg0001.label.json");
+/// The camera of a label that none fits, as `petcomp camera solve --force` writes it beside it.
+fn force_camera(folder: &Path, stem: &str) -> CameraFile {
+    let path = folder.join(format!("{stem}.label.json"));
     exchange_sides(&path);
     let label = camera::read_label(&path).unwrap();
     let forced = CameraFile::new(&label, &camera::solve(&label, &Default::default()).unwrap());
     assert!(forced.forced);
-    let camera = dir.path().join("bg0001.camera.json");
-    io::write_json(&camera, &forced).unwrap();
+    io::write_json(folder.join(format!("{stem}.camera.json")), &forced).unwrap();
+    forced
+}
+
+#[test]
+fn a_camera_that_was_forced_stays_beside_its_label() {
+    let dir = photos(&["bg0001"]);
+    let forced = force_camera(dir.path(), "bg0001");
     let studio = Studio::over(dir.path());
     let asked = r#"{ "photos": ["bg0001.jpg"] }"#;
     let solved = body(&studio.post("api/corners/joint", asked));
     assert!(solved[0]["why"].is_string(), "{solved}");
-    let stored: CameraFile = io::read_json(&camera).unwrap();
-    assert_eq!(stored, forced);
+    assert_eq!(saved(dir.path(), "bg0001").1, forced);
+}
+
+#[test]
+fn a_camera_that_was_forced_stays_when_its_label_is_saved_as_it_is_and_no_longer() {
+    let dir = photos(&["bg0001"]);
+    let forced = force_camera(dir.path(), "bg0001");
+    let studio = Studio::over(dir.path());
+    let save = |shift_px: f64| {
+        let mut read = body(&studio.get("api/corners/label?photo=bg0001.jpg"));
+        let x = &mut read["label"]["surface"]["corners_px"][0][0];
+        *x = json!(x.as_f64().unwrap() + shift_px);
+        let (label, version) = (&read["label"], &read["version"]);
+        let asked = json!({ "photo": "bg0001.jpg", "label": label, "version": version });
+        let answer = body(&studio.post("api/corners/save", &asked.to_string()));
+        assert!(answer["why"].is_string(), "{answer}");
+    };
+    save(0.0);
+    assert_eq!(saved(dir.path(), "bg0001").1, forced);
+    save(1.0);
+    assert!(!dir.path().join("bg0001.camera.json").exists());
 }
 
 #[test]

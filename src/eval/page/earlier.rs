@@ -4,6 +4,7 @@
 use super::Metrics;
 use crate::error::{Error, Result};
 use crate::io;
+use std::fs::DirEntry;
 use std::path::Path;
 
 /// The metrics of a single run.
@@ -11,8 +12,7 @@ pub(super) const METRICS: &str = "metrics.json";
 
 /// Removes the metrics of runs but those of these names.
 pub(super) fn remove_metrics(folder: &Path, kept: &[String]) -> Result<()> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    for path in entries.flatten().map(|entry| entry.path()) {
+    for path in io::entries(folder)?.iter().map(DirEntry::path) {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let is_kept = kept.iter().any(|kept| *kept == name);
         if !is_kept && are_metrics(&name, &path) {

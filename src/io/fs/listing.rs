@@ -3,7 +3,24 @@
 use super::natural_order::compare_paths;
 use crate::error::{Error, Result};
 use std::collections::BTreeSet;
+use std::fs::DirEntry;
 use std::path::{Path, PathBuf};
+
+/// What is in a folder, in the order of the disk.
+///
+/// # Errors
+/// A folder that cannot be listed to its end: what is missing would be taken for not there.
+pub fn entries(folder: &Path) -> Result<Vec<DirEntry>> {
+    all_of(folder, std::fs::read_dir(folder))
+}
+
+fn all_of<T>(
+    folder: &Path,
+    listed: std::io::Result<impl Iterator<Item = std::io::Result<T>>>,
+) -> Result<Vec<T>> {
+    let all = listed.and_then(|listed| listed.collect::<std::io::Result<Vec<T>>>());
+    all.map_err(|e| Error::file(folder, e))
+}
 
 /// The files of a kind below a folder, in natural order of path (`2.png` before `10.png`), without
 /// those that macOS puts beside others; each folder once, as links may lead in circles.
@@ -44,8 +61,8 @@ pub(crate) fn is_apple_double(path: &Path) -> bool {
 
 /// What is in a folder, in order of name: of two names of a folder always the same one counts.
 fn folders_and_files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    let entries = entries(folder)?;
+    let mut paths: Vec<PathBuf> = entries.iter().map(DirEntry::path).collect();
     paths.sort();
     Ok(paths.into_iter().partition(|path| path.is_dir()))
 }
@@ -61,6 +78,13 @@ fn check_file_count(count: usize, most: usize, folder: &Path) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_that_cannot_be_listed_to_its_end_is_an_error() {
+        let listed = [Ok(1), Err(std::io::Error::other("a bad block")), Ok(3)];
+        let told = all_of(Path::new("photos"), Ok(listed.into_iter())).unwrap_err();
+        assert_eq!(told.to_string(), "photos: a bad block");
+    }
 
     #[test]
     fn files_of_macos_beside_others_are_passed_over() {

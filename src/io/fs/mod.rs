@@ -14,6 +14,7 @@ mod text_name;
 pub use atomic::{absolute, check_folder_of, create_folder, relative, relative_on_disk};
 pub use checksum::{Checksum, copy};
 pub use distinct::check_distinct;
+pub use listing::entries;
 pub use sanitize_path::{below, inside};
 pub use text_name::path_text;
 

@@ -1,5 +1,6 @@
 //! Names and paths that come out of documents: nothing leads outside of a folder.
 
+use super::listing::entries;
 use super::open::reason;
 use crate::error::{Error, Result};
 use std::fs::{DirEntry, Metadata};
@@ -102,10 +103,9 @@ fn or_working_folder(folder: &Path) -> &Path {
 /// [`Error::File`] naming the link, or a folder that cannot be looked into.
 pub(crate) fn refuse_links(folder: impl AsRef<Path>) -> Result<()> {
     let folder = folder.as_ref();
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    entries
-        .flatten()
-        .try_for_each(|entry| refuse_linked_entry(folder, &entry))
+    entries(folder)?
+        .iter()
+        .try_for_each(|entry| refuse_linked_entry(folder, entry))
 }
 
 fn refuse_linked_entry(folder: &Path, entry: &DirEntry) -> Result<()> {

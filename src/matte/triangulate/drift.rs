@@ -1,6 +1,7 @@
 //! Exposure and white balance that differ between photos, by the light that the object reflects.
 
 use super::lines::PixelFilm;
+use crate::bounds::above;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::image::Image;
 use crate::matte::arrays::channel_pairs;
@@ -69,9 +70,9 @@ fn drifted([drift, most]: [f32; 2], is_dye_inferred: bool) -> Diagnostic {
     Diagnostic::warning(
         Code::MatteExposureDrift,
         format_args!(
-            "the light that the object reflects differs by {:.1} % or more between the photos, expected at most {:.1} %, \
+            "the light that the object reflects differs by {} % or more between the photos, expected at most {:.1} %, \
              and the transmittance is wrong: {cause}, and photograph again",
-            100.0 * drift,
+            above(100.0 * drift, 100.0 * most),
             100.0 * most
         ),
     )

@@ -7,6 +7,7 @@ use petcomp::io;
 use petcomp::{Coverage, Error, Image, LinearRgb, Result, Roi};
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::fs::DirEntry;
 use std::path::{Path, PathBuf};
 
 /// New backgrounds, by the names of their files.
@@ -49,8 +50,8 @@ impl Place {
     /// # Errors
     /// A folder without places, or records that cannot be read.
     pub(super) fn all_in(folder: &Path) -> Result<Vec<Self>> {
-        let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-        let mut folders: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+        let entries = io::entries(folder)?;
+        let mut folders: Vec<PathBuf> = entries.iter().map(DirEntry::path).collect();
         folders.retain(|path| path.join(RECORD).is_file());
         folders.sort();
         if folders.is_empty() {

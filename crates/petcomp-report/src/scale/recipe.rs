@@ -155,9 +155,7 @@ fn cpu_seconds_in(stat: &str) -> Option<f64> {
 /// Of all files below a folder.
 fn file_sizes(folder: &Path) -> Result<Vec<f64>> {
     let mut sizes = Vec::new();
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    for entry in entries {
-        let entry = entry.map_err(|e| Error::file(folder, e))?;
+    for entry in io::entries(folder)? {
         let about = entry.metadata().map_err(|e| Error::file(entry.path(), e))?;
         if about.is_dir() {
             sizes.extend(file_sizes(&entry.path())?);

@@ -1,6 +1,6 @@
 //! Photos of one camera, solved together.
 
-use super::label_file::{labelled, usable};
+use super::label_file::{labelled, remove_anothers, usable};
 use super::photos::beside;
 use crate::folder::Folder;
 use crate::refusal::Answer;
@@ -8,7 +8,6 @@ use petcomp::camera::{self, CameraFile, Label, LabelledPhoto, Solution, SolveErr
 use petcomp::{Error, io};
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
 
 /// What became of one of the photos.
 #[derive(Default, Serialize)]
@@ -114,21 +113,6 @@ fn refused(
     Ok(JointPhoto::without_camera(name, together, why))
 }
 
-/// Removes the camera beside a label unless it was solved from that: alone, or with `--force`.
-fn remove_anothers(folder: &Folder, name: &str, member: &LabelledPhoto) -> Answer<()> {
-    let place = camera_place(folder, name)?;
-    let stored = folder.file(&beside(name, "camera.json")).ok();
-    let stored = stored.and_then(|path| io::read_json::<CameraFile>(path).ok());
-    if stored.is_none_or(|file| !file.is_of(member)) {
-        let _ = std::fs::remove_file(place);
-    }
-    Ok(())
-}
-
-fn camera_place(folder: &Folder, name: &str) -> Answer<PathBuf> {
-    folder.place(&beside(name, "camera.json"))
-}
-
 /// Writes the camera of a photo where it has one that fits.
 fn written(
     folder: &Folder,
@@ -142,7 +126,7 @@ fn written(
         Err(error) => return refused(folder, name, member, all.len(), &error),
     };
     let file = CameraFile::solved_together(member, &solution, all);
-    io::write_json(camera_place(folder, name)?, &file)?;
+    io::write_json(folder.place(&beside(name, "camera.json"))?, &file)?;
     Ok(JointPhoto {
         photo: name.into(),
         together: all.len(),

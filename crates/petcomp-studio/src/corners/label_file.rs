@@ -8,7 +8,7 @@ use petcomp::camera::{self, CameraFile, Label, LabelledPhoto, Solution, SolveErr
 use petcomp::{Error, io};
 use serde::Serialize;
 use serde_json::{Map, Value};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The label of a photo, as its file says it or as it begins.
 #[derive(Serialize)]
@@ -68,7 +68,8 @@ pub(super) struct SavedLabel {
 }
 
 /// Saves a label, with the remarks that its file has, and then the camera that is solved from it.
-/// A label without a camera is saved, too, and the camera of before removed: it is another one's.
+/// A label without a camera is saved, too, and the camera of before removed where it is another
+/// one's.
 pub(super) fn save(
     folder: &Folder,
     photo: &str,
@@ -174,24 +175,37 @@ fn merge_tables(label: &mut Map<String, Value>, remarks: Map<String, Value>) {
 }
 
 /// Solves the label of a photo and writes the camera beside it, as `petcomp camera solve` does.
+/// Where none fits, no camera of another label stays there.
 fn write_camera(folder: &Folder, photo: &str) -> Answer<String> {
     let name = beside(photo, "camera.json");
     let place = folder.place(&name)?;
-    let solved = labelled(folder, photo).and_then(|labelled| {
-        let solution = usable(camera::solve(&labelled.label, &SolveOptions::default()))?;
-        Ok(CameraFile::new(&labelled.label, &solution))
-    });
-    match solved {
-        Ok(file) => {
-            io::write_json(place, &file)?;
+    let labelled = labelled(folder, photo).inspect_err(|_| remove_if_any(&place))?;
+    match usable(camera::solve(&labelled.label, &SolveOptions::default())) {
+        Ok(solution) => {
+            io::write_json(place, &CameraFile::new(&labelled.label, &solution))?;
             Ok(name)
         }
-        Err(refusal) => {
-            // It is of another label.
-            let _ = std::fs::remove_file(place);
-            Err(refusal)
+        Err(error) => {
+            remove_anothers(folder, photo, &labelled)?;
+            Err(error.into())
         }
     }
+}
+
+/// Removes the camera beside a label unless it was solved from that: alone, or with `--force`.
+pub(super) fn remove_anothers(folder: &Folder, photo: &str, label: &LabelledPhoto) -> Answer<()> {
+    let name = beside(photo, "camera.json");
+    let place = folder.place(&name)?;
+    let stored = folder.file(&name).ok();
+    let stored = stored.and_then(|path| io::read_json::<CameraFile>(path).ok());
+    if stored.is_none_or(|file| !file.is_of(label)) {
+        remove_if_any(&place);
+    }
+    Ok(())
+}
+
+fn remove_if_any(place: &Path) {
+    let _ = std::fs::remove_file(place);
 }
 
 /// The label of a photo as a stage reads it.
