@@ -28,9 +28,9 @@ fn diagnostics() -> String {
     format!(
         "# Diagnostics\n\n\
          What a stage noticed that a person should know has a code, a severity and a message. Codes are stable, messages are not.\n\
-         Severities are `note` (good to know), `warning` (the result may be wrong: look at it; `--strict` fails) and `error` (it\n\
-         cannot be used). They stand on the standard error, in `assets.toml`, in `NAME.camera.json` and in the output of the\n\
-         `check` commands.\n\n\
+         Severities are `note` (good to know; `dataset check --strict` fails), `warning` (the result may be wrong: look at it;\n\
+         `asset check --strict` fails) and `error` (it cannot be used). They stand on the standard error, in `assets.toml`, in\n\
+         `NAME.camera.json` and in the output of the `check` commands.\n\n\
          | code | meaning |\n| --- | --- |\n{rows}"
     )
 }

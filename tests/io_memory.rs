@@ -133,6 +133,21 @@ fn likeness_takes_memory_for_bands_alone() {
     );
 }
 
+/// As the layers of a dataset: each channel is there once, where copies took 4 bytes a pixel.
+#[test]
+fn channels_that_nobody_needs_any_more_are_written_without_a_copy() {
+    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    // Blocks of few columns: those at work at the same time take little.
+    let size = (SIDE / 8, SIDE * 4);
+    let channel = |name: &str| (name.to_owned(), vec![0.5_f32; PIXELS / 2]);
+    let channels = vec![channel("G"), channel("R")];
+    let taken =
+        bytes_a_pixel(|| io::exr::write_owned_channels(&path, size, channels, &[]).unwrap());
+    assert_at_most(2.0, "channels given away", taken);
+}
+
 /// Thirteen channels that nobody asked for are not kept.
 #[test]
 fn of_an_exr_only_the_channels_that_are_used_take_memory() {

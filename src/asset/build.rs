@@ -643,6 +643,25 @@ mod tests {
     }
 
     #[test]
+    fn a_photo_whose_pixels_are_not_square_is_refused() {
+        let folder = folder_with(&TWO.replace("one.png", "one.exr"));
+        let options = io::WriteOptions {
+            canvas: io::Canvas {
+                pixel_aspect: 2.0,
+                ..io::Canvas::default()
+            },
+            ..io::WriteOptions::default()
+        };
+        io::write_with(folder.path().join("one.exr"), &slab(), &options).unwrap();
+        let refused = build(folder.path(), folder.path().join("out"), &|_, _| ()).unwrap_err();
+        let told = refused.to_string();
+        assert!(
+            told.contains("one.exr: pixels are 2 times as wide as high, expected square ones"),
+            "{told}"
+        );
+    }
+
+    #[test]
     fn mistakes_in_a_list_are_named_before_any_work() {
         let printed = |list: &str| {
             let folder = folder_with(list);

@@ -101,6 +101,8 @@ impl CaptureFiles {
         };
         let recognised = sources.recognised(display)?;
         let empty_recognised = empty_sources.recognised(display)?;
+        let mut files = self.photos.iter().chain(&self.empty);
+        files.try_for_each(io::check_square_pixels)?;
         let number = number_of_white(&recognised, &names)?;
         let view = View::of_photo(display, &recognised[number]);
         let photos = Photos {

@@ -17,7 +17,8 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 /// A list of photos: `photos.toml`, or `photos.csv` with the fields of [`PhotoEntry`] for columns,
-/// as spreadsheets write it: between commas, semicolons or tabs, with decimal points or commas.
+/// but for `captured` and `screen_corners`, which no cell can hold, as spreadsheets write it:
+/// between commas, semicolons or tabs, with decimal points or commas.
 ///
 /// ```toml
 /// [[photos]]

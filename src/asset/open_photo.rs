@@ -90,6 +90,7 @@ impl<'a> OpenPhoto<'a> {
 fn read_rectified(entry: &PhotoEntry) -> Result<RectifiedPhoto> {
     let (scale, file) = (entry.scale()?, &entry.file);
     let (photo, height) = (io::read(file)?, entry.thickness() / 2.0);
+    io::check_square_pixels(file)?;
     match scale {
         Scale::PxPerMetre(_) | Scale::Length(_) | Scale::Size(_) => {
             Ok(RectifiedPhoto::unchanged(photo))

@@ -12,9 +12,11 @@ use std::path::Path;
 /// corners are missing.
 ///
 /// # Errors
-/// A file that is no picture; a photo that does not lie in or below the label's folder.
+/// A file that is no picture, or has pixels that are not square; a photo that does not lie in or
+/// below the label's folder.
 pub fn init_label(photo: &Path, path: &Path, like: Option<&Label>) -> Result<Label> {
     let header = io::read_header(photo)?;
+    io::check_square_pixels(photo)?;
     let mut label = Label::new(
         [header.width as u32, header.height as u32],
         [[0.0; 2]; 4],

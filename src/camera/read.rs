@@ -2,7 +2,7 @@
 
 use super::error::SolveError;
 use super::focal::plausible_equivalents;
-use super::import::{self, Annotation};
+use super::import::{self, Annotation, PictureNames};
 use super::label::{Label, LabelImage};
 use super::pinhole::Camera;
 use super::solution::Solution;
@@ -110,8 +110,8 @@ pub fn read_label(path: impl AsRef<Path>) -> Result<Label> {
 ///
 /// # Errors
 /// A file that cannot be read or understood, a photo instead of a label among them; a photo that
-/// has another size than its label says, or a path that leads out of the label's folder; two photos
-/// of one name.
+/// has another size than its label says, or pixels that are not square, or a path that leads out of
+/// the label's folder; two photos of one name.
 pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec<LabelledPhoto>> {
     let path = path.as_ref();
     let text = label_text(path)?;
@@ -375,7 +375,7 @@ fn stem(path: &Path) -> String {
 
 /// The label for another program's annotation, its photo searched for beside the file.
 fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto> {
-    let file = annotated_file(annotation, path);
+    let file = annotated_file(annotation, path)?;
     if file.is_empty() {
         return Err(Error::file(path, "no name of a picture"));
     }
@@ -402,18 +402,37 @@ fn fill_in_size(image: &mut LabelImage, photo: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The name of an annotation's photo: the first that is there, in or below the folder or directly
-/// in it, or else the last.
-fn annotated_file(annotation: &Annotation, path: &Path) -> String {
-    possible_files(annotation)
-        .find(|name| path.with_file_name(name).is_file())
-        .or_else(|| possible_files(annotation).last())
-        .unwrap_or_default()
-        .to_owned()
+/// The name of an annotation's photo: of several pictures the only one that is there.
+fn annotated_file(annotation: &Annotation, path: &Path) -> Result<String> {
+    let pictures = &annotation.pictures;
+    let there = pictures.iter().filter_map(|names| file_there(names, path));
+    let there: Vec<&str> = there.collect();
+    let file = match (there.as_slice(), pictures.as_slice()) {
+        (&[one], _) => one,
+        (_, [names]) => possible_files(names).last().unwrap_or_default(),
+        (_, []) => "",
+        _ => return Err(Error::file(path, several_pictures(pictures))),
+    };
+    Ok(file.to_owned())
 }
 
-fn possible_files(annotation: &Annotation) -> impl Iterator<Item = &str> {
-    let names = annotation.files.iter().map(String::as_str);
+/// The first of a picture's names that is there, in or below the folder or directly in it.
+fn file_there<'a>(names: &'a [String], path: &Path) -> Option<&'a str> {
+    possible_files(names).find(|name| path.with_file_name(name).is_file())
+}
+
+/// What is wrong with an annotation that may be of several pictures.
+fn several_pictures(pictures: &[PictureNames]) -> String {
+    let names = pictures.iter().filter_map(|names| names.last());
+    let names: Vec<&str> = names.map(String::as_str).collect();
+    format!(
+        "an annotation that may be of {}, expected one of them in this folder",
+        names.join(" or ")
+    )
+}
+
+fn possible_files(names: &[String]) -> impl Iterator<Item = &str> {
+    let names = names.iter().map(String::as_str);
     let inside = names.clone().filter(|file| io::below("", file).is_ok());
     inside.chain(names.map(|file| file.rsplit('/').next().unwrap_or_default()))
 }
@@ -437,7 +456,8 @@ fn completed(mut labelled: LabelledPhoto, size: Option<[f64; 2]>) -> Result<Labe
 /// size or an integer multiple of it.
 ///
 /// # Errors
-/// A photo that cannot be read, or has another size than the label says.
+/// A photo that cannot be read, or has another size than the label says, or pixels that are not
+/// square.
 pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
     let path = path.as_ref();
     let Some(photo) = photo_of(&label, path) else {
@@ -446,6 +466,7 @@ pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
     check_inside(&label, path)?;
     let header = io::read_header(&photo)?;
     check_photo_size(&label, &photo, &header).map_err(|e| e.in_file(path))?;
+    io::check_square_pixels(&photo)?;
     apply_exif(&mut label, &header);
     Ok(label)
 }
@@ -605,6 +626,50 @@ pub(super) mod tests {
         write_photo(&folder.path().join("a.jpg"), notes);
         let [label] = labels_of_photos(["a.jpg"]);
         with_photo(label, folder.path().join("a.label.json")).unwrap()
+    }
+
+    #[test]
+    fn a_photo_whose_pixels_are_not_square_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let photo = folder.path().join("a.exr");
+        let options = io::WriteOptions {
+            canvas: io::Canvas {
+                pixel_aspect: 2.0,
+                ..io::Canvas::default()
+            },
+            ..io::WriteOptions::default()
+        };
+        io::write_with(&photo, &Image::<Srgb8>::new(90, 60), &options).unwrap();
+        let [label] = labels_of_photos(["a.exr"]);
+        let path = folder.path().join("a.label.json");
+        for refused in [
+            with_photo(label, &path),
+            crate::camera::init_label(&photo, &path, None),
+        ] {
+            let told = refused.unwrap_err().to_string();
+            let expected = "a.exr: pixels are 2 times as wide as high, expected square ones: \
+                            resample it to square pixels first";
+            assert!(told.ends_with(expected), "{told}");
+        }
+    }
+
+    #[test]
+    fn of_two_pictures_that_are_there_neither_is_taken() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("export.json");
+        let annotation = Annotation {
+            pictures: ["a.jpg", "b.jpg"]
+                .map(|name| vec![name.to_owned()])
+                .to_vec(),
+            ..Annotation::default()
+        };
+        let refusal = || annotated_file(&annotation, &path).unwrap_err().to_string();
+        let expected = "may be of a.jpg or b.jpg, expected one of them in this folder";
+        assert!(refusal().ends_with(expected), "{}", refusal());
+        std::fs::write(folder.path().join("b.jpg"), "").unwrap();
+        assert_eq!(annotated_file(&annotation, &path).unwrap(), "b.jpg");
+        std::fs::write(folder.path().join("a.jpg"), "").unwrap();
+        assert!(refusal().ends_with(expected), "{}", refusal());
     }
 
     #[test]

@@ -32,12 +32,13 @@ pub enum Aov {
     Position,
     /// `uv`: its texture coordinates, right and down, `U V`; NaN where there is none.
     Uv,
-    /// `cryptomatte`: coverage of every object, see [`cryptomatte`].
+    /// `cryptomatte`: coverage of every object, see [`cryptomatte`]; the first part of a file.
     Cryptomatte,
     /// `layers`: a part `layer.ID` for each card: its own light and what it hides, held out by what
     /// lies in front, `R G B A`; with film in the picture also `TR TG TB`, 1 minus what it
-    /// hides per channel. Their sum is the picture of the sharp objects at rest, before blur, depth
-    /// of field, a belt's exposure and finish: with those it is not the beauty.
+    /// hides per channel. Their sum is the picture of the sharp objects at rest, before Poisson
+    /// blending, blur, depth of field, a belt's exposure and finish: with those it is not the
+    /// beauty.
     Layers,
 }
 
@@ -77,7 +78,8 @@ pub fn front(samples: &[DeepSample]) -> Option<&DeepSample> {
     front.filter(|s| s.visible > 0.0)
 }
 
-/// The requested parts, in that order, of one size.
+/// The requested parts, of one size, in that order but for the Cryptomatte, which comes first:
+/// Blender 3.4 and 4.2 look for it in the first part alone.
 ///
 /// `frame` is the finished frame of the same samples, `shot` what they were rendered from: position
 /// and texture coordinates are those at the pixel's centre, as depth is; all three are those of the
@@ -89,7 +91,10 @@ pub fn parts(aovs: &[Aov], deep: &DeepImage, shot: &Shot, frame: &Image<PremulRg
         frame,
         bent: bent_cards(shot),
     };
-    aovs.iter().flat_map(|aov| picture.parts_of(*aov)).collect()
+    let mut ordered = aovs.to_vec();
+    ordered.sort_by_key(|aov| *aov != Aov::Cryptomatte);
+    let ordered = ordered.into_iter();
+    ordered.flat_map(|aov| picture.parts_of(aov)).collect()
 }
 
 /// Everything that parts are made from.
@@ -343,6 +348,13 @@ mod tests {
         let aovs: Vec<Aov> = names.iter().map(|n| n.parse().unwrap()).collect();
         let parts = parts(&aovs, &deep, shot, &frame);
         (frame, parts)
+    }
+
+    #[test]
+    fn a_cryptomatte_is_the_first_part() {
+        let (_, parts) = made(&shot(), &["beauty", "id", "cryptomatte", "depth"]);
+        let names: Vec<_> = parts.iter().map(|part| part.name.as_str()).collect();
+        assert_eq!(names, ["CryptoObject", "beauty", "id", "depth"]);
     }
 
     #[test]

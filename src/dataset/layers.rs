@@ -6,7 +6,7 @@ use crate::dataset::{Entry, Sample, Writer};
 use crate::deep::{DeepImage, DeepSample};
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::io::exr::write_channels;
+use crate::io::exr::write_owned_channels;
 use crate::label::LabelOptions;
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
 use crate::render::Cryptomatte;
@@ -28,8 +28,8 @@ use std::path::{Path, PathBuf};
 /// Objects are called `object003_CLASS` in the Cryptomatte's list, distractors
 /// `object003_distractor`; what is too faint for a label is among them. Without film,
 /// `RGB = sum of object RGB + background * shadow * (1 - sum of object A)`: all but the picture is
-/// of the sharp objects at rest, before blur, depth of field, a belt's exposure and finish; with
-/// those the sum does not give the picture.
+/// of the sharp objects at rest, before Poisson blending, blur, depth of field, a belt's exposure
+/// and finish; with those the sum does not give the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Layers {
@@ -83,7 +83,7 @@ impl Writer for Layers {
         let mut notes = ids.metadata;
         notes.extend(provenance(entry));
         let size = sample.frame.size();
-        write_channels(folder.join(&path), size, &borrowed(&channels), &notes)?;
+        write_owned_channels(folder.join(&path), size, channels, &notes)?;
         Ok(vec![path])
     }
 }
@@ -150,13 +150,6 @@ fn channels_of<P: Copy>(image: &Image<P>, channels: &[Channel<P>]) -> Vec<NamedC
     let channels = channels.iter();
     channels
         .map(|(name, value)| ((*name).into(), image.pixels().iter().map(value).collect()))
-        .collect()
-}
-
-fn borrowed(channels: &[NamedChannel]) -> Vec<(&str, &[f32])> {
-    channels
-        .iter()
-        .map(|(name, values)| (name.as_str(), values.as_slice()))
         .collect()
 }
 

@@ -28,7 +28,8 @@ pub struct YoloTruth {
 }
 
 /// Reads `NAME.txt` of a folder of labels and of those below it: `class cx cy w h`, shares of the
-/// image, one box a line; outlines (`class x1 y1 x2 y2 ..`) give the box around them.
+/// image, one box a line; outlines (`class x1 y1 x2 y2 ..`) give the box around them. Rows that are
+/// repeated count once, as in training.
 ///
 /// The images are below the folder `images`, by default where YOLO has them: the same path with its
 /// last `labels` replaced by `images`. One without a label file shows nothing that is to be found.
@@ -89,7 +90,13 @@ fn refuse_dataset(folder: &Path) -> Result<()> {
 }
 
 /// The truth of an image, its size, and the image where it is found.
-type LabelledImage = (EvalImage, [u32; 2], Option<Picture>);
+struct LabelledImage {
+    sheet: EvalImage,
+    size: [u32; 2],
+    picture: Option<Picture>,
+    /// Rows of its label that are left out.
+    repeated: usize,
+}
 
 /// Files by their names without folder and extension.
 type FilesByName = BTreeMap<String, PathBuf>;
@@ -127,12 +134,17 @@ impl LabelFolder {
             (None, Some(image)) => image_size(image)?,
             (None, None) => return Err(self.missing_image(name)),
         };
+        let truth = truth_of(label, size, keypoints)?;
         let sheet = EvalImage {
             group: sequence_beside(image, label),
-            ..EvalImage::new(name, truth_of(label, size, keypoints)?)
+            ..EvalImage::new(name, truth.boxes)
         };
-        let picture = image.map(|path| picture_of(path.into(), size));
-        Ok((sheet, size, picture))
+        Ok(LabelledImage {
+            sheet,
+            size,
+            picture: image.map(|path| picture_of(path.into(), size)),
+            repeated: truth.repeated,
+        })
     }
 
     /// What is wrong with a label that has no image.
@@ -165,13 +177,17 @@ fn read_image(image: &Path, keypoints: usize) -> Result<LabelledImage> {
     let size = image_size(image)?;
     let label = Some(label_of(image)).filter(|label| label.exists());
     let truth = truth_of(label.as_deref(), size, keypoints)?;
-    let picture = Some(picture_of(image.into(), size));
     let name = image.file_stem().unwrap_or_default().to_string_lossy();
     let sheet = EvalImage {
         group: sequence_beside(Some(image), None),
-        ..EvalImage::new(name, truth)
+        ..EvalImage::new(name, truth.boxes)
     };
-    Ok((sheet, size, picture))
+    Ok(LabelledImage {
+        sheet,
+        size,
+        picture: Some(picture_of(image.into(), size)),
+        repeated: truth.repeated,
+    })
 }
 
 /// What eval needs of a sidecar that petcomp writes: whether the picture is one of a belt.
@@ -239,9 +255,9 @@ pub(super) fn is_picture(path: &Path) -> bool {
 }
 
 /// Nothing where there is no label file.
-fn truth_of(label: Option<&Path>, size: [u32; 2], keypoints: usize) -> Result<Vec<GroundTruth>> {
+fn truth_of(label: Option<&Path>, size: [u32; 2], keypoints: usize) -> Result<LabelTruth> {
     label.map_or_else(
-        || Ok(Vec::new()),
+        || Ok(LabelTruth::default()),
         |label| read_truth(label, size, keypoints),
     )
 }
@@ -290,10 +306,11 @@ impl YoloTruth {
             keypoint_numbers,
             ..Self::default()
         };
-        for (sheet, size, picture) in images {
-            truth.sheets.push(sheet);
-            truth.sizes.push(size);
-            truth.pictures.push(picture);
+        warn_repeated(&images);
+        for image in images {
+            truth.sheets.push(image.sheet);
+            truth.sizes.push(image.size);
+            truth.pictures.push(image.picture);
         }
         truth
     }
@@ -316,12 +333,22 @@ impl YoloTruth {
     }
 }
 
+fn warn_repeated(images: &[LabelledImage]) {
+    let count: usize = images.iter().map(|image| image.repeated).sum();
+    if let Some(first) = images.iter().find(|image| image.repeated > 0) {
+        let name = &first.sheet.image;
+        log::warn!(
+            "labels: repeated rows count once, as in training: {count}, the first of image \"{name}\""
+        );
+    }
+}
+
 /// What is wrong with a name that no image has.
 pub(super) fn no_image(name: &str, count: usize) -> String {
     format!("no image \"{name}\" in the truth of {count} images")
 }
 
-fn read_truth(path: &Path, size: [u32; 2], keypoints: usize) -> Result<Vec<GroundTruth>> {
+fn read_truth(path: &Path, size: [u32; 2], keypoints: usize) -> Result<LabelTruth> {
     let rows = parse_truth(&io::read_text(path)?, size, keypoints);
     rows.map_err(|what| Error::file(path, what))
 }
@@ -334,10 +361,28 @@ fn read_detections(path: &Path, size: [u32; 2], keypoints: usize) -> Result<Vec<
 /// What was read, or what is wrong with the text.
 type Parsed<T> = std::result::Result<T, String>;
 
-fn parse_truth(text: &str, size: [u32; 2], keypoints: usize) -> Parsed<Vec<GroundTruth>> {
-    let rows = parse_rows(text, 0, keypoints)?.into_iter();
-    let truth = rows.map(|row| GroundTruth::new(row.class, row.bbox(size)));
-    Ok(truth.collect())
+/// What a label says.
+#[derive(Debug, Default, PartialEq)]
+struct LabelTruth {
+    boxes: Vec<GroundTruth>,
+    /// Rows that are left out, as trainers do: each is the same as one above it.
+    repeated: usize,
+}
+
+fn parse_truth(text: &str, size: [u32; 2], keypoints: usize) -> Parsed<LabelTruth> {
+    let rows = parse_rows(text, 0, keypoints)?;
+    let (count, mut known) = (rows.len(), Vec::new());
+    for row in rows {
+        if !known.contains(&row) {
+            known.push(row);
+        }
+    }
+    let boxes = known.iter();
+    let boxes = boxes.map(|row| GroundTruth::new(row.class, row.bbox(size)));
+    Ok(LabelTruth {
+        boxes: boxes.collect(),
+        repeated: count - known.len(),
+    })
 }
 
 /// With a confidence at the end of each line.
@@ -349,7 +394,7 @@ fn parse_detections(text: &str, size: [u32; 2], keypoints: usize) -> Parsed<Vec<
 
 /// What a text of labels and one of detections give, for the fuzzers.
 pub(crate) fn sheet_of(truth: &str, found: &str, size: [u32; 2]) -> Parsed<EvalImage> {
-    let truth = parse_truth(truth, size, 0)?;
+    let truth = parse_truth(truth, size, 0)?.boxes;
     Ok(EvalImage {
         found: parse_detections(found, size, 0)?,
         ..EvalImage::new("", truth)
@@ -411,9 +456,11 @@ fn image_size(image: &Path) -> Result<[u32; 2]> {
 }
 
 /// A line: class, box in shares of the image, and what stands behind.
+#[derive(PartialEq)]
 struct LabelRow {
     class: u32,
     shares: BBox,
+    keypoints: Vec<f64>,
     confidence: f64,
 }
 
@@ -434,7 +481,7 @@ fn parse_row(line: &str, extra: usize, keypoints: usize) -> Parsed<LabelRow> {
     let mut words = line.split_ascii_whitespace();
     let class = parse_class(words.next().unwrap_or_default())?;
     let mut numbers = words.map(parse_finite).collect::<Parsed<Vec<f64>>>()?;
-    leave_out_keypoints(&mut numbers, extra, keypoints)?;
+    let keypoints = take_keypoints(&mut numbers, extra, keypoints)?;
     let (place, rest) = split_extra(&numbers, extra)?;
     check_shares(place)?;
     let shares = box_around(place).ok_or_else(|| too_few(&numbers, extra))?;
@@ -444,17 +491,18 @@ fn parse_row(line: &str, extra: usize, keypoints: usize) -> Parsed<LabelRow> {
     Ok(LabelRow {
         class,
         shares,
+        keypoints,
         confidence,
     })
 }
 
 /// Takes the numbers of keypoints out from behind those of the box; a row may do without them.
-fn leave_out_keypoints(numbers: &mut Vec<f64>, extra: usize, keypoints: usize) -> Parsed<()> {
+fn take_keypoints(numbers: &mut Vec<f64>, extra: usize, keypoints: usize) -> Parsed<Vec<f64>> {
     // Behind a confidence there may be the id of a track.
     let ends = |behind: usize| (extra..=2 * extra).contains(&behind);
     let is_box = numbers.len().checked_sub(BOX_NUMBERS).is_some_and(ends);
     if keypoints == 0 || is_box {
-        return Ok(());
+        return Ok(Vec::new());
     }
     let behind = numbers.len().checked_sub(BOX_NUMBERS + keypoints);
     if !behind.is_some_and(ends) {
@@ -468,8 +516,8 @@ fn leave_out_keypoints(numbers: &mut Vec<f64>, extra: usize, keypoints: usize) -
             "{count} numbers behind the class, expected cx cy w h and {keypoints} of keypoints (kpt_shape){confidence}"
         ));
     }
-    numbers.drain(BOX_NUMBERS..BOX_NUMBERS + keypoints);
-    Ok(())
+    let taken = numbers.drain(BOX_NUMBERS..BOX_NUMBERS + keypoints);
+    Ok(taken.collect())
 }
 
 /// The numbers of the place, and those behind them.
@@ -716,6 +764,20 @@ mod tests {
         let unsure = parse_detections(&format!("{place} 0.1 0.2 2 0.9 0.8 1"), size, 6);
         let expected = "line 1: 10 numbers behind the class, expected cx cy w h and 6 of keypoints (kpt_shape), and a confidence (save_conf=True)";
         assert_eq!(unsure.unwrap_err(), expected);
+    }
+
+    #[test]
+    fn repeated_rows_are_one_object() {
+        let counts = |text: &str, keypoints| {
+            let truth = parse_truth(text, [10, 10], keypoints).unwrap();
+            (truth.boxes.len(), truth.repeated)
+        };
+        let other_class = "1 0.5 0.5 0.2 0.4";
+        let rows = format!("0 0.5 0.5 0.2 0.4\n{other_class}\n0 0.50 0.5 0.2 0.4\n");
+        assert_eq!(counts(&rows, 0), (2, 1));
+        let place = "0 0.5 0.5 0.2 0.4";
+        let poses = format!("{place} 0.1 0.2\n{place} 0.1 0.3\n{place} 0.1 0.2\n");
+        assert_eq!(counts(&poses, 2), (2, 1));
     }
 
     #[test]

@@ -30,6 +30,22 @@ pub fn write_channels(
     write_encoded(path.as_ref(), encode(size, planes, metadata))
 }
 
+/// As [`write_channels`], of channels that nobody needs any more: many large ones are not copied.
+///
+/// # Errors
+/// Those of [`write_channels`].
+pub fn write_owned_channels(
+    path: impl AsRef<Path>,
+    size: (usize, usize),
+    channels: Vec<(String, Vec<f32>)>,
+    metadata: &[(String, String)],
+) -> Result<()> {
+    let (names, samples): (Vec<String>, Vec<Vec<f32>>) = channels.into_iter().unzip();
+    let samples = samples.into_iter().map(FlatSamples::F32);
+    let planes = names.iter().map(String::as_str).zip(samples).collect();
+    write_encoded(path.as_ref(), encode(size, planes, metadata))
+}
+
 /// As [`write_channels`], a picture somewhere on a canvas, without texts.
 ///
 /// # Errors

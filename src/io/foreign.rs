@@ -8,7 +8,7 @@ const CONVERT: &str = "convert it to PNG first";
 pub(super) const DEVELOP: &str = "develop it to a 16-bit TIFF first";
 
 /// First bytes of each kind from a place on; its name, and what to do.
-const KINDS: [(usize, &[u8], &str, &str); 18] = [
+const KINDS: [(usize, &[u8], &str, &str); 22] = [
     (4, b"ftyphevc", SEQUENCE, CONVERT),
     (4, b"ftypmsf1", SEQUENCE, CONVERT),
     (4, b"ftypavif", "AVIF", CONVERT),
@@ -27,6 +27,11 @@ const KINDS: [(usize, &[u8], &str, &str); 18] = [
     (0, b"IIU\0", RAW, DEVELOP),
     (0, b"FUJIFILMCCD-RAW", RAW, DEVELOP),
     (0, b"FOVb", RAW, DEVELOP),
+    // Phase One: behind IIII and a letter, which pixels of an ordinary TIFF may begin with, too.
+    (13, b"waR", RAW, DEVELOP),
+    (8, b"MMMMRaw", RAW, DEVELOP),
+    (6, b"HEAPCCDR", RAW, DEVELOP),
+    (0, b"\0MRM", RAW, DEVELOP),
 ];
 
 const SEQUENCE: &str = "a sequence of HEIC pictures";

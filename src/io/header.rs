@@ -14,14 +14,17 @@ pub enum Window {
     Data,
 }
 
-/// The plane that an EXR's picture lies in: where, and of what pixels. Other formats have only the
-/// default.
+/// The plane that an EXR's picture lies in: where, of what pixels, and what is shown of it. Other
+/// formats have only the default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Canvas {
     /// Column and row of the picture's first pixel. Default: 0, 0.
     pub at: [i32; 2],
     /// Width of a pixel by its height. Default: 1.
     pub pixel_aspect: f32,
+    /// The display window of a picture that is written as a part of it: column and row of its
+    /// first pixel, its columns and rows. Default: that of the picture.
+    pub display: Option<([i32; 2], [usize; 2])>,
 }
 
 impl Default for Canvas {
@@ -29,6 +32,7 @@ impl Default for Canvas {
         Self {
             at: [0; 2],
             pixel_aspect: 1.0,
+            display: None,
         }
     }
 }
@@ -51,8 +55,12 @@ pub struct Header {
     /// Columns and rows that are stored: those of the picture, but for EXR, whose data window may
     /// be any other.
     pub data_size: [usize; 2],
-    /// Names of the channels, `R G B A` first if present.
+    /// Names of the channels, `R G B A` first if present; of several parts those of the one that
+    /// colours are read from.
     pub channels: Vec<String>,
+    /// Names of the parts of an EXR that has several, first that of the one that colours are read
+    /// from.
+    pub parts: Vec<String>,
     /// Bits of a sample: 8 and 16 are display-encoded integers (16 in an EXR: half floats), 32 is
     /// float.
     pub bits: u32,

@@ -140,7 +140,7 @@ pub use picture::Picture;
 #[cfg(feature = "pipeline")]
 pub(crate) use read::read_checked;
 #[doc(hidden)]
-pub use read::{pictures_at_once, read_format};
+pub use read::{check_square_pixels, pictures_at_once, read_format};
 pub use read::{read, read_header, read_with};
 #[doc(hidden)]
 pub use write::jpeg_bytes;

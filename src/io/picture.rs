@@ -89,6 +89,11 @@ impl Picture {
         self.format
     }
 
+    /// Names of the channels that its colours are made from.
+    pub fn channels(&self) -> &[String] {
+        &self.raster.names
+    }
+
     /// Its samples are display-encoded integers; others are scene-linear.
     pub fn is_display_encoded(&self) -> bool {
         self.raster.display_encoded

@@ -119,13 +119,24 @@ mod tests {
         );
         assert!(told(b"RIFF\x10\0\0\0WEBPVP8 ").starts_with("is WebP, expected EXR"));
         // By its first bytes a TIFF.
-        let raw = told(b"II*\0\x10\0\0\0CR\x02\0");
-        assert!(
-            raw.ends_with("HDR: develop it to a 16-bit TIFF first"),
-            "{raw}"
-        );
-        let tiff = recognized(Path::new("a.jpg"), b"II*\0\x08\0\0\0");
-        assert_eq!(tiff, Ok(Format::Tiff));
+        for start in [
+            b"II*\0\x10\0\0\0CR\x02\0".as_slice(),
+            b"II*\0\x08\x0a\0\0IIIICwaR",
+            b"MM\0*\0\0\x0a\x08MMMMRawT",
+            b"II\x1a\0\0\0HEAPCCDR",
+            b"\0MRM\0\0\0\0",
+        ] {
+            let raw = told(start);
+            assert!(
+                raw.ends_with("HDR: develop it to a 16-bit TIFF first"),
+                "{raw}"
+            );
+        }
+        // The second one begins with dark pixels.
+        for start in [b"II*\0\x08\0\0\0".as_slice(), b"II*\0\x10\0\0\0IIIIIIII"] {
+            let tiff = recognized(Path::new("a.jpg"), start);
+            assert_eq!(tiff, Ok(Format::Tiff));
+        }
     }
 
     #[test]

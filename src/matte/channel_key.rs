@@ -40,7 +40,8 @@ pub enum ChannelLimit {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ChannelKeyOptions {
-    /// Which Blender to be; `robust` and 4.2 are 3.4 here. Default: `blender-3.4`.
+    /// Which Blender to be; `robust` and 4.2 are 3.4 here. A value exactly at two equal limits gives
+    /// the pixel's alpha in all profiles; Blender 4.2 and 4.5 give NaN. Default: `blender-3.4`.
     pub profile: Profile,
     /// The colour space. Default: `RGB`.
     pub color_space: KeySpace,

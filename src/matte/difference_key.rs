@@ -32,7 +32,7 @@ impl Default for DifferenceKeyOptions {
 /// Keys a photo by its difference from a clean plate.
 ///
 /// Takes two scene-linear pictures of one size; returns a matte of that size, at most the photo's
-/// alpha.
+/// alpha. Background whose alpha is below 0 is 0 all the same, except in Blender 4.5.
 ///
 /// # Method
 /// With `D` the mean of the absolute differences of R, G and B: 0 up to `tolerance`, then `(D -
@@ -52,19 +52,38 @@ pub fn difference_key<P: Photo>(
 }
 
 impl DifferenceKeyOptions {
-    /// The matte of a pixel, at most its alpha.
+    /// The matte of a pixel.
     #[inline]
     fn coverage(&self, p: PremulRgba, clean: PremulRgba) -> Coverage {
-        let m = self.matte(mean_difference(p, clean));
-        Coverage(m.map_or(p.a, |m| if m < p.a { m } else { p.a }))
-    }
-    /// The matte of an opaque pixel; none beyond the falloff.
-    #[inline]
-    fn matte(&self, difference: f32) -> Option<f32> {
-        if self.profile == Profile::Blender45 {
-            late_matte(difference, self.tolerance, self.falloff)
+        let difference = mean_difference(p, clean);
+        Coverage(if self.profile == Profile::Blender45 {
+            self.late_matte(difference, p.a)
         } else {
-            early_matte(difference, self.tolerance, self.falloff)
+            self.early_matte(difference, p.a)
+        })
+    }
+
+    /// As Blender 3.4 computes it: background is 0 whatever its alpha.
+    #[inline]
+    fn early_matte(&self, difference: f32, alpha: f32) -> f32 {
+        if difference <= self.tolerance {
+            0.0
+        } else if difference <= self.falloff + self.tolerance {
+            lesser((difference - self.tolerance) / self.falloff, alpha)
+        } else {
+            alpha
+        }
+    }
+
+    /// As Blender 4.5 computes it.
+    #[inline]
+    fn late_matte(&self, difference: f32, alpha: f32) -> f32 {
+        if difference <= self.tolerance + self.falloff {
+            let beyond = difference - self.tolerance;
+            let beyond = if beyond > 0.0 { beyond } else { 0.0 };
+            lesser(quotient_or_zero(beyond, self.falloff), alpha)
+        } else {
+            alpha
         }
     }
 }
@@ -75,19 +94,10 @@ fn mean_difference(a: PremulRgba, b: PremulRgba) -> f32 {
     ((a.r - b.r).abs() + (a.g - b.g).abs() + (a.b - b.b).abs()) / 3.0
 }
 
-/// The rise of the matte as Blender 3.4 computes it; none beyond it.
-fn early_matte(difference: f32, tolerance: f32, falloff: f32) -> Option<f32> {
-    if difference <= tolerance {
-        return Some(0.0);
-    }
-    (difference <= falloff + tolerance).then(|| (difference - tolerance) / falloff)
-}
-
-/// The rise of the matte as Blender 4.5 computes it; none beyond it.
-fn late_matte(difference: f32, tolerance: f32, falloff: f32) -> Option<f32> {
-    let beyond = difference - tolerance;
-    let beyond = if beyond > 0.0 { beyond } else { 0.0 };
-    (difference <= tolerance + falloff).then(|| quotient_or_zero(beyond, falloff))
+/// The first where it is less, or else the second.
+#[inline]
+fn lesser(first: f32, second: f32) -> f32 {
+    if first < second { first } else { second }
 }
 
 #[inline]
@@ -96,5 +106,25 @@ fn quotient_or_zero(dividend: f32, divisor: f32) -> f32 {
         0.0
     } else {
         dividend / divisor
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn background_of_negative_alpha_is_0_before_blender_4_5() {
+        let photo = Image::filled(1, 1, PremulRgba::new(0.2, 0.3, 0.4, -0.5));
+        for (_, profile) in Profile::ALL {
+            let options = DifferenceKeyOptions {
+                profile,
+                ..DifferenceKeyOptions::default()
+            };
+            let matte = difference_key(&photo, &photo, &options).unwrap();
+            let is_late = profile == Profile::Blender45;
+            let expected = if is_late { -0.5 } else { 0.0 };
+            assert_eq!(matte[(0, 0)].0, expected, "{profile:?}");
+        }
     }
 }

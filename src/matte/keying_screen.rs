@@ -31,8 +31,8 @@ const SMOOTHNESS_SIGMA: f64 = 0.85;
 /// double precision.
 ///
 /// # Errors
-/// [`Error::Value`](crate::Error::Value) where no point lies in the picture, or `smoothness`
-/// outside 0 to 1.
+/// [`Error::Value`](crate::Error::Value) where no point lies in the picture, for a colour that is
+/// not finite, or `smoothness` outside 0 to 1.
 pub fn keying_screen(
     (width, height): (usize, usize),
     points: &[ScreenPoint],
@@ -41,12 +41,22 @@ pub fn keying_screen(
     check_value((0.0..=1.0).contains(&smoothness), "smoothness", || {
         format!("{smoothness}, expected 0 to 1")
     })?;
+    check_colors(points)?;
     let points = points_inside(points, width, height)?;
     let size = [width as f64, height as f64];
     let sigma = SHARPEST_SIGMA + SMOOTHNESS_SIGMA * smoothness;
     Ok(Image::from_fn(width, height, |x, y| {
         screen_color(&points, [x as f64 + 0.5, y as f64 + 0.5], size, sigma)
     }))
+}
+
+fn check_colors(points: &[ScreenPoint]) -> Result<()> {
+    let mut points = points.iter().enumerate();
+    points.try_for_each(|(i, p)| {
+        check_value(p.color.is_finite(), &format!("points[{i}]"), || {
+            format!("{:?}, expected finite numbers", p.color.channels())
+        })
+    })
 }
 
 /// The points that lie in the picture, at least one.
@@ -138,5 +148,18 @@ mod tests {
             ..LEFT
         };
         assert!(keying_screen((20, 10), &[outside], 0.0).is_err());
+    }
+
+    #[test]
+    fn a_colour_that_is_not_finite_is_refused_by_its_point() {
+        let lost = ScreenPoint {
+            color: LinearRgb::new(f32::INFINITY, 0.0, 0.5),
+            ..RIGHT
+        };
+        let refusal = keying_screen((20, 10), &[LEFT, lost], 0.0).unwrap_err();
+        assert_eq!(
+            refusal.to_string(),
+            "points[1]: [inf, 0.0, 0.5], expected finite numbers"
+        );
     }
 }

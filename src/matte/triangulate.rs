@@ -103,9 +103,9 @@ pub struct Triangulated {
 /// # Errors
 /// [`Error::Value`](crate::Error::Value) (`photos`) for fewer than two or of different size,
 /// (`mask`) a coverage outside 0 to 1, or an option that cannot be right;
-/// [`Error::Photo`](crate::Error::Photo) where a pixel of a photo is not a finite number, no channel
-/// of the screens differs, the object moved farther than `max_shift_px`, turned, or moved otherwise
-/// (`least_agreement`).
+/// [`Error::Photo`](crate::Error::Photo) where a pixel of a photo is not a finite number, no pixel is
+/// covered by more than half, no channel of the screens differs, the object moved farther than
+/// `max_shift_px`, turned, or moved otherwise (`least_agreement`).
 /// # Panics
 /// When a photo and its plate differ in size.
 ///
@@ -119,6 +119,7 @@ pub fn triangulate(
     check_sizes(shots, inside)?;
     check_pixels(shots)?;
     check_coverage(inside)?;
+    check_not_empty(inside)?;
     let aligned = align(shots, inside, options)?;
     let noise = strongest_noise(shots);
     let lines = fit_lines(&aligned, noise);
@@ -259,6 +260,13 @@ fn check_sizes(
         })?;
     }
     Ok(())
+}
+
+/// An object is what a mask covers by more than half.
+fn check_not_empty(inside: &Image<Coverage>) -> Result<()> {
+    check_photo(inside.pixels().iter().any(|c| c.0 > 0.5), || {
+        "the mask of the object is empty".into()
+    })
 }
 
 /// All photos are finite; they count from 1.

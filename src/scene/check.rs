@@ -41,7 +41,11 @@ impl Scene {
         check_surface(&self.surface)?;
         check_camera(&self.camera)?;
         self.view.check()?;
-        self.lens.check()
+        self.lens.check()?;
+        match &self.camera {
+            CameraSource::Known(camera) => self.lens.check_fold(camera),
+            CameraSource::Rectangle { .. } => Ok(()),
+        }
     }
 
     fn check_objects(&self) -> Result<()> {
@@ -293,6 +297,7 @@ fn check_light(light: &AreaLight, at: &str) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::tilted_camera;
 
     fn scene() -> Scene {
         let object = Object {
@@ -389,6 +394,18 @@ mod tests {
         assert_eq!(
             reported,
             "objects[0].placement.at.rotation: a quaternion of norm 2, expected norm 1"
+        );
+    }
+
+    #[test]
+    fn a_lens_that_folds_the_pictures_of_a_known_camera_is_told() {
+        let reported = complaint(|s| {
+            s.camera = CameraSource::Known(tilted_camera());
+            s.lens.k1 = -1.5;
+        });
+        assert!(
+            reported.starts_with("lens.k1: -1.5, expected at least -0."),
+            "{reported}"
         );
     }
 

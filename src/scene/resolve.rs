@@ -82,7 +82,6 @@ impl Scene {
         if let Some(plate) = &plate {
             self.check_plate(plate)?;
         }
-        self.lens.check_fold(&camera)?;
         let seen = self.view.camera(&self.lens.camera(&camera));
         let distortion = RadialDistortion::new(&seen, self.lens.k1);
         Ok(Shot {

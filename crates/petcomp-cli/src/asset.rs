@@ -100,7 +100,7 @@ pub(crate) struct AddPhotoArgs {
     scale: ScaleArgs,
     /// Corners of the screen for --screen-size, from the top left clockwise, pixels; by default
     /// they are found
-    #[arg(long, value_name = "X,Y X,Y X,Y X,Y", value_parser = parse_corners, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y X,Y X,Y X,Y", value_parser = parse_corners)]
     screen_corners: Option<[[f64; 2]; 4]>,
     #[command(flatten)]
     capture: CaptureArgs,

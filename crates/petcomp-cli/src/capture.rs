@@ -19,7 +19,7 @@ pub(crate) struct FramesArgs {
     /// Folder to write
     #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
-    /// Pixels of the display: best its own number, so that nothing is scaled
+    /// Pixels of the display, 400 to 16384 a side: best its own number, so that nothing is scaled
     #[arg(long, value_name = "WxH", value_parser = parse_pixel_size)]
     size: [u32; 2],
     /// Width of the picture on the display, metres, by a ruler; can be given later, to `asset add`

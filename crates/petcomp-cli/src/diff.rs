@@ -127,7 +127,7 @@ pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<u8> {
         pair.write_difference(path, args.scale)?;
     }
     print_comparison(args, &report, global);
-    pair.print_passed_over(global);
+    pair.print_passed_over(args, global);
     pair.print_likeness(global);
     Ok(report.verdict.exit_code())
 }
@@ -147,35 +147,33 @@ fn print_comparison(args: &DiffArgs, report: &Comparison, global: &GlobalArgs) {
 struct PicturePair {
     a: Picture,
     b: Picture,
-    /// Channels of each that are not compared.
-    other_channels: [Vec<String>; 2],
+    /// What of each is not compared.
+    passed_over: [PassedOver; 2],
 }
 
 impl PicturePair {
     fn read(args: &DiffArgs) -> petcomp::Result<Self> {
         let (a, b) = (Picture::read(&args.a)?, Picture::read(&args.b)?);
-        let other_channels = [other_channels(&a, &args.a)?, other_channels(&b, &args.b)?];
-        Ok(Self {
-            a,
-            b,
-            other_channels,
-        })
+        let passed_over = [PassedOver::of(&a, &args.a)?, PassedOver::of(&b, &args.b)?];
+        Ok(Self { a, b, passed_over })
     }
 
     /// Pictures with other channels beside their colours are not the same, whatever the colours.
     fn has_same_channels(&self) -> bool {
-        let [a, b] = &self.other_channels;
-        a == b
+        let [a, b] = &self.passed_over;
+        a.channels == b.channels
     }
 
-    fn print_passed_over(&self, global: &GlobalArgs) {
-        let [names, _] = &self.other_channels;
-        if !names.is_empty() {
-            let count = names.len();
+    fn print_passed_over(&self, args: &DiffArgs, global: &GlobalArgs) {
+        let [a, b] = &self.passed_over;
+        if !a.channels.is_empty() {
+            let (count, names) = (a.channels.len(), a.channels.join(", "));
             global.print_status(format_args!(
-                "Colours and alpha alone were compared, none of {count} other channels"
+                "Colours and alpha alone were compared, none of {count} other channels ({names})"
             ));
         }
+        a.print_parts(&args.a, global);
+        b.print_parts(&args.b, global);
     }
 
     /// Pictures without alpha have three channels, over which means are taken.
@@ -227,14 +225,41 @@ impl PicturePair {
 /// Channels that are compared, or that colours are made from.
 const COLOR_CHANNELS: [&str; 7] = ["R", "G", "B", "A", "Y", "RY", "BY"];
 
-/// The channels of an EXR beside its colours; of its first part.
-fn other_channels(picture: &Picture, path: &Path) -> petcomp::Result<Vec<String>> {
-    if picture.format() != Format::Exr {
-        return Ok(Vec::new());
+/// What a file has beside the colours that are compared.
+#[derive(Default)]
+struct PassedOver {
+    /// The other channels of the part that is compared.
+    channels: Vec<String>,
+    /// The names of several parts, first that of the one that is compared.
+    parts: Vec<String>,
+}
+
+impl PassedOver {
+    /// Nothing of a file that is no EXR.
+    fn of(picture: &Picture, path: &Path) -> petcomp::Result<Self> {
+        if picture.format() != Format::Exr {
+            return Ok(Self::default());
+        }
+        let io::Header {
+            mut channels,
+            parts,
+            ..
+        } = io::read_header(path)?;
+        channels.retain(|name| {
+            !COLOR_CHANNELS.contains(&name.as_str()) && !picture.channels().contains(name)
+        });
+        Ok(Self { channels, parts })
     }
-    let mut names = io::read_header(path)?.channels;
-    names.retain(|name| !COLOR_CHANNELS.contains(&name.as_str()));
-    Ok(names)
+
+    fn print_parts(&self, path: &Path, global: &GlobalArgs) {
+        if let [compared, others @ ..] = self.parts.as_slice() {
+            let (path, count) = (path.display(), self.parts.len());
+            let others = others.join(", ");
+            global.print_status(format_args!(
+                "{path}: of {count} parts \"{compared}\" alone was compared, not {others}"
+            ));
+        }
+    }
 }
 
 fn opaque([r, g, b, _]: [f32; 4]) -> LinearRgb {

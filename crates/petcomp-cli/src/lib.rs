@@ -66,7 +66,7 @@ enum Verb {
     /// Pages in the browser: label corners, look at mattes, tune a recipe, browse a dataset
     #[cfg(feature = "studio")]
     Studio(studio::StudioArgs),
-    /// What this machine has, and whether petcomp works on it
+    /// What this machine has, and whether petcomp works on it: exit status 1 where it does not
     Doctor(doctor::DoctorArgs),
 }
 

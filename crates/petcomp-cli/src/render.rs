@@ -14,15 +14,17 @@ use std::path::{Path, PathBuf};
 pub(crate) struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Picture to write: .png, .jpg as the recipe's `pictures` says, or .exr for scene-linear values
-    /// with alpha; in a .png or .jpg a scene without a plate lies over black, without alpha
+    /// Picture to write: .png, .jpg as the recipe's `pictures` says, .tif for sRGB codes with
+    /// alpha, or .exr for scene-linear values with alpha; in a .png or .jpg a scene without a plate
+    /// lies over black, without alpha
     #[arg(short, long, value_name = "PICTURE")]
     output: PathBuf,
     /// draft, normal or reference: how finely everything is computed; by default as the recipe or
     /// the scene's settings say
     #[arg(long)]
     quality: Option<Quality>,
-    /// Parts of a multi-part .exr: beauty,coverage,shadow,id,depth,position,uv,cryptomatte,layers
+    /// Parts of a multi-part .exr: beauty,coverage,shadow,id,depth,position,uv,cryptomatte,layers;
+    /// the Cryptomatte comes first, where Blender finds it
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     aov: Vec<Aov>,
     /// Also write the picture as it is displayed

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 pub(crate) enum SceneCommand {
     /// Draw scene K of a recipe
     Draw(DrawArgs),
-    /// Check that a scene file is possible
+    /// Check that the values of a scene file are possible; the files that it names are not opened
     Check {
         /// Scene, TOML or JSON
         scene: PathBuf,

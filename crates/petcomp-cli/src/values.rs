@@ -2,8 +2,9 @@
 //! together.
 
 use clap::builder::RangedU64ValueParser;
+use petcomp::matte::key::expected_of_screen;
 use petcomp::{Error, LinearRgb};
-use std::fmt::Display;
+use std::any::TypeId;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
@@ -25,8 +26,8 @@ pub(crate) fn check_companion(
     }
 }
 
-/// The same program, whose options take a number below 0 for their value and say what they expect;
-/// clap would take it for another option.
+/// The same program, whose options take numbers below 0 for their value and say what they expect;
+/// clap would take them for another option.
 pub(crate) fn with_negative_numbers(program: clap::Command) -> clap::Command {
     program
         .mut_args(with_negative_number)
@@ -35,7 +36,23 @@ pub(crate) fn with_negative_numbers(program: clap::Command) -> clap::Command {
 
 fn with_negative_number(arg: clap::Arg) -> clap::Arg {
     let is_option = !arg.is_positional() && arg.get_action().takes_values();
+    let is_list = is_option && takes_list(&arg);
     arg.allow_negative_numbers(is_option)
+        .allow_hyphen_values(is_list)
+}
+
+/// Whether the value is a list of numbers. Clap takes for it whatever follows, another option too:
+/// what parses it says what was expected.
+fn takes_list(arg: &clap::Arg) -> bool {
+    let lists = [
+        TypeId::of::<LinearRgb>(),
+        TypeId::of::<[usize; 2]>(),
+        TypeId::of::<[u32; 2]>(),
+        TypeId::of::<[f64; 2]>(),
+        TypeId::of::<[[f64; 2]; 4]>(),
+    ];
+    let value = arg.get_value_parser().type_id();
+    lists.into_iter().any(|list| value == list)
 }
 
 /// Four points from `X,Y X,Y X,Y X,Y`.
@@ -90,31 +107,21 @@ fn split_size(text: &str) -> (&str, &str) {
     text.split_once(['x', 'X', ',']).unwrap_or_default()
 }
 
-/// Four stops over white: no screen is brighter.
-const MAX_CHANNEL: f32 = 16.0;
-
-/// A scene-linear colour from `R,G,B`.
+/// The scene-linear colour of a screen from `R,G,B`.
 pub(crate) fn parse_color(text: &str) -> Result<LinearRgb, String> {
-    let channels = parse_numbers::<f32, 3>(text, "R,G,B")?;
-    if channels.iter().any(|&value| value > MAX_CHANNEL) {
-        return Err("expected scene-linear values, white is 1; are these 8-bit codes?".into());
-    }
-    Ok(LinearRgb::from(channels))
+    let channels = parse_numbers::<f32, 3>(text, "R,G,B as in 0.02,0.6,0.05")?;
+    let color = LinearRgb::from(channels);
+    expected_of_screen(color).map_or(Ok(color), |expected| Err(expected.into()))
 }
 
 /// A pixel from `X,Y`.
 pub(crate) fn parse_pixel(text: &str) -> Result<[usize; 2], String> {
-    parse_numbers(text, "X,Y")
+    parse_numbers(text, "X,Y, whole numbers of at least 0, as in 40,30")
 }
 
 /// Numbers with commas between them.
-fn parse_numbers<T, const N: usize>(text: &str, form: &str) -> Result<[T; N], String>
-where
-    T: FromStr<Err: Display>,
-{
-    let numbers: Result<Vec<T>, _> = text.split(',').map(|n| n.trim().parse()).collect();
-    let numbers = numbers.map_err(|e| e.to_string())?;
-    numbers
-        .try_into()
-        .map_err(|numbers: Vec<T>| format!("{} numbers, expected {form}", numbers.len()))
+fn parse_numbers<T: FromStr, const N: usize>(text: &str, form: &str) -> Result<[T; N], String> {
+    let numbers: Option<Vec<T>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    let numbers = numbers.and_then(|numbers| numbers.try_into().ok());
+    numbers.ok_or_else(|| format!("\"{text}\", expected {form}"))
 }

@@ -3,6 +3,7 @@
 mod desk;
 
 use desk::{Desk, PETCOMP, SAMPLES, text, words};
+use petcomp::io::exr::{ChannelSamples, Part};
 use petcomp::io::{self, FromFile, ToFile};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
 use std::ops::Range;
@@ -1068,6 +1069,7 @@ fn what_is_keyed_lies_where_its_exr_does_and_lost_pixels_are_told() {
     let canvas = io::Canvas {
         at: [-3, 7],
         pixel_aspect: 2.0,
+        ..Default::default()
     };
     let placed = io::WriteOptions {
         canvas,
@@ -1100,6 +1102,33 @@ fn what_is_keyed_lies_where_its_exr_does_and_lost_pixels_are_told() {
     let told = text(&desk.run(&key).stderr);
     assert!(told.contains(warned), "{told}");
     assert_eq!(header("other.exr").canvas, canvas);
+}
+
+#[test]
+fn a_cut_out_keeps_its_place_in_the_photo_unless_it_is_reduced() {
+    let desk = Desk::new();
+    let canvas = io::Canvas {
+        at: [-3, 7],
+        ..Default::default()
+    };
+    let placed = io::WriteOptions {
+        canvas,
+        ..Default::default()
+    };
+    let photo = red_on_green(30..90, 25..55);
+    io::write_with(desk.path("a.exr"), &photo, &placed).expect("a picture");
+    desk.ok(&words("matte cut a.exr -o cut.exr"));
+    let header = |name: &str| io::read_header(desk.path(name)).expect("an EXR");
+    let cut = header("cut.exr");
+    assert_eq!((cut.canvas, cut.width, cut.height), (canvas, 120, 80));
+    assert!(cut.data_at[0] > 0 && cut.data_size[0] < 120, "{cut:?}");
+    let shown = desk.read::<PremulRgba>("cut.exr");
+    assert!(shown[(60, 40)].a > 0.9 && shown[(2, 2)].a == 0.0);
+    assert!(shown[(85, 50)].a > 0.9 && shown[(95, 50)].a < 0.1);
+    desk.write("small.toml", "longest_side = 40\n");
+    desk.ok(&words("matte cut a.exr -o small.exr --options small.toml"));
+    let small = header("small.exr");
+    assert_eq!((small.canvas.at, small.width), ([0, 0], 40));
 }
 
 #[test]
@@ -1174,6 +1203,33 @@ fn a_keyer_asks_for_a_screen_in_linear_light_or_for_a_plate() {
     assert!(told.contains("--screen <R,G,B>|--plate <FILE>"), "{told}");
     let told = desk.refused(&[&key[..], &["--screen", "30,180,60"]].concat());
     assert!(told.contains("are these 8-bit codes?"), "{told}");
+}
+
+#[test]
+fn lists_that_begin_with_a_minus_are_values() {
+    let desk = Desk::new();
+    write_green_ramp(&desk.path("a.png"), 0.5);
+    let key = ["matte", "key", "a.png", "-o", "cut.exr"];
+    let told = desk.refused(&[&key[..], &["--screen", "--plate", "a.png"]].concat());
+    let missing = "'--plate' for '--screen <R,G,B>': \"--plate\", expected R,G,B as in";
+    assert!(told.contains(missing), "{told}");
+    let screen = ["matte", "keying-screen", "a.png", "-o", "plate.exr"];
+    let told = desk.refused(&[&screen[..], &["--point", "-1,2"]].concat());
+    assert!(told.contains("\"-1,2\", expected X,Y"), "{told}");
+    desk.ok(&[&key[..], &["--screen", "-0.2,0.4,-0.1"]].concat());
+}
+
+#[test]
+fn a_point_where_the_picture_is_not_finite_is_refused() {
+    let desk = Desk::new();
+    let mut photo = Image::filled(8, 8, LinearRgb::new(0.25, 0.5, 0.125));
+    photo[(5, 5)].r = f32::NAN;
+    desk.write_picture("a.exr", &photo);
+    let told = desk.refused(&words(
+        "matte keying-screen a.exr -o plate.exr --point 2,2 --point 5,5",
+    ));
+    let expected = "--point 5,5: the picture is [NaN, 0.5, 0.125] there, expected finite numbers";
+    assert!(told.contains(expected), "{told}");
 }
 
 #[test]
@@ -1466,7 +1522,31 @@ fn diff_tells_channels_that_it_passes_over() {
     let told = text(&output.stdout);
     assert!(told.contains("differ in their channels"), "{told}");
     let told = desk.ok(&["diff", "depth.exr", "depth.exr"]);
-    assert!(told.contains("none of 1 other channels"), "{told}");
+    assert!(told.contains("none of 1 other channels (Z)"), "{told}");
+}
+
+#[test]
+fn diff_tells_which_of_several_parts_it_compares() {
+    let desk = Desk::new();
+    let part = |name: &str, channels: &[&str]| Part {
+        name: name.into(),
+        channels: channels
+            .iter()
+            .map(|c| (c.to_string(), ChannelSamples::Float(vec![0.5; 4])))
+            .collect(),
+        metadata: Vec::new(),
+    };
+    let parts = [part("beauty", &["R", "G", "B"]), part("depth", &["Z"])];
+    let [beauty, depth] = parts.clone();
+    let turned = [depth, beauty];
+    for (name, parts) in [("a.exr", parts), ("b.exr", turned)] {
+        io::exr::write_parts(desk.path(name), (2, 2), &parts).expect("an EXR");
+    }
+    let told = desk.ok(&["diff", "a.exr", "b.exr"]);
+    for name in ["a.exr", "b.exr"] {
+        let line = format!("{name}: of 2 parts \"beauty\" alone was compared, not depth");
+        assert!(told.contains(&line), "{told}");
+    }
 }
 
 #[test]

@@ -229,6 +229,22 @@ fn classes_are_called_by_name_wherever_eval_runs_or_it_says_why_not() {
 }
 
 #[test]
+fn quiet_leaves_the_notes_that_strict_fails_for() {
+    let desk = Desk::with_labels();
+    desk.write(
+        "set/data.yaml",
+        "train: images/train\nval: images/val\nnc: 3\nnames: [cap, none, lid]\n",
+    );
+    let output = desk.run(&["-q", "dataset", "check", "set", "--strict"]);
+    let said = text(&output.stdout);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("set: class \"lid\" has no label in train ["),
+        "{said}"
+    );
+}
+
+#[test]
 fn quiet_leaves_the_answer() {
     let desk = Desk::with_labels();
     let said = |args: &[&str]| {

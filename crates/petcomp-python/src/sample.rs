@@ -162,9 +162,24 @@ impl Facts {
 
     fn ids(&self) -> Image<u32> {
         let [width, height] = self.size;
+        if self.deep.width() == 0 {
+            return self.ids_of_masks();
+        }
         Image::from_fn(width, height, |x, y| {
             composite::front(self.samples(x, y)).map_or(0, |sample| sample.object.0)
         })
+    }
+
+    /// Of a picture that was made in another way: nothing but their order tells which is in front.
+    fn ids_of_masks(&self) -> Image<u32> {
+        let [width, height] = self.size;
+        let mut ids = Image::new(width, height);
+        for object in &self.labels.objects {
+            for (x, y) in object.visible_mask.pixels() {
+                ids[(x as usize, y as usize)] = object.id.0;
+            }
+        }
+        ids
     }
 
     /// None for a picture that was made in another way.

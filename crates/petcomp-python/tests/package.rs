@@ -9,3 +9,12 @@ fn versions_agree() {
     let package = include_str!("../python/petcomp/__init__.py");
     assert!(package.contains(&format!("\n__version__ = \"{version}\"\n")));
 }
+
+/// What an extension of cargo's has, but for OpenImageIO.
+#[test]
+fn the_wheel_has_markers_and_the_studio() {
+    let project = include_str!("../pyproject.toml");
+    assert!(project.contains("\nfeatures = [\"markers\", \"studio\"]\n"));
+    let package = include_str!("../Cargo.toml");
+    assert!(package.contains("\ndefault = [\"markers\", \"oiio\", \"studio\"]\n"));
+}

@@ -315,6 +315,8 @@ def test_the_program_is_inside():
         [sys.executable, "-m", "petcomp", "asset", "list", "/nowhere"], capture_output=True, text=True
     )
     assert done.returncode == 4 and done.stderr.startswith("error: ")
+    done = subprocess.run([sys.executable, "-m", "petcomp", "studio", "--help"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_threads_are_set():

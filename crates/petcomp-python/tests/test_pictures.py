@@ -211,6 +211,14 @@ def test_a_shot_is_rendered_and_labelled():
     assert sample.scene is None and "Sample(64 x 48, 1 labels)" == repr(sample)
 
 
+def test_ids_of_masks_are_those_of_the_last_one_there():
+    masks = np.zeros((2, 3, 4), bool)
+    masks[0, :2, :3] = masks[1, 1:, 1:] = True
+    sample = petcomp.Sample.from_masks(np.zeros((3, 4, 3), np.uint8), list(masks), [0, 0], ["a"])
+    assert sample.ids.tolist() == [[1, 1, 1, 0], [1, 2, 2, 2], [0, 2, 2, 2]]
+    assert np.isinf(sample.depth).all()
+
+
 def test_a_card_above_covers_the_one_below():
     two = shot().with_card(
         petcomp.Card(id=2, texture=np.full((4, 4, 3), 200, np.uint8), size=(0.2, 0.1), position=(0, 0, 0.1))

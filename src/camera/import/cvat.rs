@@ -31,7 +31,7 @@ fn annotation(image: Node<'_, '_>) -> Result<Annotation> {
     let (width, height) = (side_px(image, "width")?, side_px(image, "height")?);
     let name = image.attribute("name").unwrap_or_default();
     Ok(Annotation {
-        files: vec![name.replace('\\', "/")],
+        pictures: vec![vec![name.replace('\\', "/")]],
         size: Some([width, height]),
         shapes: shapes(image)?,
         source: PROGRAM,
@@ -137,8 +137,8 @@ mod tests {
     fn pictures_with_a_polygon_are_labels() {
         let annotation = only(XML);
         assert_eq!(
-            (annotation.size, annotation.files.as_slice()),
-            (Some([200, 100]), &["bg0.jpg".to_owned()][..])
+            (annotation.size, annotation.pictures.as_slice()),
+            (Some([200, 100]), &[vec!["bg0.jpg".to_owned()]][..])
         );
         let label = annotation.label().unwrap();
         assert_eq!(

@@ -1,10 +1,13 @@
 //! Label Studio: the exports JSON (tasks with annotations and results) and JSON-MIN (tasks with
 //! their results beside each other). Positions are in percent of the picture.
 
-use super::{AnnotatedShape, Annotation, ShapeKind, turned_about, with_shapes};
+use super::{AnnotatedShape, Annotation, PictureNames, ShapeKind, turned_about, with_shapes};
 use crate::error::{Error, Result};
+use crate::io::Format;
 use serde::Deserialize;
 use serde_json::Value;
+use std::collections::BTreeSet;
+use std::path::Path;
 
 /// The source of surfaces that were drawn in it.
 pub(super) const PROGRAM: &str = "label-studio";
@@ -69,17 +72,23 @@ fn annotation(task: &Value) -> Result<Annotation> {
         None => results_beside(task),
     };
     let mut annotation = Annotation {
-        files: picture_names(task),
         source: PROGRAM,
         ..Default::default()
     };
-    for (i, result) in results.iter().enumerate().filter(|(_, r)| has_size(r)) {
+    let mut tags = Vec::new();
+    for (i, value) in results.iter().enumerate().filter(|(_, r)| has_size(r)) {
         let in_result = |e: String| Error::value(format!("result[{i}]"), e);
-        let result = read_result(result).map_err(in_result)?;
+        let result = read_result(value).map_err(in_result)?;
         annotation.set_size(&result).map_err(in_result)?;
         if let Some(shape) = result.shape() {
             annotation.add_region(shape);
+            tags.extend(value.get("to_name").and_then(Value::as_str));
         }
+    }
+    annotation.pictures = pictures(task, &tags);
+    if annotation.pictures.is_empty() && !annotation.shapes.is_empty() {
+        let what = "no name of a picture, expected an address that ends in .jpg, .png, ..";
+        return Err(Error::value("data", what));
     }
     Ok(annotation)
 }
@@ -225,38 +234,53 @@ fn turned_about_corner([x, y]: [f64; 2], [w, h]: [f64; 2], degrees: f64) -> Vec<
         .into()
 }
 
-/// Endings of pictures.
-const PICTURE_ENDINGS: [&str; 8] = [
-    ".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp", ".webp", ".exr",
-];
+/// Pictures that Label Studio shows and petcomp does not read.
+const UNREAD_ENDINGS: [&str; 2] = [".bmp", ".webp"];
 
-/// Names that a task's picture may have, the most likely first.
-fn picture_names(task: &Value) -> Vec<String> {
+/// The pictures of a task that shapes may be on: the field of the name that their tag has, or else
+/// the uploaded file, or else any field, as a tag may have another name than its field.
+fn pictures(task: &Value, tags: &[&str]) -> Vec<PictureNames> {
     let data = task.get("data").unwrap_or(task);
-    member_values(data)
-        .chain(task.get("file_upload"))
-        .filter_map(|value| picture_name(value.as_str()?))
-        .flat_map(with_original_name)
-        .collect()
+    let named = tags.iter().filter_map(|tag| data.get(*tag));
+    let choices = [
+        pictures_at(named),
+        pictures_at(task.get("file_upload")),
+        pictures_at(member_values(data)),
+    ];
+    let first = choices.into_iter().find(|choice| !choice.is_empty());
+    first.into_iter().flatten().collect()
+}
+
+fn pictures_at<'a>(addresses: impl IntoIterator<Item = &'a Value>) -> BTreeSet<PictureNames> {
+    let addresses = addresses.into_iter().filter_map(Value::as_str);
+    let names = addresses.filter_map(picture_name);
+    names.map(with_original_name).collect()
 }
 
 /// A name, and the one that the file may have had before it was uploaded.
-fn with_original_name(name: String) -> impl Iterator<Item = String> {
+fn with_original_name(name: String) -> PictureNames {
     let original = without_upload_prefix(&name).map(str::to_owned);
-    [Some(name), original].into_iter().flatten()
+    [Some(name), original].into_iter().flatten().collect()
 }
 
-/// The name of the picture at an address.
+/// The name of the picture at an address: in its query, or in front of `?` or `#`, which may also
+/// belong to the name.
 fn picture_name(address: &str) -> Option<String> {
-    // In the query, where there is one.
-    let path = address.rsplit_once("?d=").map_or(address, |(_, path)| path);
+    let in_query = address.rsplit_once("?d=").map(|(_, path)| path);
+    let in_front = address.split(['?', '#']).next();
+    let mut paths = [in_query, in_front, Some(address)].into_iter().flatten();
+    paths.find_map(last_step_if_picture)
+}
+
+fn last_step_if_picture(path: &str) -> Option<String> {
     let name = decoded(path.rsplit(['/', '\\']).next()?);
     is_picture(&name).then_some(name)
 }
 
 fn is_picture(name: &str) -> bool {
-    let name = name.to_lowercase();
-    PICTURE_ENDINGS.iter().any(|end| name.ends_with(end))
+    let lower = name.to_lowercase();
+    Format::from_extension(Path::new(name)).is_some()
+        || UNREAD_ENDINGS.iter().any(|end| lower.ends_with(end))
 }
 
 /// The name that a file had before it was uploaded.
@@ -310,11 +334,7 @@ mod tests {
     fn percent_become_pixels_and_the_added_name_is_known() {
         let annotation = only(JSON);
         assert_eq!(annotation.size, Some([200, 100]));
-        assert!(
-            annotation.files.contains(&"bg_1.jpg".into()),
-            "{:?}",
-            annotation.files
-        );
+        assert_eq!(annotation.pictures, [["0123abcd-bg_1.jpg", "bg_1.jpg"]]);
         let label = annotation.label().unwrap();
         assert_eq!(
             label.surface.corners_px,
@@ -326,7 +346,7 @@ mod tests {
     #[test]
     fn the_short_export_is_read_too() {
         let annotation = only(MIN);
-        assert_eq!(annotation.files, ["my bg.jpg"]);
+        assert_eq!(annotation.pictures, [["my bg.jpg"]]);
         let corners = annotation.label().unwrap().surface.corners_px;
         assert_eq!(
             corners,
@@ -422,6 +442,45 @@ mod tests {
                 .to_string()
                 .contains("image_rotation: 90")
         );
+    }
+
+    /// The pictures of a task with other data.
+    fn pictures_of(data: &str) -> Vec<PictureNames> {
+        let (before, _) = JSON.split_once("\"file_upload\"").unwrap();
+        let named = before.replace("\"type\": \"polygonlabels\"", "\"to_name\": \"image\"");
+        only(&format!("{named}{data}}}]")).pictures
+    }
+
+    #[test]
+    fn the_tag_and_the_upload_tell_which_picture_it_is() {
+        let data = r#""data": {"image": "/x/b.jpg", "before": "/x/a.jpg"}"#;
+        assert_eq!(pictures_of(data), [["b.jpg"]]);
+        let other = data.replace("image", "photo");
+        assert_eq!(pictures_of(&other), [["a.jpg"], ["b.jpg"]]);
+        let uploaded = format!(r#""file_upload": "b.jpg", {other}"#);
+        assert_eq!(pictures_of(&uploaded), [["b.jpg"]]);
+    }
+
+    #[test]
+    fn signed_addresses_and_every_format_have_names() {
+        for (address, name) in [
+            ("https://x.org/b/a.jpg?X-Amz-Signature=0f&n=1/2", "a.jpg"),
+            ("https://x.org/a.HEIC#top", "a.HEIC"),
+            ("/data/local-files/?d=b/a.tif", "a.tif"),
+            ("s3://b/bg #1.png", "bg #1.png"),
+            ("/data/a.webp", "a.webp"),
+        ] {
+            assert_eq!(picture_name(address).as_deref(), Some(name), "{address}");
+        }
+    }
+
+    #[test]
+    fn a_task_whose_picture_has_no_name_is_named() {
+        let text = JSON.replace(".jpg", ".pdf");
+        let told = super::super::annotations(&text).unwrap_err().to_string();
+        let expected =
+            "[0].data: no name of a picture, expected an address that ends in .jpg, .png, ..";
+        assert_eq!(told, expected);
     }
 
     #[test]

@@ -39,7 +39,7 @@ pub(super) fn annotation(value: Value) -> Result<Annotation> {
     let file: LabelMe = serde_path_to_error::deserialize(value)
         .map_err(|e| Error::value(e.path().to_string(), e.inner()))?;
     Ok(Annotation {
-        files: vec![file.image_path.replace('\\', "/")],
+        pictures: vec![vec![file.image_path.replace('\\', "/")]],
         size: file.image_width.zip(file.image_height).map(|(w, h)| [w, h]),
         shapes: file.shapes.into_iter().map(shape).collect(),
         source: PROGRAM,

@@ -16,14 +16,18 @@ use serde_json::Value;
 /// What a program recorded for a picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Annotation {
-    /// Names that its file may have, the most likely first; the program may have added something.
-    pub(crate) files: Vec<String>,
+    /// The picture; several where the program does not say on which of them the shapes are.
+    pub(crate) pictures: Vec<PictureNames>,
     /// Width and height, pixels; none where the program does not record them.
     pub(crate) size: Option<[u32; 2]>,
     pub(crate) shapes: Vec<AnnotatedShape>,
     /// Which program.
     pub(crate) source: &'static str,
 }
+
+/// Names that a picture's file may have, the most likely first; the program may have added
+/// something.
+pub(crate) type PictureNames = Vec<String>;
 
 /// Something drawn on a picture, with pixels as ours: 0 is the picture's edge.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,7 +88,8 @@ impl Annotation {
             name = UNNAMED.into();
         }
         let mut label = Label::new(self.size.unwrap_or_default(), corners_px, [1.0; 2]);
-        label.image.file = self.files.first().cloned().unwrap_or_default();
+        let mut names = self.pictures.iter().flatten();
+        label.image.file = names.next().cloned().unwrap_or_default();
         label.surface = LabelSurface {
             id: name,
             corners_px: Some(corners_px),

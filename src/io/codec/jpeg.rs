@@ -171,11 +171,14 @@ fn check_complete(bytes: &[u8]) -> Result<(), Refusal> {
     }
 }
 
-/// Decodes a complete file; decoders return a half-grey picture for one that was cut, so that is
-/// looked at first.
+/// Decodes a complete file; decoders, also those of other kinds, return a half-grey picture for one
+/// that was cut, so that is looked at first.
 pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
-    read_before_scan(&mut &bytes[..], limits)?;
-    check_complete(bytes)?;
+    let start = read_before_scan(&mut &bytes[..], limits);
+    if !matches!(start, Err(Refusal::Broken(_))) {
+        check_complete(bytes)?;
+    }
+    start?;
     let decoder = open(bytes, bytes.len() as u64, limits)?;
     let (width, height) = decoder.dimensions();
     let size = (width as usize, height as usize);
@@ -340,9 +343,27 @@ mod tests {
     }
 
     fn sampled_frame(marker: u8, bits: u8, factors: u8) -> Result<Vec<u8>, Refusal> {
+        let file = sampled_file(marker, bits, factors);
+        read_before_scan(&mut file.as_slice(), &Limits::default())
+    }
+
+    fn sampled_file(marker: u8, bits: u8, factors: u8) -> Vec<u8> {
         let frame = [marker, 0, 11, bits, 0, 1, 0, 1, 1, 1, factors, 0];
-        let file = [b"\xff\xd8\xff".as_slice(), &frame, b"\xff\xda\0\x02"];
-        read_before_scan(&mut file.concat().as_slice(), &Limits::default())
+        [b"\xff\xd8\xff".as_slice(), &frame, b"\xff\xda\0\x02"].concat()
+    }
+
+    #[test]
+    fn a_cut_file_is_not_left_to_another_decoder() {
+        for (marker, factors) in [(0xc9, 0x11), (0xc0, 0x31)] {
+            let cut = [sampled_file(marker, 8, factors), vec![0x12, 0x34]].concat();
+            let whole = [cut.as_slice(), b"\xff\xd9"].concat();
+            let refusal = |file: &[u8]| decode(file, &Limits::default()).err().unwrap();
+            assert!(matches!(refusal(&whole), Refusal::Unsupported(_)));
+            match refusal(&cut) {
+                Refusal::Broken(told) => assert_eq!(told, "truncated JPEG (no end marker)"),
+                other => panic!("{other}"),
+            }
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::io::format::Format;
 use crate::io::header::{Header, Notes, note};
 use crate::io::limits::{Demand, Limits};
 use crate::quality::Quality;
-use png::{BitDepth, ColorType, Compression, Transformations};
+use png::{BitDepth, CodingIndependentCodePoints, ColorType, Compression, Transformations};
 use std::io::{BufRead, Cursor, ErrorKind, Seek};
 
 impl From<png::DecodingError> for Refusal {
@@ -84,12 +84,10 @@ fn texts(info: &png::Info<'_>) -> Notes {
 pub(crate) fn color_description(bytes: &[u8], limits: &Limits) -> Option<ColorDescription> {
     let reader = open(Cursor::new(bytes), bytes.len() as u64, limits).ok()?;
     let info = reader.info();
-    if let Some(cicp) = info.coding_independent_code_points {
-        let (primaries, transfer) = (cicp.color_primaries, cicp.transfer_function);
-        let is_known = known_code_points(primaries, transfer).is_some();
-        if is_known || info.icc_profile.is_none() {
-            return Some(ColorDescription::CodePoints(primaries, transfer));
-        }
+    if let Some(cicp) = info.coding_independent_code_points
+        && (are_applied(cicp) || info.icc_profile.is_none())
+    {
+        return Some(described_code_points(cicp));
     }
     if let Some(icc) = &info.icc_profile {
         return Some(ColorDescription::Icc(icc.to_vec()));
@@ -97,6 +95,19 @@ pub(crate) fn color_description(bytes: &[u8], limits: &Limits) -> Option<ColorDe
     match info.srgb {
         Some(_) => None,
         None => described_curve(info),
+    }
+}
+
+fn are_applied(cicp: CodingIndependentCodePoints) -> bool {
+    let known = known_code_points(cicp.color_primaries, cicp.transfer_function);
+    cicp.is_video_full_range_image && known.is_some()
+}
+
+fn described_code_points(cicp: CodingIndependentCodePoints) -> ColorDescription {
+    let (primaries, transfer) = (cicp.color_primaries, cicp.transfer_function);
+    match cicp.is_video_full_range_image {
+        true => ColorDescription::CodePoints(primaries, transfer),
+        false => ColorDescription::NarrowCodePoints(primaries, transfer),
     }
 }
 
@@ -309,6 +320,21 @@ mod tests {
             let chunk = [primaries, transfer, 0, 1];
             assert_eq!(described(icc, png::chunk::cICP, &chunk), Some(expected));
         }
+    }
+
+    #[test]
+    fn code_points_of_narrow_range_are_not_applied() {
+        let chunk = [12, 13, 0, 0];
+        let narrow = described(b"", png::chunk::cICP, &chunk).unwrap();
+        assert_eq!(narrow, ColorDescription::NarrowCodePoints(12, 13));
+        let told = DisplayProfile::from_description(narrow).unwrap_err();
+        assert!(
+            told.ends_with("narrow range, taken as full range"),
+            "{told}"
+        );
+        let profile = ColorDescription::Icc(b"a profile".to_vec());
+        let beside = described(b"a profile", png::chunk::cICP, &chunk);
+        assert_eq!(beside, Some(profile));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::io::format::Format;
 use crate::io::header::{Header, lines_of_notes, notes_of_lines};
 use crate::io::limits::{Demand, Limits};
 use std::collections::BTreeMap;
-use std::io::{BufRead, Cursor, Read, Seek};
+use std::io::{BufRead, Cursor, ErrorKind, Read, Seek};
 use std::ops::Range;
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::encoder::colortype::{self, Gray8, Gray16, Gray32Float, RGB8, RGB16, RGB32Float};
@@ -48,15 +48,22 @@ impl From<TiffError> for Refusal {
     fn from(e: TiffError) -> Self {
         match e {
             TiffError::UnsupportedError(e) => unsupported(&e),
-            TiffError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
-                Self::Broken("truncated TIFF".into())
-            }
+            e if is_early_end(&e) => truncated(),
             e => Self::Broken(format!(
                 "damaged TIFF: {}",
                 e.to_string().trim_start_matches("format error: ")
             )),
         }
     }
+}
+
+/// Bytes are missing.
+fn is_early_end(e: &TiffError) -> bool {
+    matches!(e, TiffError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof)
+}
+
+fn truncated() -> Refusal {
+    Refusal::Broken("truncated TIFF".into())
 }
 
 fn unsupported(what: &dyn std::fmt::Display) -> Refusal {
@@ -367,8 +374,33 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     match decode_known(bytes, limits) {
         // OpenImageIO would read its bits as bytes.
         Err(Refusal::Unsupported(what)) if !states_bits(bytes) => Err(Refusal::Broken(what)),
+        // OpenImageIO would fill up what is missing of some kinds.
+        Err(Refusal::Unsupported(_)) if is_cut(bytes, limits) => Err(truncated()),
         decoded => decoded,
     }
+}
+
+/// The file ends before a strip or tile of its first picture does.
+fn is_cut(bytes: &[u8], limits: &Limits) -> bool {
+    let Ok(decoder) = Decoder::new(Cursor::new(bytes)) else {
+        return false;
+    };
+    let mut decoder = decoder.with_limits(metadata_limits(limits));
+    let lists = [
+        [Tag::StripOffsets, Tag::StripByteCounts],
+        [Tag::TileOffsets, Tag::TileByteCounts],
+    ];
+    lists.into_iter().any(|tags| {
+        let [places, lengths] = tags.map(|tag| long_integers(&mut decoder, tag));
+        let mut chunks = places.iter().zip(lengths);
+        chunks.any(|(place, length)| place.saturating_add(length) > bytes.len() as u64)
+    })
+}
+
+/// The numbers of a tag; none where it is not there or cannot be read.
+fn long_integers(decoder: &mut Decoder<impl Read + Seek>, tag: Tag) -> Vec<u64> {
+    let integers = decoder.find_tag_unsigned_vec(tag);
+    integers.ok().flatten().unwrap_or_default()
 }
 
 /// The file says how many bits a sample has; where it does not, it is one.
@@ -400,7 +432,7 @@ fn decode_known(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
 /// Codes from the lowest bit up, as before 1990: such data begins with the clear code (TIFF 6.0,
 /// section 13).
 fn refuse_old_lzw(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> Result<(), Refusal> {
-    if decoder.find_tag_unsigned(Tag::Compression)? != Some(LZW_COMPRESSION) {
+    if !is_lzw(decoder)? {
         return Ok(());
     }
     let strips = decoder.find_tag_unsigned_vec::<u64>(Tag::StripOffsets)?;
@@ -410,6 +442,10 @@ fn refuse_old_lzw(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> Resu
         Some(&[0, second]) if second & 1 == 1 => Err(unsupported(&"old LZW")),
         _ => Ok(()),
     }
+}
+
+fn is_lzw(decoder: &mut Decoder<impl Read + Seek>) -> Result<bool, TiffError> {
+    Ok(decoder.find_tag_unsigned(Tag::Compression)? == Some(LZW_COMPRESSION))
 }
 
 /// Where the strips or tiles of a picture lie, and what each of them holds.
@@ -555,7 +591,13 @@ fn read_chunk(
     index: usize,
 ) -> Result<(Samples, [usize; 2]), Refusal> {
     let number = u32::try_from(index).map_err(|_| "damaged TIFF: strips without number")?;
-    let chunk = known_samples(decoder.read_chunk(number)?);
+    let decoded = decoder.read_chunk(number);
+    // Where it decodes row by row, as of tiles that reach over the border, it takes the last codes
+    // for missing (weezl 0.1.12).
+    if decoded.as_ref().is_err_and(is_early_end) && is_lzw(decoder)? {
+        return Err(unsupported(&"LZW whose end is not found"));
+    }
+    let chunk = known_samples(decoded?);
     let (columns, rows) = decoder.chunk_data_dimensions(number);
     Ok((chunk, [columns as usize, rows as usize]))
 }
@@ -737,6 +779,45 @@ mod tests {
         image.encoder().write_tag(tag, value).unwrap();
         image.write_data(&[7; 4]).unwrap();
         file.into_inner()
+    }
+
+    /// A grey picture of 2 x 2 pixels, with the directory in front of its only strip.
+    fn with_strip(compression: u16, strip: &[u8]) -> Vec<u8> {
+        let entries = [
+            (Tag::ImageWidth, 2),
+            (Tag::ImageLength, 2),
+            (Tag::BitsPerSample, 8),
+            (Tag::Compression, u32::from(compression)),
+            (Tag::PhotometricInterpretation, 1),
+            (Tag::StripOffsets, 98),
+            (Tag::StripByteCounts, strip.len() as u32),
+        ];
+        let mut file = b"II*\0\x08\0\0\0\x07\0".to_vec();
+        for (tag, value) in entries {
+            file.extend(tag.to_u16().to_le_bytes());
+            file.extend(b"\x04\0\x01\0\0\0");
+            file.extend(u32::to_le_bytes(value));
+        }
+        file.extend([0; 4]);
+        file.extend(strip);
+        file
+    }
+
+    #[test]
+    fn a_cut_file_is_not_left_to_another_decoder() {
+        const LZMA_COMPRESSION: u16 = 34_925;
+        // The codes 256 (begin) and 7, nine bits each: the others are not there.
+        let codes = [0x80, 0x01, 0xc0];
+        for compression in [LZMA_COMPRESSION, LZW_COMPRESSION] {
+            let whole = with_strip(compression, &codes);
+            let refusal = |file: &[u8]| decode(file, &Limits::default()).err().unwrap();
+            let left = refusal(&whole);
+            assert!(matches!(left, Refusal::Unsupported(_)), "{left}");
+            match refusal(&whole[..whole.len() - 1]) {
+                Refusal::Broken(told) => assert_eq!(told, "truncated TIFF"),
+                other => panic!("{compression}: {other}"),
+            }
+        }
     }
 
     #[test]

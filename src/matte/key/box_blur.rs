@@ -270,7 +270,8 @@ fn mean_of_rows(out: &mut [f32], rows: &[&[f32]], first: usize, inside: &[f32]) 
     }
 }
 
-/// Adds up weighted rows from a first column on: the centre, then two at each distance.
+/// Adds up weighted rows from a first column on: 0, the centre, then two at each distance. The 0 is
+/// Blender's, and makes 0 of -0.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
@@ -282,7 +283,7 @@ fn weighted_sum(out: &mut [f32], rows: &[&[f32]], first: usize, weights: &[f32])
     let done = groups.len() * SUMMED_COLUMNS;
     for (out, start) in groups.iter_mut().zip((first..).step_by(SUMMED_COLUMNS)) {
         let mut sums = *columns_at(rows[0], start);
-        (0..SUMMED_COLUMNS).for_each(|k| sums[k] *= weights[0]);
+        (0..SUMMED_COLUMNS).for_each(|k| sums[k] = 0.0 + sums[k] * weights[0]);
         for (pair, w) in pairs.iter().zip(&weights[1..]) {
             let [a, b] = pair.map(|row| columns_at(row, start));
             (0..SUMMED_COLUMNS).for_each(|k| sums[k] = sums[k] + w * a[k] + w * b[k]);
@@ -291,7 +292,7 @@ fn weighted_sum(out: &mut [f32], rows: &[&[f32]], first: usize, weights: &[f32])
     }
     for (x, out) in (first + done..).zip(rest) {
         let taps = pairs.iter().zip(&weights[1..]);
-        *out = taps.fold(weights[0] * rows[0][x], |sum, ([a, b], w)| {
+        *out = taps.fold(0.0 + weights[0] * rows[0][x], |sum, ([a, b], w)| {
             sum + w * a[x] + w * b[x]
         });
     }

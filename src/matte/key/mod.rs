@@ -43,7 +43,8 @@
 //! the border (cut off up to 4.3, repeated from 4.4 on), in the sizes of the blur and edge windows, and in the disc (up
 //! to 4.3 its left and bottom tip are missing). The fourth, `robust`, is 3.4 with a full disc and a final matte within 0
 //! to 1; it takes pixels that are no numbers for transparent ones of matte 0, refuses keys too grey to work, levels in the
-//! wrong order, and fills holes in plates. What it changed it counts: [`Deviations`].
+//! wrong order, fills holes in plates, and keys all of a plate by the primary channel of its mean. What it changed it
+//! counts: [`Deviations`].
 //!
 //! # What to watch
 //!
@@ -200,7 +201,7 @@ impl<'a, P: Photo> Keying<'a, P> {
     ///
     /// # Errors
     /// [`Error::Value`] for a setting out of range, a picture of another size than the photo's, a screen colour that is
-    /// not finite, and in the `robust` profile for a key that cannot work.
+    /// not finite or as bright as 8-bit codes are, and in the `robust` profile for a key that cannot work.
     pub fn run(&self, options: &KeyOptions) -> Result<Keyed> {
         let mut keyed = Keyed::default();
         self.run_into(options, &mut keyed)?;
@@ -281,7 +282,7 @@ impl<'a, P: Photo> Keying<'a, P> {
         self.check_size("core", self.core.map(Image::size))?;
         match self.screen {
             Screen::Color(c) => {
-                check_finite(c)?;
+                check_screen(c)?;
                 robust::check_color(c, options)
             }
             Screen::Plate(plate) => self.check_size("plate", Some(plate.size())),
@@ -294,12 +295,24 @@ impl<'a, P: Photo> Keying<'a, P> {
     }
 }
 
-fn check_finite(screen: LinearRgb) -> Result<()> {
-    if screen.is_finite() {
-        return Ok(());
+/// Four stops over white: no screen is brighter.
+const MAX_CHANNEL: f32 = 16.0;
+
+/// What was expected of a colour that is none of a screen; nothing where it is one.
+#[doc(hidden)]
+pub fn expected_of_screen(screen: LinearRgb) -> Option<&'static str> {
+    if !screen.is_finite() {
+        return Some("expected finite numbers");
     }
-    let what = format!("{:?}, expected finite numbers", screen.channels());
-    Err(Error::value("screen", what))
+    let is_too_bright = screen.channels().iter().any(|&value| value > MAX_CHANNEL);
+    is_too_bright.then_some("expected scene-linear values, white is 1; are these 8-bit codes?")
+}
+
+fn check_screen(screen: LinearRgb) -> Result<()> {
+    expected_of_screen(screen).map_or(Ok(()), |expected| {
+        let what = format!("{:?}, {expected}", screen.channels());
+        Err(Error::value("screen", what))
+    })
 }
 
 impl std::fmt::Display for Deviations {

@@ -93,9 +93,11 @@ impl<'a, P: Photo> Stream<'a, P> {
             self.compute_band(plane, first, matte, cutout);
             robust::count_unusable(&self.keying, self.options, first..first + count)
         });
+        // Nothing is computed, and nothing clamped, before the sum.
+        let unusable: Deviations = seen.sum();
         Deviations {
             clamped: self.clamped.load(Ordering::Relaxed),
-            ..seen.sum()
+            ..unusable
         }
     }
 

@@ -356,6 +356,12 @@ fn what_cannot_be_keyed_is_refused_by_name() {
         message(Keying::new(&photo, nan)),
         "screen: [NaN, 0.0, 0.0], expected finite numbers"
     );
+    let codes = Screen::Color(LinearRgb::new(20.0, 200.0, 40.0));
+    assert_eq!(
+        message(Keying::new(&photo, codes)),
+        "screen: [20.0, 200.0, 40.0], expected scene-linear values, white is 1; \
+         are these 8-bit codes?"
+    );
 }
 
 #[test]
@@ -391,4 +397,27 @@ fn pixels_that_are_no_numbers_are_background_to_the_robust_profile() {
             assert_eq!(keyed.cutout[(2, 0)], PremulRgba::TRANSPARENT);
         }
     }
+}
+
+#[test]
+fn what_the_robust_profile_clamps_is_counted() {
+    let photo = Image::filled(4, 3, GREEN);
+    let core = Image::filled(4, 3, Coverage(1.7));
+    let job = Keying::new(&photo, Screen::Color(GREEN)).with_core(&core);
+    let keyed = job.run(&KeyOptions::for_profile(Profile::Robust)).unwrap();
+    assert_eq!(keyed.deviations.clamped, 12);
+    assert!(keyed.matte.pixels().iter().all(|m| m.0 == 1.0));
+}
+
+#[test]
+fn a_blur_of_nothing_is_no_negative_zero_in_blender_4_5() {
+    let photo = Image::filled(4, 3, LinearRgb::new(0.6, 0.5, 0.4));
+    let options = KeyOptions {
+        clip_black: 1.0,
+        clip_white: 0.3,
+        blur_post: 4,
+        ..KeyOptions::for_profile(LATE)
+    };
+    let matte = key(&photo, GREEN, &options).matte;
+    assert!(matte.pixels().iter().all(|m| m.0.to_bits() == 0));
 }

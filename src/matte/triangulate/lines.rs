@@ -78,7 +78,7 @@ impl PixelLines {
     }
 }
 
-/// Standard deviation of an unknown transmittance.
+/// Standard deviation of an unknown transmittance or gain.
 const UNKNOWN_SIGMA: f32 = 1e3;
 /// Standard deviation of a transmittance inferred from other channels around what it is.
 const INFERRED_SIGMA: f32 = 0.06;
@@ -205,7 +205,7 @@ impl Inferred {
         inside: &Image<Coverage>,
         channel: usize,
     ) -> (f32, f32) {
-        let (mut top, mut bottom, mut levers) = (0.0, f64::MIN_POSITIVE, Vec::new());
+        let (mut top, mut bottom, mut levers) = (0.0, 0.0_f64, Vec::new());
         for pixel in covered_pixels(pixels, inside) {
             let (measured, expected) = self.measured_and_expected(pixel, channel);
             let weight = 1.0 / f64::from(pixel.sigma(channel)).powi(2);
@@ -213,6 +213,8 @@ impl Inferred {
             bottom += weight * expected * expected;
             levers.push(pixel.lines[channel].lever());
         }
+        // Where no plastic lets light through, nothing is measured, and the prior holds.
+        let bottom = bottom.max(f64::from(UNKNOWN_SIGMA).powi(-2));
         let gain = (top / bottom) as f32;
         let off = PLATE_ERROR * median_lever(levers) * gain.max(1.0);
         (gain, (1.0 / bottom) as f32 + off * off)

@@ -116,6 +116,18 @@ fn a_channel_in_which_the_plates_hardly_differ_follows_from_the_others() {
 }
 
 #[test]
+fn an_object_that_lets_nothing_through_is_opaque() {
+    let (mask, paint) = (inside(), LinearRgb::grey(0.3));
+    let screens = [GREEN, BLUE];
+    let photos = screens.map(|k| mask.map(|c| if c.0 > 0.5 { paint } else { k }));
+    let found = of_photos(&photos, &even_plates(&screens)).unwrap();
+    assert_eq!(found.determined, [false, true, true]);
+    for film in lines::covered_pixels(&found.film, &mask) {
+        assert_eq!((film.color, film.opacity), (paint, LinearRgb::WHITE));
+    }
+}
+
+#[test]
 fn a_clipped_screen_is_told_with_its_photo() {
     let clipped = |second| {
         let found = solved(&[GREEN, second], [0.0; 2], 0.0).unwrap();
@@ -269,6 +281,19 @@ fn a_coverage_that_is_none_and_an_option_out_of_range_are_refused() {
         refused(&inside(), options),
         "least_agreement: 7, expected 0 to 1"
     );
+}
+
+#[test]
+fn a_mask_that_is_empty_is_told_as_that() {
+    let photos = [GREEN, BLUE].map(|k| photo(k, [0.0; 2], 0.0, 1));
+    let plates = even_plates(&[GREEN, BLUE]);
+    let shots: Vec<_> = photos.iter().zip(&plates).collect();
+    for most in [0.0, 0.5] {
+        let mask = inside().map(|c| Coverage(most * c.0));
+        let refusal = triangulate(&shots, &mask, &TriangulateOptions::default()).unwrap_err();
+        let said = refusal.to_string();
+        assert!(said.contains("the mask of the object is empty"), "{said}");
+    }
 }
 
 #[test]

@@ -7,7 +7,7 @@
 Views are drawn of a tray of 0.56 x 0.37 m by a camera of known focal length, tilted by 5 to 65 degrees; each corner is half
 a pixel off (standard deviation). Error: how far from its true place on the tray a pixel is put, of 25 pixels of each view,
 root of the mean square. Seconds are those of one solution in memory: petcomp's (library.rs) with its standard deviations
-and doubts, OpenCV's called from Python, which costs it some microseconds. `findHomography` knows no focal length.
+and warnings, OpenCV's called from Python, which costs it some microseconds. `findHomography` knows no focal length.
 """
 
 import json

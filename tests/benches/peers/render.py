@@ -6,7 +6,7 @@
     target/release/petcomp-report render SCENE --size W H --cycles FOLDER/render    (the same points as a chart of its own)
 
 The scene is a file of golden/render/scene_reference.py: one of golden/render, or one that
-`petcomp scene export SCENE --to cycles DIR` wrote. Seconds are those of the rendering alone, without start, files and
+`petcomp scene export SCENE RECIPE --to cycles DIR` wrote. Seconds are those of the rendering alone, without start, files and
 textures' pyramids, as each program tells its own processor time. Error: `petcomp-report render` measures both programs'
 against the picture of the largest count, which has seeds of its own and is kept for the next run. FOLDER/render gets Cycles'
 pictures (spp_00016.exr) and times.json.

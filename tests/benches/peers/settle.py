@@ -8,7 +8,7 @@ Three heaps each of 20 and of 5 cards (and of 60, `--counts 20 5 60`, which take
 settle --peers` draws and settles. Bullet gets the same boxes, masses, friction, damping, walls and starts, in three
 settings: its own defaults; petcomp's step and the scale that is recommended for small bodies (lengths times ten, gravity
 too); and that with a larger solver effort. It stops as petcomp does: all bodies slower than 1 cm/s and 0.5 rad/s for
-0.2 s, or after 10 s. Seconds are those of one heap in memory: petcomp's (library.rs) with the judgement of its end,
+0.1 s, or after 10 s. Seconds are those of one heap in memory: petcomp's (library.rs) with the judgement of its end,
 Bullet's with the calls from Python, two a body and step. Overlap, the deepest of three heaps, is measured for both by the
 separating-axis test below, in double precision.
 """
@@ -20,7 +20,7 @@ from side_by_side import INSIDE, Comparison, arguments, here, library, library_s
 
 TIMES = 3
 # When petcomp calls a heap at rest or gives it up, and its damping (src/settle/world).
-SLOW, SLOW_TURN, STILL, LIMIT = 0.01, 0.5, 0.2, 10.0
+SLOW, SLOW_TURN, STILL, LIMIT = 0.01, 0.5, 0.1, 10.0
 DAMPING = 0.5
 WALL = 0.5
 SETTINGS = {

@@ -16,7 +16,7 @@ pub(crate) struct InitLabelArgs {
     #[arg(long, value_name = "WxH", value_parser = parse_metres, required_unless_present = "like")]
     size: Option<[f64; 2]>,
     /// Its corners in pixels, "x,y x,y x,y x,y": top left, top right, bottom right, bottom left
-    #[arg(long, value_name = "CORNERS", value_parser = parse_corners, allow_hyphen_values = true)]
+    #[arg(long, value_name = "CORNERS", value_parser = parse_corners)]
     corners: Option<[[f64; 2]; 4]>,
     /// Label of another photo of the same rectangle: its size, its markers and its camera's name
     /// are taken over, and the markers looked for

@@ -25,7 +25,8 @@ pub(crate) enum InspectCommand {
 pub(crate) struct CheckArgs {
     /// Folder of the dataset
     folder: PathBuf,
-    /// Exit with status 1 where there is a note, too: classes without labels, very small boxes
+    /// Exit with status 1 where there are notes alone: classes with few labels or none, very small
+    /// boxes
     #[arg(long)]
     strict: bool,
 }
@@ -59,13 +60,13 @@ pub(crate) struct SheetArgs {
 
 pub(super) fn run(command: &InspectCommand, global: &GlobalArgs) -> anyhow::Result<()> {
     match command {
-        InspectCommand::Check(args) => check_dataset(args, global),
+        InspectCommand::Check(args) => check_dataset(args),
         InspectCommand::Report(args) => write_report(args, global),
         InspectCommand::Sheet(args) => write_sheet(args, global),
     }
 }
 
-fn check_dataset(args: &CheckArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+fn check_dataset(args: &CheckArgs) -> anyhow::Result<()> {
     let folder = args.folder.display();
     let checked = dataset::check(&args.folder)?;
     if checked.has_yolo {
@@ -73,7 +74,7 @@ fn check_dataset(args: &CheckArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     }
     let notes = checked.notes();
     for note in &notes {
-        global.print_status(located(&folder, note));
+        print::line(located(&folder, note));
     }
     print_findings(&checked, &args.folder)?;
     if args.strict && !notes.is_empty() {

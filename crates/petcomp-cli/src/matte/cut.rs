@@ -1,6 +1,6 @@
 //! `petcomp matte cut`: the object without its background.
 
-use super::picture_files::canvas_of;
+use super::picture_files::canvas_of_cut_out;
 use crate::diagnostics::report_diagnostics;
 use crate::documents::read_options;
 use crate::global::GlobalArgs;
@@ -13,7 +13,8 @@ use std::path::PathBuf;
 pub(crate) struct CutArgs {
     /// Photo of one object on a uniform screen or board
     photo: PathBuf,
-    /// Cut-out to write: .exr (scene-linear, premultiplied) or .png
+    /// Cut-out to write: .exr (scene-linear, premultiplied) or .png; an .exr of an .exr photo keeps
+    /// its place in the photo, unless it is reduced to the option `longest_side`
     #[arg(short, long, value_name = "PICTURE")]
     output: PathBuf,
     /// Options to use instead of the defaults, as TOML
@@ -28,7 +29,7 @@ pub(crate) fn run(args: &CutArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let photo = io::read::<LinearRgb>(&args.photo)?;
     let cut = cut_out(&photo, &options).map_err(|e| e.in_file(&args.photo))?;
     let written = WriteOptions {
-        canvas: canvas_of(&args.photo)?,
+        canvas: canvas_of_cut_out(&args.photo, photo.size(), &cut)?,
         ..WriteOptions::default()
     };
     io::write_with(&args.output, &cut.to_rgba(), &written)?;

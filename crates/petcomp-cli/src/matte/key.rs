@@ -27,9 +27,10 @@ pub(crate) struct KeyArgs {
     /// The picture to key, or the frames of a sequence; alpha is taken as premultiplied
     #[arg(required = true, value_name = "PICTURE")]
     frames: Vec<PathBuf>,
-    /// Where the premultiplied cut-out goes, an EXR with 32-bit floats; or a folder that is there
-    /// or ends in /, where it gets the frame's name with the ending .exr, as for --matte and
-    /// --edges: of several frames all three are folders
+    /// Where the cut-out goes: .exr for 32-bit floats, scene-linear, premultiplied; .png or .tif
+    /// for sRGB codes with straight alpha; or a folder that is there or ends in /, where it gets
+    /// the frame's name with the ending .exr, as for --matte and --edges: of several frames all
+    /// three are folders
     #[arg(short, long, value_name = "FILE|FOLDER")]
     output: PathBuf,
     /// Where the matte goes

@@ -160,8 +160,14 @@ fn screen_point(photo: &Image<PremulRgba>, [x, y]: [usize; 2]) -> Result<ScreenP
         x < width && y < height,
         "--point {x},{y}: outside the picture of {width} x {height} pixels"
     );
+    let color = photo[(x, y)].color();
+    anyhow::ensure!(
+        color.is_finite(),
+        "--point {x},{y}: the picture is {:?} there, expected finite numbers",
+        color.channels()
+    );
     Ok(ScreenPoint {
         at_px: Point2::new(x as f64 + 0.5, y as f64 + 0.5),
-        color: photo[(x, y)].color(),
+        color,
     })
 }

@@ -3,6 +3,7 @@
 use anyhow::Result;
 use petcomp::Image;
 use petcomp::io::{self, Bits, Canvas, Format, Header, ToFile, WriteOptions};
+use petcomp::matte::CutOut;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
@@ -27,8 +28,37 @@ pub(super) fn is_exr(path: &Path) -> bool {
 
 /// Where a photo's picture lies, for what is made of it; warns of what that does not keep.
 pub(super) fn canvas_of(photo: &Path) -> petcomp::Result<Canvas> {
-    if io::read_format(photo)? != Format::Exr {
+    Ok(canvas_of_exr(photo)?.unwrap_or_default())
+}
+
+/// The same for a cut-out of the photo, which stays in the photo's display window. One that was
+/// reduced has no place there.
+pub(super) fn canvas_of_cut_out(
+    photo: &Path,
+    (width, height): (usize, usize),
+    cut: &CutOut,
+) -> petcomp::Result<Canvas> {
+    let Some(whole) = canvas_of_exr(photo)? else {
         return Ok(Canvas::default());
+    };
+    if cut.scale != 1.0 {
+        return Ok(Canvas {
+            at: [0; 2],
+            ..whole
+        });
+    }
+    let [x, y] = whole.at;
+    Ok(Canvas {
+        at: [x + cut.roi.x as i32, y + cut.roi.y as i32],
+        display: Some((whole.at, [width, height])),
+        ..whole
+    })
+}
+
+/// None of a photo in another format.
+fn canvas_of_exr(photo: &Path) -> petcomp::Result<Option<Canvas>> {
+    if io::read_format(photo)? != Format::Exr {
+        return Ok(None);
     }
     let header = io::read_header(photo)?;
     if stores_more_than_shown(&header) {
@@ -37,7 +67,7 @@ pub(super) fn canvas_of(photo: &Path) -> petcomp::Result<Canvas> {
             "{photo}: of {w} x {h} stored pixels, those outside the display window are not kept"
         );
     }
-    Ok(header.canvas)
+    Ok(Some(header.canvas))
 }
 
 fn stores_more_than_shown(header: &Header) -> bool {

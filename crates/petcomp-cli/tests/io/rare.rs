@@ -131,6 +131,35 @@ fn tiles_larger_than_the_picture_are_cut() {
     }
 }
 
+/// Codes of nine bits; the table begins anew before they become longer.
+fn lzw(bytes: &[u8]) -> Vec<u8> {
+    let parts = bytes.chunks(200);
+    let codes = parts.flat_map(|part| [256].into_iter().chain(part.iter().copied().map(u16::from)));
+    let codes = codes.chain([257]);
+    let bits: Vec<u8> = codes
+        .flat_map(|code| (0..9).rev().map(move |i| (code >> i & 1) as u8))
+        .collect();
+    let packed =
+        |bits: &[u8]| bits.iter().fold(0_u8, |sum, bit| sum << 1 | bit) << (8 - bits.len());
+    bits.chunks(8).map(packed).collect()
+}
+
+/// Our decoder takes the last codes of such a tile for missing.
+#[test]
+fn tiles_of_lzw_that_reach_over_the_border_are_read() {
+    let folder = Folder::new();
+    let tags = [(259, 3, 1, 5), (322, 3, 1, 16), (323, 3, 1, 16)];
+    let made = in_pieces(&about(13, 16, 8, 1), &tags, TILES, &[lzw(&tile(0, 1))]);
+    let read = codes_of(&folder.with("lzw.tif", &made));
+    assert_eq!(read.size(), (13, 16));
+    for (i, code) in read.pixels().iter().enumerate() {
+        assert_eq!(code.g, self::code(i % 13, i / 13, 0), "{i}");
+    }
+    let cut = folder.with("cut.tif", &made[..made.len() - 1]);
+    let e = io::read::<LinearRgb>(cut).unwrap_err().to_string();
+    assert!(e.ends_with("truncated TIFF"), "{e}");
+}
+
 /// As quad-tile.tif and cramps-tile.tif of libtiff's sample pictures: what is in tiles stands under
 /// the tags of strips.
 #[test]
@@ -373,8 +402,8 @@ fn the_part_with_colours_is_taken_wherever_it_stands() {
 }
 
 /// An EXR of 4 x 4 halves with luminance for each pixel and a pair of colour differences for four
-/// of them.
-fn chroma_exr(by: [f32; 4], ry: [f32; 4]) -> Vec<u8> {
+/// of them, in blocks that were compressed by a method.
+fn chroma_exr(method: u8, blocks: &[Vec<u8>]) -> Vec<u8> {
     let text = |name: &str, kind: &str, value: &[u8]| {
         [
             name.as_bytes(),
@@ -408,7 +437,7 @@ fn chroma_exr(by: [f32; 4], ry: [f32; 4]) -> Vec<u8> {
             "chlist",
             &[channel("BY", 2), channel("RY", 2), channel("Y", 1), vec![0]].concat(),
         ),
-        text("compression", "compression", &[0]),
+        text("compression", "compression", &[method]),
         text("dataWindow", "box2i", &window),
         text("displayWindow", "box2i", &window),
         text("lineOrder", "lineOrder", &[0]),
@@ -418,38 +447,41 @@ fn chroma_exr(by: [f32; 4], ry: [f32; 4]) -> Vec<u8> {
         vec![0],
     ]
     .concat();
+    let mut at = file.len() + 8 * blocks.len();
+    for block in blocks {
+        file.extend((at as u64).to_le_bytes());
+        at += 8 + block.len();
+    }
+    for (y, block) in blocks.iter().enumerate() {
+        file.extend([(y as u32).to_le_bytes(), (block.len() as u32).to_le_bytes()].concat());
+        file.extend(block);
+    }
+    file
+}
+
+/// The lines of such a file without compression, of a luminance of 0.5.
+fn chroma_lines(by: [f32; 4], ry: [f32; 4]) -> [Vec<u8>; 4] {
     let halves = |v: &[f32]| {
         v.iter()
             .flat_map(|&v| half::f16::from_f32(v).to_le_bytes())
             .collect::<Vec<u8>>()
     };
-    let lines: Vec<Vec<u8>> = (0..4_usize)
-        .map(|y| {
-            let chroma = if y % 2 == 0 {
-                [halves(&by[y..y + 2]), halves(&ry[y..y + 2])].concat()
-            } else {
-                Vec::new()
-            };
-            [chroma, halves(&[0.5; 4])].concat()
-        })
-        .collect();
-    let mut at = file.len() + 8 * lines.len();
-    for line in &lines {
-        file.extend((at as u64).to_le_bytes());
-        at += 8 + line.len();
-    }
-    for (y, line) in lines.iter().enumerate() {
-        file.extend([(y as u32).to_le_bytes(), (line.len() as u32).to_le_bytes()].concat());
-        file.extend(line);
-    }
-    file
+    [0_usize, 1, 2, 3].map(|y| {
+        let chroma = if y % 2 == 0 {
+            [halves(&by[y..y + 2]), halves(&ry[y..y + 2])].concat()
+        } else {
+            Vec::new()
+        };
+        [chroma, halves(&[0.5; 4])].concat()
+    })
 }
 
 /// `RY = (R - Y) / Y` and `BY = (B - Y) / Y`; OpenImageIO does not read such files.
 #[test]
 fn luminance_with_colour_of_half_the_size_is_read() {
     let folder = Folder::new();
-    let path = folder.with("a.exr", &chroma_exr([0.0, 1.0, 1.0, 1.0], [-1.0; 4]));
+    let lines = chroma_lines([0.0, 1.0, 1.0, 1.0], [-1.0; 4]);
+    let path = folder.with("a.exr", &chroma_exr(0, &lines));
     let read = io::read::<LinearRgb>(&path).unwrap();
     assert_eq!(io::read_header(&path).unwrap().channels, ["BY", "RY", "Y"]);
     let weights = color::xyz_from_rgb(&color::RgbSpace::REC709);
@@ -469,6 +501,24 @@ fn luminance_with_colour_of_half_the_size_is_read() {
             p.r == 0.0 && (p.b - blue).abs() < 1e-6 && (luminance - 0.5).abs() < 1e-6,
             "{x} {y}: {p:?}"
         );
+    }
+}
+
+/// The block of 4 x 4 pixels: one of B44 for each channel, or as it is.
+#[test]
+fn colour_of_half_the_size_in_b44_is_named() {
+    let folder = Folder::new();
+    for (method, name) in [(6, "B44"), (7, "B44A")] {
+        let path = folder.with("a.exr", &chroma_exr(method, &[vec![0; 3 * 14]]));
+        let told = io::read::<LinearRgb>(&path).unwrap_err().to_string();
+        let expected = format!(
+            "a.exr: unsupported EXR: channels with fewer samples than pixels, \
+             compressed by {name}; save it as RGB or with ZIP compression"
+        );
+        assert!(told.contains(&expected), "{told}");
+        let lines = chroma_lines([1.0; 4], [-1.0; 4]);
+        let path = folder.with("raw.exr", &chroma_exr(method, &[lines.concat()]));
+        assert_eq!(io::read::<LinearRgb>(&path).unwrap()[(3, 3)].r, 0.0);
     }
 }
 

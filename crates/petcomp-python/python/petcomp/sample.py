@@ -43,7 +43,8 @@ class Sample:
 
         ``image``: height x width x 3 or 4, float32 (scene-linear, premultiplied, alpha 0 to 1) or uint8 (sRGB).
         ``masks``: one for each object, height x width, bool or float32 (a pixel belongs to the object where
-        it is above 0.5). ``object_classes``: its class, a place in ``classes``.
+        it is above 0.5); where masks overlap, the last is in front. ``object_classes``: its class, a place
+        in ``classes``.
         """
         numbers = [_class_number(number) for number in object_classes]
         return cls(_petcomp.Sample.from_masks(image, list(masks), numbers, class_names(classes)))
@@ -75,7 +76,7 @@ class Sample:
     def depth(self) -> npt.NDArray[np.float32]:
         """Distance of the object in front along the optical axis: height x width, float32, metres.
 
-        Infinite where there is none.
+        Infinite where there is none, and everywhere in a sample ``from_masks``, whose distances nobody tells.
         """
         return self._native.depth()
 

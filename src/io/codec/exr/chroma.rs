@@ -13,7 +13,7 @@ use crate::color::{RgbSpace, xyz_from_rgb};
 use crate::io::codec::refusal::Refusal;
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
 use exr::meta::header::Header;
-use exr::prelude::{IntegerBounds, Vec2};
+use exr::prelude::{Compression, IntegerBounds, Vec2};
 use std::ops::Range;
 
 /// Names of luminance and the two differences.
@@ -117,6 +117,10 @@ impl Sampling {
         let section = IntegerBounds::new(Vec2(0, rows.start as i32), Vec2(width, rows.len()));
         let data = block.compressed_pixels_le;
         let compression = header.compression;
+        // What would not become smaller is stored as it is.
+        if data.len() != bytes {
+            check_decodable(compression)?;
+        }
         Ok(compression.decompress_image_section_from_le(&declared, data, section, false)?)
     }
 
@@ -167,6 +171,19 @@ impl Sampling {
             samples: samples.clone(),
         })
     }
+}
+
+/// Refuses B44, whose decoder panics at channels with fewer samples than pixels.
+fn check_decodable(compression: Compression) -> Result<(), Refusal> {
+    let name = match compression {
+        Compression::B44 => "B44",
+        Compression::B44A => "B44A",
+        _ => return Ok(()),
+    };
+    let what = format!(
+        "unsupported EXR: channels with fewer samples than pixels, compressed by {name}; save it as RGB or with ZIP compression"
+    );
+    Err(Refusal::Unsupported(what))
 }
 
 /// A line of samples in a block.

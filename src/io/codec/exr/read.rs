@@ -169,9 +169,13 @@ fn best_part(meta: &MetaData, wanted: Wanted) -> Result<(usize, Vec<usize>), Ref
 
 /// The part's own name says that it is the finished picture.
 fn is_finished_part(header: &exr::meta::header::Header) -> bool {
-    let name = &header.own_attributes.layer_name;
-    name.as_ref()
-        .is_some_and(|name| is_finished(&string_of(name)))
+    is_finished(&part_name(header))
+}
+
+/// A part's own name; empty where it has none.
+fn part_name(header: &exr::meta::header::Header) -> String {
+    let name = header.own_attributes.layer_name.as_ref();
+    name.map(string_of).unwrap_or_default()
 }
 
 /// Parts without the channels come last: their error is given where no part has them.
@@ -277,19 +281,33 @@ pub(crate) fn header(
     let meta = read_meta(start.as_slice().chain(file), file_bytes, limits)?;
     let first = meta.headers.first().ok_or("no part with pixels")?;
     let (width, height) = window_size(first.shared_attributes.display_window);
-    let colored = best_part(&meta, Wanted::Color).map_or(first, |(part, _)| &meta.headers[part]);
+    let read = best_part(&meta, Wanted::Color).map_or(0, |(part, _)| part);
+    let colored = &meta.headers[read];
     Ok(Header {
         format: Format::Exr,
         width,
         height,
         canvas: canvas(first),
-        channels: in_default_order(listed_names(&first.channels)),
-        bits: 8 * widest_sample(&first.channels) as u32,
+        channels: in_default_order(listed_names(&colored.channels)),
+        parts: names_of_several(&meta, read),
+        bits: 8 * widest_sample(&colored.channels) as u32,
         data_at: data_offset(colored),
         data_size: [colored.layer_size.x(), colored.layer_size.y()],
         metadata: text_attributes(first),
         ..Header::default()
     })
+}
+
+/// The names of several parts, one of them before the others.
+fn names_of_several(meta: &MetaData, before: usize) -> Vec<String> {
+    let mut names: Vec<String> = match &meta.headers[..] {
+        [_] => Vec::new(),
+        several => several.iter().map(part_name).collect(),
+    };
+    if let Some(until) = names.get_mut(..=before) {
+        until.rotate_right(1);
+    }
+    names
 }
 
 /// The first bytes, as if every channel had a sample for each pixel.
@@ -322,6 +340,7 @@ fn canvas(header: &exr::meta::header::Header) -> Canvas {
     Canvas {
         at: [shown.x(), shown.y()],
         pixel_aspect: writable_aspect(shared.pixel_aspect),
+        ..Canvas::default()
     }
 }
 
@@ -534,6 +553,7 @@ mod tests {
         let canvas = Canvas {
             at: [-3, 7],
             pixel_aspect: 2.0,
+            ..Canvas::default()
         };
         let planes = vec![("Z", FlatSamples::F32(vec![1.0, 2.0]))];
         let file = encode((2, 1), canvas, planes, Compression::Zip, &[]).unwrap();
@@ -731,5 +751,21 @@ mod tests {
         let read = header(file.as_slice(), 10_000, &Limits::default()).unwrap();
         assert_eq!((read.width, read.height), (2, 1));
         assert_eq!((read.data_at, read.data_size), ([0, 0], [5, 3]));
+        assert_eq!(read.channels, ["R", "G", "B"]);
+        assert_eq!(read.parts, ["rgba", "depth"]);
+    }
+
+    #[test]
+    fn a_part_of_a_picture_lies_in_the_display_window_of_the_whole() {
+        let canvas = Canvas {
+            at: [-2, 8],
+            display: Some(([-3, 7], [4, 3])),
+            ..Canvas::default()
+        };
+        let planes = vec![("Z", FlatSamples::F32(vec![1.0, 2.0]))];
+        let file = encode((2, 1), canvas, planes, Compression::Zip, &[]).unwrap();
+        let read = header(file.as_slice(), 10_000, &Limits::default()).unwrap();
+        assert_eq!((read.canvas.at, read.width, read.height), ([-3, 7], 4, 3));
+        assert_eq!((read.data_at, read.data_size), ([1, 1], [2, 1]));
     }
 }

@@ -4,8 +4,8 @@ use super::attributes::{FIRST_ATTRIBUTE, add_texts, sort_attributes, utf8_text};
 use crate::io::header::Canvas;
 use exr::prelude::Compression as Method;
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Vec2,
-    WritableImage,
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, IntegerBounds, Layer, LayerAttributes,
+    SmallVec, Vec2, WritableImage,
 };
 use std::io::Cursor;
 
@@ -50,6 +50,10 @@ pub(crate) fn encode(
     layer.attributes.layer_position = Vec2(canvas.at[0], canvas.at[1]);
     let mut image = Image::from_layer(layer);
     image.attributes.pixel_aspect = canvas.pixel_aspect;
+    if let Some(([x, y], [width, height])) = canvas.display {
+        let window = IntegerBounds::new(Vec2(x, y), Vec2(width, height));
+        image.attributes.display_window = window;
+    }
     let mut out = Cursor::new(Vec::new());
     image
         .write()
