@@ -87,11 +87,16 @@ fn begin_writers(plan: &Plan) -> Result<()> {
 fn claimable_identity(folder: &Path) -> Result<Option<Value>> {
     check_is_folder(folder)?;
     let before = identity(folder)?;
-    if before.is_none() && holds_something(folder)? {
+    if before.is_some() || !holds_something(folder)? {
+        return Ok(before);
+    }
+    // Another shard may have begun it in between.
+    let begun = identity(folder)?;
+    if begun.is_none() {
         let what = format!("is not empty and has no {IDENTITY}, expected a new or empty folder");
         return Err(Error::file(folder, what));
     }
-    Ok(before)
+    Ok(begun)
 }
 
 fn check_is_folder(folder: &Path) -> Result<()> {

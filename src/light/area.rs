@@ -70,14 +70,17 @@ impl LightFrame {
 const MIN_SIDE_M: f64 = 1e-6;
 
 /// Side lengths (diameters of an ellipse), metres.
-pub(super) fn side_lengths(light: &AreaLight) -> [f64; 2] {
+pub(crate) fn side_lengths(light: &AreaLight) -> [f64; 2] {
     light.size.map(|side| side.max(MIN_SIDE_M))
 }
 
-/// The longer side of a light, or its longer diameter, metres.
-pub(crate) fn longer_side(light: &AreaLight) -> f64 {
-    let [a, b] = side_lengths(light);
-    a.max(b)
+/// The height of its lowest point, of the rectangle around an ellipse, metres.
+pub(crate) fn lowest_z(light: &AreaLight) -> f64 {
+    let corners = frame(light).corners(side_lengths(light));
+    corners
+        .iter()
+        .map(|corner| corner.z)
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// Area of a light's face, square metres.

@@ -36,9 +36,9 @@ mod sky;
 mod surface;
 
 pub(crate) use ambient::ambient_directions;
-pub(crate) use area::longer_side;
 #[doc(hidden)]
 pub use area::{LightFrame, frame, radiance};
+pub(crate) use area::{lowest_z, side_lengths};
 #[doc(hidden)]
 pub use blur::plate_blur;
 #[doc(hidden)]
@@ -51,7 +51,7 @@ pub(crate) use irradiance::unit_irradiance;
 pub use measured_plate::MeasuredPlate;
 pub(crate) use measured_plate::PlateMeasures;
 #[doc(hidden)]
-pub use nodes::{Node, nodes};
+pub use nodes::{Node, nodes, samples_along};
 pub(crate) use nodes::{geometry_term, nodes_above};
 #[doc(hidden)]
 pub use noise::plate_noise;

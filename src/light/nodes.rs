@@ -4,7 +4,7 @@ use crate::geom::{Point3, Vector3};
 use crate::light::area::{LightFrame, face_area, frame, side_lengths};
 use crate::light::quadrature::gauss_legendre;
 use crate::scene::{AreaLight, LightShape};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// A point of a light's face and the area it represents.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,25 +27,43 @@ pub(crate) fn geometry_term(
     if r2 > 0.0 { cosines / (r2 * r2) } else { 0.0 }
 }
 
-/// Sample points of a light, `per_side` (at least 1) along each side.
+/// How many sample points lie along each side of a light, of which a square one has `per_side` (at
+/// least 1): as many in all at most, as far apart along the one side as along the other.
+pub fn samples_along(light: &AreaLight, per_side: usize) -> [usize; 2] {
+    let (n, [a, b]) = (per_side.max(1), side_lengths(light));
+    let ratio = a.max(b) / a.min(b);
+    let longer = ((n as f64 * ratio.sqrt()).round() as usize).min(n * n);
+    let shorter = n * n / longer;
+    if a >= b {
+        [longer, shorter]
+    } else {
+        [shorter, longer]
+    }
+}
+
+/// Sample points of a light, so many (at least 1) along each side.
 ///
 /// # Method
 /// Rectangle: product of two Gauss-Legendre rules. Ellipse: the rings of Shirley and Chiu's
 /// concentric map of a square of points, each for the same area, at radii that give the disk its
-/// second moment.
-pub fn nodes(light: &AreaLight, per_side: usize) -> Vec<Node> {
+/// second moment; of an oblong one chords across its longer diameter, at the points of the Gauss rule
+/// for their lengths (Chebyshev's polynomials of the second kind), with a Gauss-Legendre rule along
+/// each.
+pub fn nodes(light: &AreaLight, counts: [usize; 2]) -> Vec<Node> {
+    let counts = counts.map(|n| n.max(1));
     match light.shape {
-        LightShape::Rectangle => rectangle_nodes(light, &gauss_legendre(per_side.max(1))),
-        LightShape::Ellipse => ellipse_nodes(light, per_side.max(1)),
+        LightShape::Rectangle => rectangle_nodes(light, counts.map(gauss_legendre)),
+        LightShape::Ellipse if counts[0] == counts[1] => ellipse_nodes(light, counts[0]),
+        LightShape::Ellipse => oblong_ellipse_nodes(light, counts),
     }
 }
 
-fn rectangle_nodes(light: &AreaLight, rule: &[(f64, f64)]) -> Vec<Node> {
+fn rectangle_nodes(light: &AreaLight, [along_x, along_y]: [Vec<(f64, f64)>; 2]) -> Vec<Node> {
     let (frame, area) = (frame(light), face_area(light));
     let [half_x, half_y] = half_sides(light);
-    let mut nodes = Vec::with_capacity(rule.len() * rule.len());
-    for &(y, wy) in rule {
-        nodes.extend(rule.iter().map(|&(x, wx)| Node {
+    let mut nodes = Vec::with_capacity(along_x.len() * along_y.len());
+    for (y, wy) in along_y {
+        nodes.extend(along_x.iter().map(|&(x, wx)| Node {
             point: frame.point(x * half_x, y * half_y),
             area: area * wx * wy / 4.0,
         }));
@@ -66,6 +84,27 @@ fn ellipse_nodes(light: &AreaLight, per_side: usize) -> Vec<Node> {
         area: area / count,
     });
     disk.collect()
+}
+
+fn oblong_ellipse_nodes(light: &AreaLight, counts: [usize; 2]) -> Vec<Node> {
+    let (frame, area) = (frame(light), face_area(light));
+    let [a, b] = half_sides(light);
+    let longer = usize::from(counts[1] > counts[0]);
+    let (chords, along) = (counts[longer], gauss_legendre(counts[1 - longer]));
+    let mut nodes = Vec::with_capacity(chords * along.len());
+    for i in 1..=chords {
+        let (half, at) = libm::sincos(PI * i as f64 / (chords + 1) as f64);
+        let width = 2.0 * half * half / (chords + 1) as f64;
+        nodes.extend(along.iter().map(|&(t, w)| {
+            let mut point = [at, half * t];
+            point.rotate_right(longer);
+            Node {
+                point: frame.point(point[0] * a, point[1] * b),
+                area: area * width * w / 2.0,
+            }
+        }));
+    }
+    nodes
 }
 
 /// The `n` x `n` points of a unit disk that stand for equal areas.
@@ -112,15 +151,15 @@ fn ring_radius(shares: usize, n: usize) -> f64 {
 /// cosines.
 pub(crate) fn nodes_above(
     light: &AreaLight,
-    per_side: usize,
+    counts: [usize; 2],
     point: Point3<f64>,
     normal: &Vector3<f64>,
 ) -> Vec<Node> {
     let frame = frame(light);
     let [a, b] = half_sides(light);
     let horizon = LightHorizon::new(&frame, [a, b], point, normal);
-    let Some(left) = horizon.visible_part(light.shape, per_side.max(1)) else {
-        return nodes(light, per_side);
+    let Some(left) = horizon.visible_part(light.shape, counts.map(|n| n.max(1))) else {
+        return nodes(light, counts);
     };
     left.into_iter()
         .map(|([x, y], area)| Node {
@@ -150,11 +189,11 @@ impl LightHorizon {
 
     /// Points and areas of what the plane leaves, with the light's sides running from -1 to 1; none
     /// where it cuts nothing.
-    fn visible_part(&self, shape: LightShape, per_side: usize) -> Option<Vec<([f64; 2], f64)>> {
+    fn visible_part(&self, shape: LightShape, counts: [usize; 2]) -> Option<Vec<([f64; 2], f64)>> {
         let ([a, b], height) = (self.rise.map(f64::abs), self.middle.abs());
         match shape {
-            LightShape::Rectangle => (height < a + b).then(|| self.strips(per_side)),
-            LightShape::Ellipse => (height < self.steepest_rise()).then(|| self.chords(per_side)),
+            LightShape::Rectangle => (height < a + b).then(|| self.strips(counts)),
+            LightShape::Ellipse => (height < self.steepest_rise()).then(|| self.chords(counts)),
         }
     }
 
@@ -163,13 +202,13 @@ impl LightHorizon {
     }
 
     /// Points and areas in the square -1..1 above the plane.
-    fn strips(&self, n: usize) -> Vec<([f64; 2], f64)> {
+    fn strips(&self, counts: [usize; 2]) -> Vec<([f64; 2], f64)> {
         let [outer, inner] = self.axes_by_rise();
         let [middle, rise, across] = [self.middle, self.rise[outer], self.rise[inner]];
-        let rule = gauss_legendre(n);
-        let mut points = Vec::with_capacity(n * n);
-        for (a, width) in rule_on(above(middle + across.abs(), rise), &rule) {
-            for (b, length) in rule_on(above(middle + rise * a, across), &rule) {
+        let [strips, along] = [outer, inner].map(|axis| gauss_legendre(counts[axis]));
+        let mut points = Vec::with_capacity(strips.len() * along.len());
+        for (a, width) in rule_on(above(middle + across.abs(), rise), &strips) {
+            for (b, length) in rule_on(above(middle + rise * a, across), &along) {
                 let mut point = [0.0; 2];
                 (point[outer], point[inner]) = (a, b);
                 points.push((point, width * length));
@@ -188,13 +227,14 @@ impl LightHorizon {
     }
 
     /// Points and areas in the unit disk above the plane.
-    fn chords(&self, n: usize) -> Vec<([f64; 2], f64)> {
+    fn chords(&self, counts: [usize; 2]) -> Vec<([f64; 2], f64)> {
         let steepest = self.steepest_rise();
         let up = self.rise.map(|r| r / steepest);
         let widest = libm::acos((-self.middle / steepest).clamp(-1.0, 1.0));
+        let [n, m] = self.axes_by_rise().map(|axis| counts[axis]);
         // Chords of a nearly whole disk grow and shrink again: n of them miss its area by 2 %.
-        let (across, along) = (gauss_legendre(2 * n), gauss_legendre(n));
-        let mut points = Vec::with_capacity(2 * n * n);
+        let (across, along) = (gauss_legendre(2 * n), gauss_legendre(m));
+        let mut points = Vec::with_capacity(2 * n * m);
         for (angle, width) in rule_on([0.0, widest], &across) {
             let (half, at) = libm::sincos(angle);
             points.extend(
@@ -236,7 +276,7 @@ mod tests {
     use super::*;
     use crate::light::area::radiance;
     use crate::light::area::tests::{lit_points, square};
-    use std::f64::consts::PI;
+    use crate::light::irradiance::unit_irradiance;
 
     /// Irradiance at a point by unit radiance from the nodes of a light: `cos cos / r^2 dA`; 0 below
     /// either horizon.
@@ -256,7 +296,7 @@ mod tests {
     #[test]
     fn nine_nodes_match_the_closed_form() {
         for (at, normal, expected) in lit_points() {
-            let sum = irradiance(&nodes(&square(), 3), &square(), at.into(), normal);
+            let sum = irradiance(&nodes(&square(), [3; 2]), &square(), at.into(), normal);
             let e = sum * f64::from(radiance(&square()).r);
             assert!(
                 (e / expected - 1.0).abs() < 1e-4,
@@ -273,8 +313,10 @@ mod tests {
             ..square()
         };
         for (light, expected) in [(square(), 0.16), (disk, PI * 0.02)] {
-            let sum: f64 = nodes(&light, 4).iter().map(|n| n.area).sum();
-            assert!((sum - expected).abs() < 1e-12);
+            for counts in [[4, 4], [6, 2], [1, 5]] {
+                let sum: f64 = nodes(&light, counts).iter().map(|n| n.area).sum();
+                assert!((sum - expected).abs() < 1e-12, "{counts:?}");
+            }
         }
     }
 
@@ -300,9 +342,9 @@ mod tests {
                 (0.3, [0.0; 3]),
             ] {
                 let light = standing(shape, height, target);
-                let nodes = nodes_above(&light, 3, Point3::origin(), &Vector3::z());
+                let nodes = nodes_above(&light, [3; 2], Point3::origin(), &Vector3::z());
                 assert!(nodes.iter().all(|n| n.point.z > 0.0), "{shape:?} {height}");
-                let [sum, fine] = [nodes, super::nodes(&light, 400)]
+                let [sum, fine] = [nodes, super::nodes(&light, [400; 2])]
                     .map(|nodes| irradiance(&nodes, &light, Point3::origin(), Vector3::z()));
                 assert!(
                     (sum / fine - 1.0).abs() < 0.02,
@@ -316,7 +358,7 @@ mod tests {
     fn what_the_horizon_leaves_has_its_area() {
         let half = |shape| standing(shape, 0.0, [0.0; 3]);
         let area = |light: &AreaLight| -> f64 {
-            nodes_above(light, 3, Point3::origin(), &Vector3::z())
+            nodes_above(light, [3; 2], Point3::origin(), &Vector3::z())
                 .iter()
                 .map(|n| n.area)
                 .sum()
@@ -339,15 +381,41 @@ mod tests {
     fn a_light_that_the_horizon_does_not_cut_keeps_its_nodes() {
         let light = square();
         assert_eq!(
-            nodes_above(&light, 3, Point3::origin(), &Vector3::z()),
-            nodes(&light, 3)
+            nodes_above(&light, [3; 2], Point3::origin(), &Vector3::z()),
+            nodes(&light, [3; 2])
         );
     }
 
     #[test]
     fn asking_for_no_nodes_gives_the_centre() {
         let light = square();
-        assert_eq!(nodes(&light, 0).len(), 1);
-        assert!((nodes(&light, 0)[0].point - Point3::from(light.position)).norm() < 1e-12);
+        assert_eq!(nodes(&light, [0; 2]).len(), 1);
+        assert!((nodes(&light, [0; 2])[0].point - Point3::from(light.position)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_tube_has_its_samples_along_its_length() {
+        let counts = [[0.4, 0.4], [0.4, 0.32], [0.2, 0.4], [1.2, 0.03], [0.0, 1.0]].map(|size| {
+            let light = AreaLight { size, ..square() };
+            samples_along(&light, 3)
+        });
+        assert_eq!(counts, [[3, 3], [3, 3], [2, 4], [9, 1], [1, 9]]);
+    }
+
+    #[test]
+    fn few_nodes_of_an_oblong_light_match_the_closed_form() {
+        for shape in [LightShape::Rectangle, LightShape::Ellipse] {
+            for size in [[1.2, 0.03], [0.06, 1.0]] {
+                let light = AreaLight {
+                    shape,
+                    size,
+                    ..square()
+                };
+                let nodes = nodes(&light, samples_along(&light, 3));
+                let sum = irradiance(&nodes, &light, Point3::origin(), Vector3::z());
+                let exact = unit_irradiance(&light, Point3::origin(), Vector3::z());
+                assert!((sum / exact - 1.0).abs() < 1e-3, "{shape:?} {size:?}");
+            }
+        }
     }
 }

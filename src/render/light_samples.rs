@@ -34,20 +34,30 @@ pub(super) struct LitPatch {
 }
 
 impl LitPatch {
-    /// Samples along each side of a light: as many as its own size asks for and the width of the
-    /// widest penumbra, `most` at most.
-    fn samples_per_side(&self, light: &AreaLight, most: usize) -> usize {
+    /// Samples along each side of a light, those of a square one being `most` at most.
+    fn samples_along(&self, light: &AreaLight, most: usize) -> [usize; 2] {
+        let [a, b] = light::side_lengths(light);
+        let longer = a.max(b);
+        let wanted = [a, b].map(|side| self.wanted_samples(light, longer) * side / longer);
+        let most = light::samples_along(light, most);
+        [0, 1].map(|k| (wanted[k].ceil() as usize).clamp(1, most[k]))
+    }
+
+    /// Samples along a side of a light of this length: as many as that asks for and the width of the
+    /// widest penumbra; all there are of a light that the surface hides a part of.
+    fn wanted_samples(&self, light: &AreaLight, size: f64) -> f64 {
+        if light::lowest_z(light) < 0.0 {
+            return f64::INFINITY;
+        }
         let way = light::frame(light).center.coords - self.center;
         let rise = self.normal.dot(&way);
-        let size = light::longer_side(light);
         let pieces = size / (MAX_PIECE * rise.max(0.0));
         // Of a light that faces what it lights; the lower it stands, the longer they are.
         let slant = way.norm() / rise.max(0.0);
         let penumbra = slant * size * self.occluded / (rise - self.occluded).max(0.0);
         let steps = penumbra / (PENUMBRA_STEP_CELLS * self.cell);
         // Where nothing casts a shadow in any detail, 0 over 0, the maximum passes over it.
-        let wanted = pieces.max(steps).max(1.0);
-        (wanted.ceil() as usize).min(most.max(1))
+        pieces.max(steps).max(1.0)
     }
 }
 
@@ -131,7 +141,8 @@ impl LightSamples {
         let faces = shot
             .lights
             .iter()
-            .map(|l| LightGroup::area_light(l, light::nodes(l, options.light_samples)));
+            .map(|l| (l, light::samples_along(l, options.light_samples)))
+            .map(|(l, counts)| LightGroup::area_light(l, light::nodes(l, counts)));
         let pieces = shot
             .environment
             .iter()
@@ -171,8 +182,8 @@ impl LightGroup {
     /// in closed form: the few nodes of a large light near by add up to several times too much or
     /// too little.
     fn face_above(light: &AreaLight, count: usize, patch: &LitPatch) -> Self {
-        let count = patch.samples_per_side(light, count);
-        let nodes = light::nodes_above(light, count, Point3::from(patch.center), &patch.normal);
+        let counts = patch.samples_along(light, count);
+        let nodes = light::nodes_above(light, counts, Point3::from(patch.center), &patch.normal);
         let group = Self::area_light(light, nodes);
         let factor = group.closed_form_ratio(light, patch);
         Self {
@@ -368,7 +379,7 @@ mod tests {
     #[test]
     fn penumbrae_of_a_few_pixels_need_few_samples() {
         let samples = |size: f64, height: f64, occluded: f64| {
-            level_patch(occluded, 0.002).samples_per_side(&disk(size, height), 3)
+            level_patch(occluded, 0.002).samples_along(&disk(size, height), 3)[0]
         };
         // Penumbrae of 0, 0.3, 3 and 17 cells.
         let by_height = [0.0, 0.01, 0.1, 0.4].map(|occluded| samples(0.05, 1.0, occluded));
@@ -386,8 +397,8 @@ mod tests {
             ..disk(0.06, 0.4)
         };
         let patch = level_patch(0.02, 0.00235);
-        assert_eq!(patch.samples_per_side(&low, 3), 3);
-        assert_eq!(patch.samples_per_side(&disk(0.06, 0.4), 3), 1);
+        assert_eq!(patch.samples_along(&low, 3), [3; 2]);
+        assert_eq!(patch.samples_along(&disk(0.06, 0.4), 3), [1; 2]);
     }
 
     #[test]

@@ -43,6 +43,13 @@ impl<'a> Occluders<'a> {
         }
     }
 
+    /// The point of the surface below the mean of the cards' middles: their shadows fall around it.
+    pub(super) fn middle_on_surface(&self) -> Vector3<f64> {
+        let centers = self.cards.iter().map(|card| card.plane.center);
+        let mean = centers.sum::<Vector3<f64>>() / self.cards.len().max(1) as f64;
+        Vector3::new(mean.x, mean.y, 0.0)
+    }
+
     /// How far cards stand up from the plane through a point with this unit normal, metres.
     pub(super) fn height_above(&self, normal: &Vector3<f64>, point: &Vector3<f64>) -> f64 {
         let corners = self.cards.iter().flat_map(|card| card.plane.corners());

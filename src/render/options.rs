@@ -22,8 +22,9 @@ use serde::{Deserialize, Serialize};
 pub struct RenderOptions {
     /// Samples along each side of a pixel, 1 to 16. Default: 2.
     pub subsamples: usize,
-    /// Samples along each side of a light, 1 to 32, at most: a small light whose penumbrae are narrow
-    /// in the picture has fewer. Default: 3.
+    /// Samples along each side of a square light, 1 to 32, at most: a small light whose penumbrae are
+    /// narrow in the picture has fewer, an oblong one as many in all, more of them along its longer
+    /// side. Default: 3.
     pub light_samples: usize,
     /// Directions that the environment is seen from, 1 to 4096. Default: 32.
     pub ambient_samples: usize,

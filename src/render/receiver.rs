@@ -127,16 +127,19 @@ impl<'a> LightingContext<'a> {
 
     /// What lights a plane, as far as it matters, on the side of the camera; none where it is seen
     /// edge-on. The normal is that of every lattice.
-    fn light_samples(&self, plane: &ScenePlane, reach: f64) -> Option<LightSamples> {
+    fn light_samples(
+        &self,
+        plane: &ScenePlane,
+        center: Vector3<f64>,
+        reach: f64,
+    ) -> Option<LightSamples> {
         let projected = ProjectedPlane::new(plane, &self.fine.view)?;
         let patch = LitPatch {
-            center: plane.center,
+            center,
             normal: projected.normal,
             reach,
-            occluded: self
-                .occluders
-                .height_above(&projected.normal, &plane.center),
-            cell: projected.cell_metres(&self.fine.view, &plane.center),
+            occluded: self.occluders.height_above(&projected.normal, &center),
+            cell: projected.cell_metres(&self.fine.view, &center),
         };
         Some(LightSamples::above(self.shot, &self.options, &patch))
     }
@@ -145,7 +148,7 @@ impl<'a> LightingContext<'a> {
     /// card is not seen at all.
     pub(super) fn card(&self, own: usize, seen: &VisibleSide<'_>) -> Option<ReceiverIrradiance> {
         let plane = &self.occluders.cards[own].plane;
-        let lights = self.light_samples(plane, plane.half_length())?;
+        let lights = self.light_samples(plane, plane.center, plane.half_length())?;
         let [sharp, soft] = SelectedLights::split(&lights);
         Some(ReceiverIrradiance {
             fine: self.card_on(&self.fine, own, seen, sharp)?,
@@ -180,7 +183,8 @@ impl<'a> LightingContext<'a> {
         // The surface may have no end; its shadows are as large as cards.
         let cards = self.occluders.cards.iter();
         let reach = cards.map(|c| c.plane.half_length()).fold(0.0, f64::max);
-        let lights = self.light_samples(&self.occluders.surface, reach)?;
+        let center = self.occluders.middle_on_surface();
+        let lights = self.light_samples(&self.occluders.surface, center, reach)?;
         let [sharp, soft] = SelectedLights::split(&lights);
         let fine = self.surface_on(&self.fine, sharp)?;
         let coarse = self.surface_on(&self.coarse, soft)?;
@@ -197,8 +201,8 @@ impl<'a> LightingContext<'a> {
         let view = &lattice.view;
         let projected = ProjectedPlane::from_above(&self.occluders.surface, view)?;
         let everywhere = view.whole_area();
-        let origin = Vector3::zeros();
-        let shadowed = ShadowedReceiver::new(&projected, &everywhere, lattice, None, &origin);
+        let target = self.occluders.middle_on_surface();
+        let shadowed = ShadowedReceiver::new(&projected, &everywhere, lattice, None, &target);
         let groups = self.ray_groups(&shadowed, lights);
         let area = shadowed_area(&groups);
         Some(self.receiver(

@@ -10,7 +10,7 @@ use crate::render::RenderOptions;
 use crate::render::card_texel::card_texel;
 use crate::render::grade::channel_mean;
 use crate::render::interreflection::Bounces;
-use crate::render::light_samples::{LightGroup, LightSample, LightSampleKind, LightSamples};
+use crate::render::light_samples::{LightGroup, LightSample, LightSamples};
 use crate::render::pixel_filter::filter_quantiles;
 use crate::render::retouch::retouched_fully;
 use crate::render::view::{CameraView, ProjectedPlane, ScenePlane, is_on_texture, visible_planes};
@@ -253,8 +253,7 @@ impl<'a> ReferenceWorld<'a> {
         sample: &LightSample,
         own: Option<usize>,
     ) -> LinearRgb {
-        let from_sky = matches!(sample.kind, LightSampleKind::Sky { .. });
-        if own.is_some() && from_sky && self.surface_blocks(p, &sample.at.xyz()) {
+        if own.is_some() && self.surface_blocks(p, sample) {
             return LinearRgb::BLACK;
         }
         let cards = self.cards.iter().enumerate();
@@ -265,10 +264,11 @@ impl<'a> ReferenceWorld<'a> {
         })
     }
 
-    fn surface_blocks(&self, p: &Vector3<f64>, direction: &Vector3<f64>) -> bool {
-        let foot = p - direction * (p.z / direction.z);
+    fn surface_blocks(&self, p: &Vector3<f64>, sample: &LightSample) -> bool {
+        let way = sample.at.xyz() - p * sample.at.w;
+        let foot = p - way * (p.z / way.z);
         let [w, h] = self.shot.catcher.map(|s| 0.5 * s);
-        direction.z < 0.0 && foot.x.abs() <= w && foot.y.abs() <= h
+        sample.at.z.max(way.z) < 0.0 && foot.x.abs() <= w && foot.y.abs() <= h
     }
 }
 

@@ -219,29 +219,30 @@ impl<'a> ShadowProjection<'a> {
 
     /// Where the way to the light crosses the surface inside of its sides.
     fn surface_sides(&self, surface: &ScenePlane) -> Vec<Vector3<f64>> {
-        let depth = &self.receiver.plane.w;
-        let foot = self.foot_map();
-        let mut sides = vec![*depth];
+        let (foot, w) = self.foot_map();
+        let mut sides = vec![self.receiver.plane.w, w];
         for (axis, size) in surface.size.into_iter().enumerate() {
             if size.is_finite() {
                 let row = foot.row(axis).transpose();
-                sides.extend([depth * (0.5 * size) - row, depth * (0.5 * size) + row]);
+                sides.extend([w * (0.5 * size) - row, w * (0.5 * size) + row]);
             }
         }
         sides
     }
 
-    /// From the lattice to the point of `z = 0` on the way from the light, times depth.
-    fn foot_map(&self) -> Matrix3<f64> {
-        let point = &self.receiver.plane.point;
-        let direction = self.sample.at.xyz();
-        let height = point.transpose() * Vector3::z() / -direction.z;
-        point + direction * height.transpose()
+    /// From the lattice to the point of `z = 0` on the way from the light, times the row beside it,
+    /// which is positive above the light.
+    fn foot_map(&self) -> (Matrix3<f64>, Vector3<f64>) {
+        let (point, depth) = (&self.receiver.plane.point, &self.receiver.plane.w);
+        let (at, q) = (self.sample.at.xyz(), self.sample.at.w);
+        let height = point.transpose() * Vector3::z();
+        let foot = at * height.transpose() - point * at.z;
+        (foot, height * q - depth * at.z)
     }
 
     /// The light comes from below the surface.
     pub(super) fn comes_from_below(&self) -> bool {
-        self.receiver.own.is_some() && self.sample.at.w == 0.0 && self.sample.at.z < 0.0
+        self.receiver.own.is_some() && self.sample.at.z < 0.0
     }
 
     /// Part of the lattice that a shadow lies in: bounds of the four corners projected onto the

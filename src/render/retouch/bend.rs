@@ -131,8 +131,9 @@ fn open_irradiance(darkroom: &Darkroom<'_>, patch: &LitPatch) -> LinearRgb {
     let sky = shot.ambient.scale(PI * (0.5 + 0.5 * normal.z) as f32);
     let faces = LightSamples::faces_above(shot, options, patch);
     let lit = faces.iter().fold(sky, |sum, group| {
-        let irradiance = group.unit_irradiance(&patch.center, normal) as f32;
-        sum + group.radiance.scale(irradiance)
+        let above = group.samples.iter().filter(|sample| sample.at.z > 0.0);
+        let irradiance: f64 = above.map(|s| s.irradiance(&patch.center, normal)).sum();
+        sum + group.radiance.scale(irradiance as f32)
     });
     let maps = shot.environment.iter().filter(|map| map.strength != 0.0);
     maps.flat_map(|map| light::sky_pieces(map, options.ambient_samples, normal))

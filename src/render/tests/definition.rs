@@ -960,3 +960,70 @@ fn the_closed_form_is_what_a_bare_surface_gets() {
     let c = render(&shot, &HIGH).at(2, 2)[0].light;
     assert!((c.g - e.g / std::f32::consts::PI).abs() < 1e-5);
 }
+
+/// A small upright card that leans towards `+x`, in the middle of its picture.
+fn leaning() -> Shot {
+    let lean = UnitQuaternion::from_euler_angles(0.0, 1.0, 0.0);
+    let white = Image::filled(64, 64, grey(1.0));
+    Shot::new(above(5, 5, 400.0)).with_card(card(1, [0.0, 0.0, 0.3], lean, [0.1; 2], white))
+}
+
+/// What comes from a lamp of this height, its middle this high, 1 m beside that card.
+fn light_from_beside(middle: f64, height: f64, catcher: [f64; 2], way: Rendering) -> f32 {
+    let lamp = AreaLight {
+        target: [0.0, 0.0, middle],
+        ..AreaLight::new([1.0, 0.0, middle], [height, 0.4], 10.0 * height)
+    };
+    let shot = leaning().with_light(lamp);
+    way(&Shot { catcher, ..shot }, &HIGH).at(2, 2)[0].light.g
+}
+
+type Rendering = fn(&Shot, &RenderOptions) -> DeepImage;
+
+#[test]
+fn the_surface_stops_what_a_lamp_sends_from_below() {
+    let endless = Shot::new(above(5, 5, 400.0)).catcher;
+    for way in [render, render_reference] {
+        assert!(light_from_beside(-0.3, 0.4, endless, way).abs() < 1e-6);
+        assert!(light_from_beside(-0.3, 0.4, [0.1; 2], way) > 0.03);
+        let sunk = light_from_beside(0.0, 0.4, endless, way);
+        let upper = light_from_beside(0.1, 0.2, endless, way);
+        assert!((sunk / upper - 1.0).abs() < 0.02, "{sunk} against {upper}");
+    }
+}
+
+/// The same picture of a place elsewhere on the surface.
+fn moved(shot: &Shot, by: Vector3<f64>) -> Shot {
+    let mut shot = shot.clone();
+    let there = Pose::translation(by.x, by.y, by.z);
+    shot.camera.camera_from_world *= there.inverse();
+    for card in &mut shot.cards {
+        card.quad.world_from_card = there * card.quad.world_from_card;
+    }
+    for light in &mut shot.lights {
+        for point in [&mut light.position, &mut light.target] {
+            *point = (Vector3::from(*point) + by).into();
+        }
+    }
+    shot
+}
+
+#[test]
+fn a_place_far_from_the_origin_has_the_same_shadows() {
+    let mut shot = pile();
+    let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.9);
+    let steep = Pose::from_parts(Vector3::zeros().into(), tilt);
+    shot.camera.camera_from_world = steep * shot.camera.camera_from_world;
+    shot.camera.camera_from_world.translation.vector = Vector3::new(0.0, 0.0, 1.0);
+    let here = render(&shot, &RenderOptions::default());
+    for y in [5.0, -5.0] {
+        let there = render(
+            &moved(&shot, Vector3::new(0.0, y, 0.0)),
+            &RenderOptions::default(),
+        );
+        let pairs = here.shadow().pixels().iter().zip(there.shadow().pixels());
+        let worst = pairs.map(|(a, b)| (a.g - b.g).abs()).fold(0.0, f32::max);
+        assert!(worst < 1e-3, "{y}: {worst}");
+        assert!(here.shadow().pixels().iter().any(|share| share.g < 0.8));
+    }
+}

@@ -163,7 +163,10 @@ mod tests {
     fn pictures_of_another_program_are_read_to_be_sorted_by_their_objects() {
         let dir = tempfile::tempdir().unwrap();
         let one = "0 0.5 0.5 0.2 0.1\n";
-        for (name, label) in [("a", one.to_owned()), ("b", one.repeat(2))] {
+        for (name, label) in [
+            ("a", one.into()),
+            ("b", format!("{one}0 0.2 0.5 0.2 0.1\n")),
+        ] {
             std::fs::write(dir.path().join(name).with_extension("png"), "").unwrap();
             std::fs::write(dir.path().join(name).with_extension("txt"), label).unwrap();
         }
