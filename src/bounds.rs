@@ -133,6 +133,22 @@ pub(crate) fn above(value: impl Into<f64>, limit: impl Into<f64>) -> String {
     format!("{:.1}", value.max(limit + 0.1))
 }
 
+/// The same below a limit, with two decimals.
+pub(crate) fn below(value: f64, limit: f64) -> String {
+    format!("{:.2}", value.min(limit - 0.01))
+}
+
+/// An offset to the right and down, as [`above`] tells it along each axis where it is more than a
+/// limit.
+pub(crate) fn offset_above(offset: [f64; 2], limit: f64) -> String {
+    let told = |v: f64| match v.abs() > limit {
+        true => v.signum() * v.abs().max(limit + 0.1),
+        false => v,
+    };
+    let [x, y] = offset.map(told);
+    format!("({x:.1}, {y:.1})")
+}
+
 /// A number without hundreds of zeros.
 pub(crate) fn number(value: f64) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-4..1e7).contains(&value.abs());
@@ -173,6 +189,10 @@ mod tests {
         let told = [20.001, 20.14, 20.4].map(|value| above(value, 20.0));
         assert_eq!(told, ["20.1", "20.1", "20.4"]);
         assert_eq!(above(5.501_f32, 5.5_f32), "5.6");
+        assert_eq!(offset_above([-3.01, 0.04], 3.0), "(-3.1, 0.0)");
+        assert_eq!(offset_above([2.99, 4.0], 3.0), "(3.0, 4.0)");
+        let told = [0.899, 0.4].map(|value| below(value, 0.9));
+        assert_eq!(told, ["0.89", "0.40"]);
     }
 
     #[test]

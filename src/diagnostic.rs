@@ -137,7 +137,7 @@ codes! {
     ResidualMatte "matte.residual_matte" "The key leaves some of the screen"
     ScreenHue "matte.screen_hue" "A part of the object has the hue of the screen"
     KeyedAway "matte.keyed_away" "A part of the object looks like bare screen"
-    TintUncertain "matte.tint_uncertain" "The tint of the plastic is uncertain"
+    TintUncertain "matte.tint_uncertain" "The tint of the plastic is uncertain, or it may be paint"
     ClippedObject "matte.clipped_object" "A part of the object is overexposed"
     Moved "matte.moved" "The object moved between two photos and was aligned"
     SimilarScreens "matte.similar_screens" "The screens do not differ in a channel"

@@ -99,10 +99,10 @@ impl CaptureFiles {
             names: &empty_names,
             read: &read_empty,
         };
-        let recognised = sources.recognised(display)?;
-        let empty_recognised = empty_sources.recognised(display)?;
         let mut files = self.photos.iter().chain(&self.empty);
         files.try_for_each(io::check_square_pixels)?;
+        let recognised = sources.recognised(display)?;
+        let empty_recognised = empty_sources.recognised(display)?;
         let number = number_of_white(&recognised, &names)?;
         let view = View::of_photo(display, &recognised[number]);
         let photos = Photos {

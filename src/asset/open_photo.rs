@@ -89,8 +89,8 @@ impl<'a> OpenPhoto<'a> {
 /// The photo, seen from straight above where something in it shows the screen's plane.
 fn read_rectified(entry: &PhotoEntry) -> Result<RectifiedPhoto> {
     let (scale, file) = (entry.scale()?, &entry.file);
-    let (photo, height) = (io::read(file)?, entry.thickness() / 2.0);
     io::check_square_pixels(file)?;
+    let (photo, height) = (io::read(file)?, entry.thickness() / 2.0);
     match scale {
         Scale::PxPerMetre(_) | Scale::Length(_) | Scale::Size(_) => {
             Ok(RectifiedPhoto::unchanged(photo))

@@ -38,8 +38,7 @@ impl Panorama {
     ///
     /// # Errors
     /// Those of [`io::read`]; those of [`new`](Self::new), and [`Error::Field`] for a picture that
-    /// is not twice as wide as high, naming the file; [`Error::File`] for pixels that are not
-    /// square.
+    /// is not twice as wide as high, naming the file.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         Self::of_file(io::read(path)?, path)
@@ -50,7 +49,6 @@ impl Panorama {
     /// # Errors
     /// Those of [`read`](Self::read) for a picture that was read.
     pub(crate) fn of_file(image: Image<LinearRgb>, path: &Path) -> Result<Self> {
-        io::check_square_pixels(path)?;
         check_shape(image.size()).map_err(|e| e.in_file(path))?;
         Self::new(image).map_err(|e| e.in_file(path))
     }
@@ -223,28 +221,6 @@ mod tests {
         for (w, h) in [(40, 20), (41, 20), (404, 200)] {
             assert!(read(w, h).is_ok(), "{w} x {h}");
         }
-    }
-
-    #[test]
-    fn a_map_has_square_pixels() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("map.exr");
-        let read = |pixel_aspect| {
-            let options = io::WriteOptions {
-                canvas: io::Canvas {
-                    pixel_aspect,
-                    ..io::Canvas::default()
-                },
-                ..io::WriteOptions::default()
-            };
-            io::write_with(&path, &Image::filled(4, 2, LinearRgb::WHITE), &options).unwrap();
-            Panorama::read(&path)
-        };
-        let told = read(2.0).unwrap_err().to_string();
-        let expected = "map.exr: pixels are 2 times as wide as high, expected square ones: \
-                        resample it to square pixels first";
-        assert!(told.ends_with(expected), "{told}");
-        assert!(read(1.0005).is_ok());
     }
 
     #[test]

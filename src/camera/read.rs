@@ -10,6 +10,7 @@ use crate::bounds::{CAMERA, SURFACE, number};
 use crate::error::{Error, Result};
 use crate::io;
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// How our label files are named: the photo's name, then this.
@@ -402,18 +403,29 @@ fn fill_in_size(image: &mut LabelImage, photo: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The name of an annotation's photo: of several pictures the only one that is there.
+/// The name of an annotation's photo: of several pictures the only one that is there, or of the
+/// others that are named beside them.
 fn annotated_file(annotation: &Annotation, path: &Path) -> Result<String> {
     let pictures = &annotation.pictures;
-    let there = pictures.iter().filter_map(|names| file_there(names, path));
-    let there: Vec<&str> = there.collect();
+    let mut there = files_there(pictures, path);
+    let count = there.len();
+    if count == 0 {
+        there = files_there(&annotation.others, path);
+    }
     let file = match (there.as_slice(), pictures.as_slice()) {
         (&[one], _) => one,
         (_, [names]) => possible_files(names).last().unwrap_or_default(),
         (_, []) => "",
-        _ => return Err(Error::file(path, several_pictures(pictures))),
+        _ => return Err(several_pictures(annotation, count).in_file(path)),
     };
     Ok(file.to_owned())
+}
+
+/// Those files of pictures that are there, each once.
+fn files_there<'a>(pictures: &'a [PictureNames], path: &Path) -> Vec<&'a str> {
+    let there = pictures.iter().filter_map(|names| file_there(names, path));
+    let there: BTreeSet<&str> = there.collect();
+    there.into_iter().collect()
 }
 
 /// The first of a picture's names that is there, in or below the folder or directly in it.
@@ -421,14 +433,15 @@ fn file_there<'a>(names: &'a [String], path: &Path) -> Option<&'a str> {
     possible_files(names).find(|name| path.with_file_name(name).is_file())
 }
 
-/// What is wrong with an annotation that may be of several pictures.
-fn several_pictures(pictures: &[PictureNames]) -> String {
-    let names = pictures.iter().filter_map(|names| names.last());
+/// The error of an annotation that may be of several pictures, so many of which are there.
+fn several_pictures(annotation: &Annotation, there: usize) -> Error {
+    let names = annotation.pictures.iter().filter_map(|names| names.last());
     let names: Vec<&str> = names.map(String::as_str).collect();
-    format!(
-        "an annotation that may be of {}, expected one of them in this folder",
+    let what = format!(
+        "an annotation that may be of {}, expected exactly one of them in this folder, of which {there} are there",
         names.join(" or ")
-    )
+    );
+    Error::value(&annotation.at, what)
 }
 
 fn possible_files(names: &[String]) -> impl Iterator<Item = &str> {
@@ -661,15 +674,52 @@ pub(super) mod tests {
             pictures: ["a.jpg", "b.jpg"]
                 .map(|name| vec![name.to_owned()])
                 .to_vec(),
+            at: "[2]".into(),
             ..Annotation::default()
         };
-        let refusal = || annotated_file(&annotation, &path).unwrap_err().to_string();
-        let expected = "may be of a.jpg or b.jpg, expected one of them in this folder";
-        assert!(refusal().ends_with(expected), "{}", refusal());
+        let assert_refused = |there: usize| {
+            let told = annotated_file(&annotation, &path).unwrap_err().to_string();
+            let expected = format!(
+                "export.json: [2]: an annotation that may be of a.jpg or b.jpg, \
+                 expected exactly one of them in this folder, of which {there} are there"
+            );
+            assert!(told.ends_with(&expected), "{told}");
+        };
+        assert_refused(0);
         std::fs::write(folder.path().join("b.jpg"), "").unwrap();
         assert_eq!(annotated_file(&annotation, &path).unwrap(), "b.jpg");
         std::fs::write(folder.path().join("a.jpg"), "").unwrap();
-        assert!(refusal().ends_with(expected), "{}", refusal());
+        assert_refused(2);
+    }
+
+    /// Pictures by the names of each.
+    fn named(pictures: &[&[&str]]) -> Vec<PictureNames> {
+        pictures
+            .iter()
+            .map(|names| names.iter().map(ToString::to_string).collect())
+            .collect()
+    }
+
+    #[test]
+    fn a_picture_that_is_there_under_another_name_is_taken_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("export.json");
+        std::fs::write(folder.path().join("bg.jpg"), "").unwrap();
+        // In a cloud and beside the export; uploaded twice.
+        for (pictures, others) in [
+            (named(&[&["9f.jpg"]]), named(&[&["9f.jpg"], &["bg.jpg"]])),
+            (
+                named(&[&["1-bg.jpg", "bg.jpg"], &["2-bg.jpg", "bg.jpg"]]),
+                vec![],
+            ),
+        ] {
+            let annotation = Annotation {
+                pictures,
+                others,
+                ..Annotation::default()
+            };
+            assert_eq!(annotated_file(&annotation, &path).unwrap(), "bg.jpg");
+        }
     }
 
     #[test]

@@ -473,17 +473,22 @@ fn a_black_photo_without_the_object_is_named_where_others_show_it() {
     let bare = photo(Frame::Black, BARE);
     // Photos of a frame may differ by more than this object reflects.
     let dim = black.zip_map(&bare, |p, e| p.scale(0.5).add_scaled(0.5, e));
-    let with = |other: Image<LinearRgb>| {
-        let measured = measured_of(&[dim.clone(), other, white.clone()], &[]);
+    let with = |others: &[Image<LinearRgb>]| {
+        let mut photos = vec![dim.clone(), white.clone()];
+        photos.splice(1..1, others.iter().cloned());
+        let measured = measured_of(&photos, &[]);
         measured.map(drop).map_err(|e| e.to_string())
     };
-    let error = with(bare).unwrap_err();
-    assert!(
-        error.contains("photo 1: shows the black frame without the object"),
-        "{error}"
-    );
+    for (count, names) in [(1, "photo 1"), (2, "photo 1 and photo 2")] {
+        let error = with(&vec![bare.clone(); count]).unwrap_err();
+        let expected = format!("{names}: black frame without the object");
+        assert!(error.contains(&expected), "{error}");
+    }
     let lamp = lit(&dim, 0.02, 1.0);
-    assert_eq!([dim.clone(), lamp].map(with), [Ok(()), Ok(())]);
+    assert_eq!(
+        [dim.clone(), lamp].map(|other| with(&[other])),
+        [Ok(()), Ok(())]
+    );
 }
 
 /// A photo of an object with a glint in its middle that clips.

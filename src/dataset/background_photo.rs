@@ -137,7 +137,7 @@ impl BackgroundPhoto {
             // Nobody knows which of the photos a label that cannot be used is of.
             Err(_) => (
                 camera::labels_beside(name, folder, size)?,
-                photos_and_labels(folder)?,
+                photos_and_labels(folder).collect(),
             ),
         };
         let files = labels.iter().flat_map(|labelled| {
@@ -412,11 +412,12 @@ fn unlabelled_photos(folder: &Path, labelled: &BTreeSet<&OsStr>) -> Vec<String> 
     names
 }
 
-/// The photos below a folder, as its labels may name those in subfolders, and what may be labels
-/// and cameras.
-fn photos_and_labels(folder: &Path) -> Result<Vec<PathBuf>> {
+/// The photos of a folder, and what may be their labels and cameras.
+fn photos_and_labels(folder: &Path) -> impl Iterator<Item = PathBuf> {
     let is_label = |path: &Path| ["json", "xml"].iter().any(|e| io::has_extension(path, e));
-    io::files_below(folder, |path| is_photo(path) || is_label(path), usize::MAX)
+    files_in(folder)
+        .into_iter()
+        .filter(move |path| is_photo(path) || is_label(path))
 }
 
 fn files_in(folder: &Path) -> Vec<PathBuf> {
@@ -597,8 +598,7 @@ mod tests {
         let mut label = Label::new([16, 12], [[0.0; 2]; 4], [0.6, 0.4]);
         label.image.file = "a.png".into();
         io::write_json(folder.path().join("a.label.json"), &label).unwrap();
-        std::fs::create_dir(folder.path().join("sub")).unwrap();
-        let others = ["b.jpg", "b.label.json", "sub/c.jpg"].map(|name| folder.path().join(name));
+        let others = ["b.jpg", "b.label.json"].map(|name| folder.path().join(name));
         others
             .iter()
             .for_each(|path| std::fs::write(path, "{").unwrap());

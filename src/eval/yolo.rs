@@ -28,8 +28,8 @@ pub struct YoloTruth {
 }
 
 /// Reads `NAME.txt` of a folder of labels and of those below it: `class cx cy w h`, shares of the
-/// image, one box a line; outlines (`class x1 y1 x2 y2 ..`) give the box around them. Rows that are
-/// repeated count once, as in training.
+/// image, one box a line; outlines (`class x1 y1 x2 y2 ..`) give the box around them. Rows of equal
+/// class, box and keypoints count once, as in training.
 ///
 /// The images are below the folder `images`, by default where YOLO has them: the same path with its
 /// last `labels` replaced by `images`. One without a label file shows nothing that is to be found.
@@ -338,7 +338,7 @@ fn warn_repeated(images: &[LabelledImage]) {
     if let Some(first) = images.iter().find(|image| image.repeated > 0) {
         let name = &first.sheet.image;
         log::warn!(
-            "labels: repeated rows count once, as in training: {count}, the first of image \"{name}\""
+            "labels: rows of equal class, box and keypoints count once, as in training: {count} are left out, the first of image \"{name}\""
         );
     }
 }
@@ -365,7 +365,7 @@ type Parsed<T> = std::result::Result<T, String>;
 #[derive(Debug, Default, PartialEq)]
 struct LabelTruth {
     boxes: Vec<GroundTruth>,
-    /// Rows that are left out, as trainers do: each is the same as one above it.
+    /// Rows that are left out, as trainers do: each has class, box and keypoints of one above it.
     repeated: usize,
 }
 

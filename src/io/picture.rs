@@ -71,6 +71,7 @@ impl Picture {
         warn_not_finite(&raster, source, wanted);
         warn_unusual_channels(&raster, source, wanted);
         warn_left_out(&raster, source, wanted);
+        warn_narrow_range(source, limits, wanted);
         Ok(Self {
             path: source.path.clone(),
             format: source.format,
@@ -247,6 +248,18 @@ fn warn_left_out(raster: &Raster, source: &SourceFile, wanted: Wanted) {
         log::warn!(
             "{path}: has samples beside its colours, the first of which is not called alpha (ExtraSamples 1 or 2); left out"
         );
+    }
+}
+
+/// Says where a PNG has codes of video, whose black and white are not the outermost ones.
+fn warn_narrow_range(source: &SourceFile, limits: &Limits, wanted: Wanted) {
+    if source.format != Format::Png || !wanted.is_color() {
+        return;
+    }
+    let is_narrow = catch_panic(|| Ok(png::has_narrow_range(&source.bytes, limits)));
+    if is_narrow.unwrap_or(false) {
+        let path = source.path.display();
+        log::warn!("{path}: has codes of narrow range (cICP), taken as full range");
     }
 }
 

@@ -4,6 +4,7 @@
 mod bright;
 mod claimed;
 mod object;
+mod paint;
 mod planes;
 mod solve;
 pub(super) mod tint;
@@ -187,11 +188,12 @@ fn exposure_gain(screen: LinearRgb) -> Option<f32> {
 fn solve_as_exposed(object: FilmInput<'_>, options: &FilmOptions) -> FilmMatte {
     let mut watch = Stopwatch::start();
     let solution = FilmSolution::new(object, options);
-    let tint = solution.tint();
+    let samples = solution.tint_samples();
+    let tint = solution.tint(&samples);
     watch.lap("tint");
     let mut factors = solution.factors(tint.flat);
     watch.lap("factors");
-    let color_uncertainty = solution.refine(&mut factors, tint, &mut watch);
+    let color_uncertainty = solution.refine(&mut factors, tint, &samples, &mut watch);
     let matte = solution.composed(&factors, tint.flat.into(), color_uncertainty);
     watch.lap("compose");
     watch.log("film");
@@ -262,17 +264,18 @@ impl<'a> FilmSolution<'a> {
 
     /// The given tint, or else that of the photo. On a grey screen all of the object is sampled,
     /// and that the tint may be another is part of the guess.
-    fn tint(&self) -> Tint {
+    fn tint(&self, samples: &TintSamples) -> Tint {
         match self.options.flat {
             Some(flat) => Tint::certain(flat.into()),
-            None if self.is_keyable => self.tint_samples(DARKEST_SHARE).fit(),
-            None => Tint::certain(self.tint_samples(1.0).fit_plastic()),
+            None if self.is_keyable => samples.fit(),
+            None => Tint::certain(samples.fit_plastic()),
         }
     }
 
-    /// A share of the object's pixels, the darkest first.
-    fn tint_samples(&self, share: f64) -> TintSamples {
+    /// The object's pixels that show its tint.
+    fn tint_samples(&self) -> TintSamples {
         let FilmInput { plate, inside, .. } = self.object;
+        let share = if self.is_keyable { DARKEST_SHARE } else { 1.0 };
         TintSamples::new(&self.calm, plate, inside, self.key, share)
     }
 
@@ -319,6 +322,7 @@ impl<'a> FilmSolution<'a> {
         &self,
         factors: &mut Image<Factor>,
         Tint { flat, uncertainty }: Tint,
+        samples: &TintSamples,
         watch: &mut Stopwatch,
     ) -> ColorUncertainty {
         let (object, most) = (self.object, largest(flat));
@@ -330,13 +334,34 @@ impl<'a> FilmSolution<'a> {
         let clipped = bright::fill_glints(factors, object);
         claimed::make_opaque(factors, object.claims);
         watch.lap("glints");
+        let paint = self.see_through_paint(factors, samples, flat.into());
+        watch.lap("see-through paint");
         ColorUncertainty {
             keyed_away,
             screen_hue,
             clipped,
             guessed,
             tint: uncertainty,
+            paint,
         }
+    }
+
+    /// The share of the object that is as bright as paint and was left see-through. On a grey
+    /// screen all that is see-through is guessed, and said to be.
+    fn see_through_paint(
+        &self,
+        factors: &Image<Factor>,
+        samples: &TintSamples,
+        flat: LinearRgb,
+    ) -> f32 {
+        if !self.is_keyable {
+            return 0.0;
+        }
+        let plate = &self.object.plate.image;
+        let reflected = factors.zip3_map(&self.calm, plate, |f, p, k| {
+            paint::reflected(p, k, f.transmittance(flat), self.key)
+        });
+        paint::see_through(reflected, samples, self.object)
     }
 
     /// What a transmittance leaves of the photo's light.

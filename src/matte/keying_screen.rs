@@ -31,8 +31,8 @@ const SMOOTHNESS_SIGMA: f64 = 0.85;
 /// double precision.
 ///
 /// # Errors
-/// [`Error::Value`](crate::Error::Value) where no point lies in the picture, for a colour that is
-/// not finite, or `smoothness` outside 0 to 1.
+/// [`Error::Value`](crate::Error::Value) where no point lies in the picture, for the colour of one
+/// that does and is not finite, or `smoothness` outside 0 to 1.
 pub fn keying_screen(
     (width, height): (usize, usize),
     points: &[ScreenPoint],
@@ -41,18 +41,19 @@ pub fn keying_screen(
     check_value((0.0..=1.0).contains(&smoothness), "smoothness", || {
         format!("{smoothness}, expected 0 to 1")
     })?;
-    check_colors(points)?;
-    let points = points_inside(points, width, height)?;
     let size = [width as f64, height as f64];
+    check_colors(points, size)?;
+    let points = points_inside(points, width, height)?;
     let sigma = SHARPEST_SIGMA + SMOOTHNESS_SIGMA * smoothness;
     Ok(Image::from_fn(width, height, |x, y| {
         screen_color(&points, [x as f64 + 0.5, y as f64 + 0.5], size, sigma)
     }))
 }
 
-fn check_colors(points: &[ScreenPoint]) -> Result<()> {
-    let mut points = points.iter().enumerate();
-    points.try_for_each(|(i, p)| {
+fn check_colors(points: &[ScreenPoint], size: [f64; 2]) -> Result<()> {
+    let points = points.iter().enumerate();
+    let mut inside = points.filter(|(_, p)| p.is_inside(size));
+    inside.try_for_each(|(i, p)| {
         check_value(p.color.is_finite(), &format!("points[{i}]"), || {
             format!("{:?}, expected finite numbers", p.color.channels())
         })
@@ -161,5 +162,11 @@ mod tests {
             refusal.to_string(),
             "points[1]: [inf, 0.0, 0.5], expected finite numbers"
         );
+        let outside = ScreenPoint {
+            at_px: Point2::new(-1.0, 0.0),
+            ..lost
+        };
+        let plate = keying_screen((20, 10), &[outside, LEFT], 0.0).unwrap();
+        assert_eq!(plate[(0, 0)], LEFT.color);
     }
 }

@@ -7,7 +7,7 @@ use super::check::{check_length, check_photo, check_share, check_value, refused}
 use super::prepared::check_finite_photo;
 use super::register;
 use super::screen::{mean_color, screen_pixels, strongest_channel};
-use crate::bounds::above;
+use crate::bounds::{above, offset_above};
 use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask, Roi};
@@ -229,11 +229,12 @@ impl PlateOptions {
         check_share("max_mismatch", self.max_mismatch)
     }
 
-    fn check_shift(&self, [x, y]: [f64; 2]) -> Result<()> {
+    fn check_shift(&self, shift_px: [f64; 2]) -> Result<()> {
         let most = self.max_shift_px;
-        check_photo(x.abs() <= most && y.abs() <= most, || {
+        check_photo(shift_px.iter().all(|v| v.abs() <= most), || {
             format!(
-                "the empty screen is offset by ({x:.1}, {y:.1}) px from the photo, expected at most {most}; did the camera move?"
+                "the empty screen is offset by {} px from the photo, expected at most {most}; did the camera move?",
+                offset_above(shift_px, most)
             )
         })
     }
@@ -241,7 +242,7 @@ impl PlateOptions {
     fn check_mismatch(&self, mismatch: f32) -> Result<()> {
         check_photo(mismatch <= self.max_mismatch, || {
             format!(
-                "the empty screen differs from the photo's by {} %, expected at most {:.0} %; did the light change?",
+                "the empty screen differs from the photo's by {} %, expected at most {:.1} %; did the light change?",
                 above(100.0 * mismatch, 100.0 * self.max_mismatch),
                 100.0 * self.max_mismatch
             )

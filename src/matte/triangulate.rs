@@ -14,7 +14,7 @@ use super::film::{ColorUncertainty, covered, view};
 use super::plate::ScreenPlate;
 use super::prepared::check_finite_photo;
 use super::register::{self, Registered};
-use crate::bounds::above;
+use crate::bounds::{above, below, offset_above};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::filter;
@@ -346,10 +346,11 @@ impl Aligner<'_> {
     }
 
     fn too_far(&self, found: &Registered) -> Option<String> {
-        let ([x, y], most) = (found.shift_px.map(|v| -v), self.options.max_shift_px);
-        (x.abs().max(y.abs()) > most).then(|| {
+        let (offset, most) = (found.shift_px.map(|v| -v), self.options.max_shift_px);
+        offset.iter().any(|v| v.abs() > most).then(|| {
             format!(
-                "the object is offset by ({x:.1}, {y:.1}) px from the first, expected at most {most}; did it move?"
+                "the object is offset by {} px from the first, expected at most {most}; did it move?",
+                offset_above(offset, most)
             )
         })
     }
@@ -360,7 +361,8 @@ impl Aligner<'_> {
         let is_unlike = agreement.max(0.0) < least;
         (found.sigma_px < MAX_JUDGED_SIGMA_PX && is_unlike).then(|| {
             format!(
-                "correlation with the first is {agreement:.2}, expected {least:.2}; did the object turn or the light change, or is it dyed? a dyed one is let through by --set film.least_agreement=0"
+                "correlation with the first is {}, expected {least:.2}; did the object turn or the light change, or is it dyed? a dyed one is let through by --set film.least_agreement=0",
+                below(agreement, least)
             )
         })
     }

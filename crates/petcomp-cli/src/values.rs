@@ -2,6 +2,7 @@
 //! together.
 
 use clap::builder::RangedU64ValueParser;
+use petcomp::asset::ScreenSource;
 use petcomp::matte::key::expected_of_screen;
 use petcomp::{Error, LinearRgb};
 use std::any::TypeId;
@@ -41,11 +42,12 @@ fn with_negative_number(arg: clap::Arg) -> clap::Arg {
         .allow_hyphen_values(is_list)
 }
 
-/// Whether the value is a list of numbers. Clap takes for it whatever follows, another option too:
-/// what parses it says what was expected.
+/// Whether the value is a list of numbers, or may be one. Clap takes for it whatever follows,
+/// another option too: what parses it says what was expected.
 fn takes_list(arg: &clap::Arg) -> bool {
     let lists = [
         TypeId::of::<LinearRgb>(),
+        TypeId::of::<ScreenSource>(),
         TypeId::of::<[usize; 2]>(),
         TypeId::of::<[u32; 2]>(),
         TypeId::of::<[f64; 2]>(),

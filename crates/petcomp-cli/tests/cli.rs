@@ -1217,6 +1217,9 @@ fn lists_that_begin_with_a_minus_are_values() {
     let told = desk.refused(&[&screen[..], &["--point", "-1,2"]].concat());
     assert!(told.contains("\"-1,2\", expected X,Y"), "{told}");
     desk.ok(&[&key[..], &["--screen", "-0.2,0.4,-0.1"]].concat());
+    let add = "asset add none.png --class a --length 0.2 -o assets";
+    let told = desk.refused(&words(&format!("{add} --screen -0.2,0.4,-0.1")));
+    assert!(told.contains("none.png"), "{told}");
 }
 
 #[test]

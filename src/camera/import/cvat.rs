@@ -35,6 +35,7 @@ fn annotation(image: Node<'_, '_>) -> Result<Annotation> {
         size: Some([width, height]),
         shapes: shapes(image)?,
         source: PROGRAM,
+        ..Annotation::default()
     })
 }
 

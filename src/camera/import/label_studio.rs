@@ -58,7 +58,21 @@ fn is_task(value: &Value) -> bool {
 
 pub(super) fn annotations(value: Value) -> Result<Vec<Annotation>> {
     let tasks = items(&value).iter().enumerate();
-    with_shapes(tasks.map(|(i, task)| annotation(task).map_err(|e| e.within(&format!("[{i}]")))))
+    with_shapes(tasks.map(|(i, task)| annotation_at(format!("[{i}]"), task)))
+}
+
+/// The annotation of a task at a place in the file.
+fn annotation_at(at: String, task: &Value) -> Result<Annotation> {
+    let annotation = annotation(task).map_err(|e| e.within(&at))?;
+    if annotation.pictures.is_empty() && !annotation.shapes.is_empty() {
+        let place = match task.get("data") {
+            Some(_) => format!("{at}.data"),
+            None => at,
+        };
+        let what = "no name of a picture, expected an address that ends in .jpg, .png, ..";
+        return Err(Error::value(place, what));
+    }
+    Ok(Annotation { at, ..annotation })
 }
 
 /// The elements of an array; none of anything else.
@@ -85,11 +99,7 @@ fn annotation(task: &Value) -> Result<Annotation> {
             tags.extend(value.get("to_name").and_then(Value::as_str));
         }
     }
-    annotation.pictures = pictures(task, &tags);
-    if annotation.pictures.is_empty() && !annotation.shapes.is_empty() {
-        let what = "no name of a picture, expected an address that ends in .jpg, .png, ..";
-        return Err(Error::value("data", what));
-    }
+    [annotation.pictures, annotation.others] = pictures(task, &tags);
     Ok(annotation)
 }
 
@@ -238,23 +248,33 @@ fn turned_about_corner([x, y]: [f64; 2], [w, h]: [f64; 2], degrees: f64) -> Vec<
 const UNREAD_ENDINGS: [&str; 2] = [".bmp", ".webp"];
 
 /// The pictures of a task that shapes may be on: the field of the name that their tag has, or else
-/// the uploaded file, or else any field, as a tag may have another name than its field.
-fn pictures(task: &Value, tags: &[&str]) -> Vec<PictureNames> {
+/// the uploaded file, or else any field, as a tag may have another name than its field. Then those
+/// of all fields: the first may be known by an address in a cloud alone.
+fn pictures(task: &Value, tags: &[&str]) -> [Vec<PictureNames>; 2] {
     let data = task.get("data").unwrap_or(task);
     let named = tags.iter().filter_map(|tag| data.get(*tag));
-    let choices = [
-        pictures_at(named),
-        pictures_at(task.get("file_upload")),
-        pictures_at(member_values(data)),
-    ];
+    let uploaded = task.get("file_upload");
+    let all = pictures_at(member_values(data).chain(uploaded));
+    let choices = [pictures_at(named), pictures_at(uploaded)];
     let first = choices.into_iter().find(|choice| !choice.is_empty());
-    first.into_iter().flatten().collect()
+    [first.unwrap_or_else(|| all.clone()), all]
 }
 
-fn pictures_at<'a>(addresses: impl IntoIterator<Item = &'a Value>) -> BTreeSet<PictureNames> {
+fn pictures_at<'a>(addresses: impl IntoIterator<Item = &'a Value>) -> Vec<PictureNames> {
     let addresses = addresses.into_iter().filter_map(Value::as_str);
     let names = addresses.filter_map(picture_name);
-    names.map(with_original_name).collect()
+    without_repeated(&names.map(with_original_name).collect())
+}
+
+/// Without those all of whose names another one has, too: a field often has the bare name of the
+/// file whose address is in another.
+fn without_repeated(pictures: &BTreeSet<PictureNames>) -> Vec<PictureNames> {
+    let is_repeated = |one: &PictureNames| {
+        let mut others = pictures.iter().filter(|other| *other != one);
+        others.any(|other| one.iter().all(|name| other.contains(name)))
+    };
+    let kept = pictures.iter().filter(|one| !is_repeated(one));
+    kept.cloned().collect()
 }
 
 /// A name, and the one that the file may have had before it was uploaded.
@@ -462,6 +482,26 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_under_two_names_is_one() {
+        let both = r#""image": "/data/upload/3/0123abcd-bg.jpg", "filename": "bg.jpg""#;
+        let min = MIN.replace(
+            "\"image\": \"/data/local-files/?d=photos/my%20bg.jpg\"",
+            both,
+        );
+        assert_eq!(only(&min).pictures, [["0123abcd-bg.jpg", "bg.jpg"]]);
+    }
+
+    #[test]
+    fn other_pictures_of_the_task_are_known() {
+        let (before, _) = JSON.split_once("\"file_upload\"").unwrap();
+        let named = before.replace("\"type\": \"polygonlabels\"", "\"to_name\": \"image\"");
+        let data = r#""data": {"image": "s3://b/9f.jpg", "filename": "bg.jpg"}"#;
+        let annotation = only(&format!("{named}{data}}}]"));
+        assert_eq!(annotation.pictures, [["9f.jpg"]]);
+        assert_eq!(annotation.others, [["9f.jpg"], ["bg.jpg"]]);
+    }
+
+    #[test]
     fn signed_addresses_and_every_format_have_names() {
         for (address, name) in [
             ("https://x.org/b/a.jpg?X-Amz-Signature=0f&n=1/2", "a.jpg"),
@@ -476,11 +516,15 @@ mod tests {
 
     #[test]
     fn a_task_whose_picture_has_no_name_is_named() {
-        let text = JSON.replace(".jpg", ".pdf");
-        let told = super::super::annotations(&text).unwrap_err().to_string();
-        let expected =
-            "[0].data: no name of a picture, expected an address that ends in .jpg, .png, ..";
-        assert_eq!(told, expected);
+        // The short export has no `data`.
+        for (export, place) in [(JSON, "[0].data"), (MIN, "[0]")] {
+            let text = export.replace(".jpg", ".pdf");
+            let told = super::super::annotations(&text).unwrap_err().to_string();
+            let expected = format!(
+                "{place}: no name of a picture, expected an address that ends in .jpg, .png, .."
+            );
+            assert_eq!(told, expected);
+        }
     }
 
     #[test]

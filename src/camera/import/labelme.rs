@@ -43,6 +43,7 @@ pub(super) fn annotation(value: Value) -> Result<Annotation> {
         size: file.image_width.zip(file.image_height).map(|(w, h)| [w, h]),
         shapes: file.shapes.into_iter().map(shape).collect(),
         source: PROGRAM,
+        ..Annotation::default()
     })
 }
 

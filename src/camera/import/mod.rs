@@ -18,6 +18,10 @@ use serde_json::Value;
 pub(crate) struct Annotation {
     /// The picture; several where the program does not say on which of them the shapes are.
     pub(crate) pictures: Vec<PictureNames>,
+    /// Pictures that are named beside it, one of which may be it where it is not there.
+    pub(crate) others: Vec<PictureNames>,
+    /// Where in the file it stands; empty where no place has a name.
+    pub(crate) at: String,
     /// Width and height, pixels; none where the program does not record them.
     pub(crate) size: Option<[u32; 2]>,
     pub(crate) shapes: Vec<AnnotatedShape>,

@@ -9,7 +9,7 @@ use crate::io::format::Format;
 use crate::io::header::{Header, Notes, note};
 use crate::io::limits::{Demand, Limits};
 use crate::quality::Quality;
-use png::{BitDepth, CodingIndependentCodePoints, ColorType, Compression, Transformations};
+use png::{BitDepth, ColorType, Compression, Transformations};
 use std::io::{BufRead, Cursor, ErrorKind, Seek};
 
 impl From<png::DecodingError> for Refusal {
@@ -84,10 +84,12 @@ fn texts(info: &png::Info<'_>) -> Notes {
 pub(crate) fn color_description(bytes: &[u8], limits: &Limits) -> Option<ColorDescription> {
     let reader = open(Cursor::new(bytes), bytes.len() as u64, limits).ok()?;
     let info = reader.info();
-    if let Some(cicp) = info.coding_independent_code_points
-        && (are_applied(cicp) || info.icc_profile.is_none())
-    {
-        return Some(described_code_points(cicp));
+    if let Some(cicp) = info.coding_independent_code_points {
+        let (primaries, transfer) = (cicp.color_primaries, cicp.transfer_function);
+        let is_known = known_code_points(primaries, transfer).is_some();
+        if is_known || info.icc_profile.is_none() {
+            return Some(ColorDescription::CodePoints(primaries, transfer));
+        }
     }
     if let Some(icc) = &info.icc_profile {
         return Some(ColorDescription::Icc(icc.to_vec()));
@@ -98,17 +100,11 @@ pub(crate) fn color_description(bytes: &[u8], limits: &Limits) -> Option<ColorDe
     }
 }
 
-fn are_applied(cicp: CodingIndependentCodePoints) -> bool {
-    let known = known_code_points(cicp.color_primaries, cicp.transfer_function);
-    cicp.is_video_full_range_image && known.is_some()
-}
-
-fn described_code_points(cicp: CodingIndependentCodePoints) -> ColorDescription {
-    let (primaries, transfer) = (cicp.color_primaries, cicp.transfer_function);
-    match cicp.is_video_full_range_image {
-        true => ColorDescription::CodePoints(primaries, transfer),
-        false => ColorDescription::NarrowCodePoints(primaries, transfer),
-    }
+/// Codes are said to lie in the narrow range of video.
+pub(crate) fn has_narrow_range(bytes: &[u8], limits: &Limits) -> bool {
+    let reader = open(Cursor::new(bytes), bytes.len() as u64, limits).ok();
+    let code_points = reader.and_then(|reader| reader.info().coding_independent_code_points);
+    code_points.is_some_and(|cicp| !cicp.is_video_full_range_image)
 }
 
 /// The exponent and the primaries, if either is present.
@@ -297,6 +293,10 @@ mod tests {
         name: png::chunk::ChunkType,
         data: &[u8],
     ) -> Option<ColorDescription> {
+        color_description(&with_chunk(icc, name, data), &Limits::default())
+    }
+
+    fn with_chunk(icc: &'static [u8], name: png::chunk::ChunkType, data: &[u8]) -> Vec<u8> {
         let mut info = png::Info::with_size(1, 1);
         info.icc_profile = (!icc.is_empty()).then_some(icc.into());
         let mut bytes = Vec::new();
@@ -305,7 +305,7 @@ mod tests {
         writer.write_chunk(name, data).unwrap();
         writer.write_image_data(&[0]).unwrap();
         drop(writer);
-        color_description(&bytes, &Limits::default())
+        bytes
     }
 
     #[test]
@@ -323,18 +323,21 @@ mod tests {
     }
 
     #[test]
-    fn code_points_of_narrow_range_are_not_applied() {
-        let chunk = [12, 13, 0, 0];
-        let narrow = described(b"", png::chunk::cICP, &chunk).unwrap();
-        assert_eq!(narrow, ColorDescription::NarrowCodePoints(12, 13));
-        let told = DisplayProfile::from_description(narrow).unwrap_err();
-        assert!(
-            told.ends_with("narrow range, taken as full range"),
-            "{told}"
-        );
-        let profile = ColorDescription::Icc(b"a profile".to_vec());
-        let beside = described(b"a profile", png::chunk::cICP, &chunk);
-        assert_eq!(beside, Some(profile));
+    fn code_points_of_narrow_range_are_applied_and_told() {
+        for (range, is_narrow) in [(0, true), (1, false)] {
+            let chunk = [12, 13, 0, range];
+            let name = png::chunk::cICP;
+            let expected = ColorDescription::CodePoints(12, 13);
+            assert_eq!(described(b"", name, &chunk), Some(expected));
+            for icc in [&b""[..], b"a profile"] {
+                let file = with_chunk(icc, name, &chunk);
+                assert_eq!(has_narrow_range(&file, &Limits::default()), is_narrow);
+            }
+        }
+        assert!(!has_narrow_range(
+            &with_chunk(b"", png::chunk::sRGB, &[0]),
+            &Limits::default()
+        ));
     }
 
     #[test]

@@ -48,8 +48,6 @@ pub(crate) enum ColorDescription {
     },
     /// Primaries and transfer function by their numbers in ITU-T H.273.
     CodePoints(u8, u8),
-    /// The same of codes in the narrow range of video.
-    NarrowCodePoints(u8, u8),
     /// Adobe RGB (1998), by name.
     AdobeRgb,
     /// Not sRGB, and nothing says what.
@@ -100,9 +98,6 @@ impl DisplayProfile {
                     .ok_or_else(|| format!("code points {primaries}/{transfer} for its colours"))?;
                 Self::from_curve(exponent, Some(space))
             }
-            ColorDescription::NarrowCodePoints(primaries, transfer) => Err(format!(
-                "code points {primaries}/{transfer} for colours of narrow range, taken as full range"
-            )),
             ColorDescription::AdobeRgb => {
                 let matrix = to_rec709(&RgbSpace::ADOBE_RGB)?;
                 Self::from_power(Some(ADOBE_EXPONENT), matrix).map(Some)

@@ -27,8 +27,13 @@ const UNASSOCIATED_ALPHA: u16 = 2;
 const SEPARATE_PLANES: u16 = 2;
 /// TIFF 6.0, `FillOrder`: the first pixel is in the lowest bit.
 const LOWEST_BIT_FIRST: u16 = 2;
-/// TIFF 6.0, `Compression`.
+/// TIFF 6.0 and its supplements, `Compression`.
+const NO_COMPRESSION: u16 = 1;
 const LZW_COMPRESSION: u16 = 5;
+const OLD_JPEG_COMPRESSION: u16 = 6;
+const JPEG_COMPRESSION: u16 = 7;
+/// The last two bytes of a JPEG.
+const END_OF_JPEG: &[u8] = b"\xff\xd9";
 /// TIFF 6.0, `PhotometricInterpretation`: codes are indices into a palette.
 const PALETTE_COLOR: u16 = 3;
 /// TIFF 6.0 and its supplements, the same: lightness and two differences of colour.
@@ -375,26 +380,44 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
         // OpenImageIO would read its bits as bytes.
         Err(Refusal::Unsupported(what)) if !states_bits(bytes) => Err(Refusal::Broken(what)),
         // OpenImageIO would fill up what is missing of some kinds.
-        Err(Refusal::Unsupported(_)) if is_cut(bytes, limits) => Err(truncated()),
+        Err(Refusal::Unsupported(_)) if is_cut_file(bytes, limits) => Err(truncated()),
         decoded => decoded,
     }
 }
 
-/// The file ends before a strip or tile of its first picture does.
-fn is_cut(bytes: &[u8], limits: &Limits) -> bool {
-    let Ok(decoder) = Decoder::new(Cursor::new(bytes)) else {
-        return false;
+/// The file ends before a strip or tile of its first picture does. Lengths that are stated too long
+/// do no harm to a JPEG whose end is there, nor without compression, where OpenImageIO itself
+/// refuses what is missing.
+fn is_cut(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> bool {
+    let is_jpeg = match compression(decoder) {
+        Ok(NO_COMPRESSION) | Err(_) => return false,
+        Ok(method) => [OLD_JPEG_COMPRESSION, JPEG_COMPRESSION].contains(&method),
     };
-    let mut decoder = decoder.with_limits(metadata_limits(limits));
+    let mut too_long = beyond_the_end(decoder, bytes).into_iter();
+    too_long.any(|chunk| !is_jpeg || !chunk.windows(2).any(|pair| pair == END_OF_JPEG))
+}
+
+/// The same of a file whose pixels the decoder cannot read.
+fn is_cut_file(bytes: &[u8], limits: &Limits) -> bool {
+    let decoder = Decoder::new(Cursor::new(bytes)).ok();
+    let decoder = decoder.map(|decoder| decoder.with_limits(metadata_limits(limits)));
+    decoder.is_some_and(|mut decoder| is_cut(&mut decoder, bytes))
+}
+
+/// Of strips and tiles that are stated to reach beyond the end of the file, what is there.
+fn beyond_the_end<'a>(decoder: &mut Decoder<impl Read + Seek>, bytes: &'a [u8]) -> Vec<&'a [u8]> {
     let lists = [
         [Tag::StripOffsets, Tag::StripByteCounts],
         [Tag::TileOffsets, Tag::TileByteCounts],
     ];
-    lists.into_iter().any(|tags| {
-        let [places, lengths] = tags.map(|tag| long_integers(&mut decoder, tag));
-        let mut chunks = places.iter().zip(lengths);
-        chunks.any(|(place, length)| place.saturating_add(length) > bytes.len() as u64)
-    })
+    let chunks = lists.into_iter().flat_map(|tags| {
+        let [places, lengths] = tags.map(|tag| long_integers(decoder, tag));
+        places.into_iter().zip(lengths)
+    });
+    chunks
+        .filter(|&(place, length)| place.saturating_add(length) > bytes.len() as u64)
+        .map(|(place, _)| bytes.get(place as usize..).unwrap_or_default())
+        .collect()
 }
 
 /// The numbers of a tag; none where it is not there or cannot be read.
@@ -414,6 +437,7 @@ fn decode_known(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     limits.check_memory(file.width, file.height, file.names.len())?;
     let extra = extra_samples(&mut file.decoder)?;
     refuse_old_lzw(&mut file.decoder, bytes)?;
+    refuse_cut_jpeg(&mut file.decoder, bytes)?;
     let mut samples = read_chunks(&mut file)?;
     if file.inks {
         samples = light_left_by_inks(samples)?;
@@ -445,7 +469,20 @@ fn refuse_old_lzw(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> Resu
 }
 
 fn is_lzw(decoder: &mut Decoder<impl Read + Seek>) -> Result<bool, TiffError> {
-    Ok(decoder.find_tag_unsigned(Tag::Compression)? == Some(LZW_COMPRESSION))
+    Ok(compression(decoder)? == LZW_COMPRESSION)
+}
+
+/// The decoder would fill up what is missing.
+fn refuse_cut_jpeg(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> Result<(), Refusal> {
+    match compression(decoder)? == JPEG_COMPRESSION && is_cut(decoder, bytes) {
+        true => Err(truncated()),
+        false => Ok(()),
+    }
+}
+
+fn compression(decoder: &mut Decoder<impl Read + Seek>) -> Result<u16, TiffError> {
+    let stated = decoder.find_tag_unsigned(Tag::Compression)?;
+    Ok(stated.unwrap_or(NO_COMPRESSION))
 }
 
 /// Where the strips or tiles of a picture lie, and what each of them holds.
@@ -592,9 +629,12 @@ fn read_chunk(
 ) -> Result<(Samples, [usize; 2]), Refusal> {
     let number = u32::try_from(index).map_err(|_| "damaged TIFF: strips without number")?;
     let decoded = decoder.read_chunk(number);
-    // Where it decodes row by row, as of tiles that reach over the border, it takes the last codes
-    // for missing (weezl 0.1.12).
-    if decoded.as_ref().is_err_and(is_early_end) && is_lzw(decoder)? {
+    // Of tiles that reach over the right border, which it decodes row by row, it takes the last
+    // codes for missing (weezl 0.1.12).
+    if decoded.as_ref().is_err_and(is_early_end)
+        && is_lzw(decoder)?
+        && decoder.chunk_data_dimensions(number).0 < decoder.chunk_dimensions().0
+    {
         return Err(unsupported(&"LZW whose end is not found"));
     }
     let chunk = known_samples(decoded?);
@@ -806,18 +846,36 @@ mod tests {
     #[test]
     fn a_cut_file_is_not_left_to_another_decoder() {
         const LZMA_COMPRESSION: u16 = 34_925;
-        // The codes 256 (begin) and 7, nine bits each: the others are not there.
-        let codes = [0x80, 0x01, 0xc0];
-        for compression in [LZMA_COMPRESSION, LZW_COMPRESSION] {
-            let whole = with_strip(compression, &codes);
-            let refusal = |file: &[u8]| decode(file, &Limits::default()).err().unwrap();
-            let left = refusal(&whole);
-            assert!(matches!(left, Refusal::Unsupported(_)), "{left}");
-            match refusal(&whole[..whole.len() - 1]) {
-                Refusal::Broken(told) => assert_eq!(told, "truncated TIFF"),
-                other => panic!("{compression}: {other}"),
-            }
+        let whole = with_strip(LZMA_COMPRESSION, &[1, 2, 3]);
+        let left = decode(&whole, &Limits::default()).err().unwrap();
+        assert!(matches!(left, Refusal::Unsupported(_)), "{left}");
+        assert_truncated(&whole[..whole.len() - 1]);
+        // Strips are not decoded row by row. The codes 256 (begin) and 7, nine bits each: the
+        // others are not there.
+        assert_truncated(&with_strip(LZW_COMPRESSION, &[0x80, 0x01, 0xc0]));
+    }
+
+    fn assert_truncated(file: &[u8]) {
+        match decode(file, &Limits::default()) {
+            Err(Refusal::Broken(told)) => assert_eq!(told, "truncated TIFF"),
+            other => panic!("{:?}", other.map(|_| "read")),
         }
+    }
+
+    #[test]
+    fn a_jpeg_is_cut_where_its_end_is_not_there() {
+        let mut jpeg = Vec::new();
+        let encoder = jpeg_encoder::Encoder::new(&mut jpeg, 90);
+        let grey = jpeg_encoder::ColorType::Luma;
+        encoder.encode(&[7; 4], 2, 2, grey).unwrap();
+        jpeg.push(0);
+        let file = with_strip(JPEG_COMPRESSION, &jpeg);
+        // Without its last byte the strip is one too long, and without two it has no end.
+        for missing in [0, 1] {
+            let read = decode(&file[..file.len() - missing], &Limits::default()).unwrap();
+            assert_eq!((read.width, read.height), (2, 2));
+        }
+        assert_truncated(&file[..file.len() - 2]);
     }
 
     #[test]

@@ -367,6 +367,51 @@ fn an_opaque_red_card_has_no_uncertain_tint() {
     assert!(confidence > 0.8, "{confidence}");
 }
 
+/// What covers the ellipse as columns say, on a screen.
+fn solved_columns(screen: LinearRgb, column: impl Fn(usize) -> LinearRgb + Sync) -> FilmMatte {
+    let photo = Image::from_fn(SIZE.0, SIZE.1, |x, y| match is_inside(x, y) {
+        true => column(x),
+        false => screen,
+    });
+    solved_on(screen, &photo)
+}
+
+/// Paper and paint of no clear hue were see-through by 0.2 to 0.6 with a high confidence.
+#[test]
+fn paint_that_is_left_see_through_is_told() {
+    let (green, blue) = ([0.05, 0.42, 0.1], [0.04, 0.11, 0.45]);
+    let [cool_white, ivory, grey_green] =
+        [[0.72, 0.76, 0.87], [0.95, 0.91, 0.72], [0.29, 0.36, 0.27]];
+    for (card, screen) in [(cool_white, blue), (ivory, green), (grey_green, green)] {
+        let found = solved_columns(screen.into(), |_| card.into());
+        let sure = found.color_uncertainty.confidence();
+        assert!(
+            is_warned(&found, Code::TintUncertain) && sure < 0.3,
+            "{card:?}: {sure} {:?}",
+            found.diagnostics
+        );
+    }
+    let plastic = LinearRgb::from(green).scale(CLEAR_TRANSMITTANCE) + LinearRgb::grey(0.015);
+    let half = solved_columns(
+        green.into(),
+        |x| if x < 90 { plastic } else { ivory.into() },
+    );
+    let paint = half.color_uncertainty.paint;
+    assert!((0.3..0.6).contains(&paint), "{paint}");
+    assert!(is_warned(&half, Code::TintUncertain));
+}
+
+#[test]
+fn glints_on_clear_plastic_are_no_paint() {
+    let plastic = GREEN.scale(CLEAR_TRANSMITTANCE) + LinearRgb::grey(0.015);
+    let found = solved_columns(GREEN, |x| match x % 20 {
+        0..2 => plastic + LinearRgb::grey(0.6),
+        _ => plastic,
+    });
+    assert_eq!(found.color_uncertainty.paint, 0.0);
+    assert!(found.diagnostics.is_empty(), "{:?}", found.diagnostics);
+}
+
 #[test]
 fn a_label_of_a_hue_beside_the_screens_is_opaque() {
     // Lime on green, sky on blue: as bright in the screen's channel as the screen through plastic.

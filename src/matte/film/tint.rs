@@ -89,7 +89,7 @@ const EQUAL_MISFIT: f32 = 0.1;
 
 /// Light that the darkest of dyed plastic scatters, were it clear, over the screen's: at most 0.17
 /// on screens of 0.34 to 0.5, more on darker ones. Paint that is not almost black has 0.26 and more.
-const MAX_SCATTERED: f32 = 0.2;
+pub(super) const MAX_SCATTERED: f32 = 0.2;
 /// The same on a screen so dark that plastic reflects as much as it.
 const MAX_SCATTERED_ON_DARK: f32 = 0.5;
 /// Misfit of a dye in plastic that has it: 2.3 at most.
@@ -178,6 +178,8 @@ pub(super) struct TintSamples {
 /// A pixel of the photo and of the screen behind it.
 #[derive(Clone, Copy)]
 struct ScreenPair {
+    /// Of the pixel in the photo.
+    index: usize,
     pixel: [f32; 3],
     screen: [f32; 3],
 }
@@ -228,6 +230,12 @@ impl TintSamples {
     /// The tint that explains the pixels best as plastic, whatever else they may be.
     pub(super) fn fit_plastic(&self) -> [f32; 3] {
         lowest_cost(&self.hypotheses()).flat
+    }
+
+    /// The median of the pixels in another picture of the photo's size; 0 where there are none.
+    pub(super) fn median_of(&self, picture: &Image<f32>) -> f32 {
+        let values = self.pixels.iter().map(|pair| picture.pixels()[pair.index]);
+        median(values, f32::total_cmp).unwrap_or(0.0)
     }
 
     /// Clear plastic, and then every dye in every amount.
@@ -398,6 +406,7 @@ impl ScreenPair {
     #[inline]
     fn at([photo, screen]: [&Image<LinearRgb>; 2], index: usize) -> Self {
         Self {
+            index,
             pixel: photo.pixels()[index].into(),
             screen: screen.pixels()[index].into(),
         }

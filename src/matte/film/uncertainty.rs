@@ -26,6 +26,9 @@ pub struct ColorUncertainty {
     /// How far other tints, or opaque paint, that explain the photo as well differ in what they let
     /// through.
     pub tint: f32,
+    /// Share of the object that reflects as much as paint and was yet left see-through: all of it
+    /// where its darkest does.
+    pub paint: f32,
 }
 
 impl ColorUncertainty {
@@ -34,13 +37,15 @@ impl ColorUncertainty {
     /// most of the others is 0.0022, one of which had lost some, too. The tint of 9 of 10
     /// bottles of the screen's own hue is less certain, that of no other by more than 0.024.
     /// Hue: caps and labels (a fifth of a bottle) are treated as opaque, which they are; where more
-    /// has it, it is the plastic itself.
+    /// has it, it is the plastic itself. Paint: 0.042 at most in those photos; in photos of opaque
+    /// things that were left see-through 0.12 and more.
     pub const NEEDS_REVIEW: Self = Self {
         keyed_away: 0.005,
         screen_hue: 0.25,
         clipped: 0.3,
         guessed: 0.5,
         tint: 0.04,
+        paint: 0.05,
     };
 
     /// How certain colour and transmittance are, 0 to 1: 0.5 where one cause reaches
@@ -51,13 +56,14 @@ impl ColorUncertainty {
             .product()
     }
 
-    fn causes(self) -> [f32; 5] {
+    fn causes(self) -> [f32; 6] {
         [
             self.keyed_away,
             self.screen_hue,
             self.clipped,
             self.guessed,
             self.tint,
+            self.paint,
         ]
     }
 
@@ -67,6 +73,7 @@ impl ColorUncertainty {
             (self.keyed_away > MIN_REPORTED_HUE).then(|| Self::keyed_away(self.keyed_away)),
             (self.screen_hue > MIN_REPORTED_HUE).then(|| Self::screen_hue(self.screen_hue)),
             (self.tint > Self::NEEDS_REVIEW.tint).then(|| Self::tint_uncertain(self.tint)),
+            (self.paint > Self::NEEDS_REVIEW.paint).then(|| Self::see_through_paint(self.paint)),
             (self.clipped > MIN_REPORTED_CLIPPED).then(|| Self::clipped_object(self.clipped)),
         ];
         all.into_iter().flatten().collect()
@@ -107,6 +114,17 @@ impl ColorUncertainty {
         )
     }
 
+    /// `share` of the object reflects as much as paint.
+    fn see_through_paint(share: f32) -> Diagnostic {
+        Diagnostic::warning(
+            Code::TintUncertain,
+            format_args!(
+                "{:.0} % of the object is as bright as paint and yet taken for see-through; if it lets no light through, it needs matte = \"outline\"",
+                100.0 * share
+            ),
+        )
+    }
+
     /// `share` of the object is brighter than the camera can measure.
     fn clipped_object(share: f32) -> Diagnostic {
         Diagnostic::note(
@@ -136,7 +154,7 @@ const MIN_REPORTED_CLIPPED: f32 = 0.03;
 const BARE_TRANSMITTANCE: f32 = 0.85;
 
 /// Transmittance of the screen's channel below which nothing seems to be seen through something.
-const OPAQUE_TRANSMITTANCE: f32 = 0.1;
+pub(super) const OPAQUE_TRANSMITTANCE: f32 = 0.1;
 /// Share of the object that is opaque from which on the rest may be paint, not plastic.
 const MIN_OPAQUE_SHARE: f32 = 0.8;
 /// Shade of the screen from which on paint of its hue is told from what is dark.

@@ -120,7 +120,7 @@ impl Confidence {
         Diagnostic::warning(
             Code::ThresholdSensitive,
             format_args!(
-                "low confidence: bounding box moves {:.0} px at a lower edge threshold; is there a faint tip, or a shadow?",
+                "low confidence: bounding box moves {:.0} px at a lower edge threshold; is there a faint tip, a shadow or, in a small JPEG, its ringing (take a larger photo)?",
                 self.faint_px
             ),
         )
@@ -193,6 +193,19 @@ mod tests {
                 .map(|d| (d.needs_review(), d.message.contains(reason)));
             assert!(told.eq([(true, true)]), "{warnings:?}");
         }
+    }
+
+    #[test]
+    fn a_box_that_grows_may_be_the_ringing_of_a_small_jpeg() {
+        let swollen = Confidence {
+            faint_px: 9.0,
+            ..SURE
+        };
+        let [warning] = &swollen.diagnostics(1.0, 1.0)[..] else {
+            panic!("not one warning");
+        };
+        let advice = "in a small JPEG, its ringing (take a larger photo)";
+        assert!(warning.message.contains(advice), "{warning}");
     }
 
     #[test]

@@ -293,7 +293,7 @@ fn main_object(
 
 fn two_objects([one, other]: &[String; 2]) -> Error {
     refused(format!(
-        "two objects, {one} and {other}; photograph them one by one (or, if it is one, raise the search's option join)"
+        "two objects, {one} and {other}; photograph them one by one (or, if it is one, set `join = 0.08` or more under `[cut_out.segment]` in a TOML list of photos)"
     ))
 }
 

@@ -181,6 +181,24 @@ fn two_objects_are_refused() {
 }
 
 #[test]
+fn parts_that_are_refused_are_one_object_with_the_join_that_is_advised() {
+    let parts = photo(400, 200, GREEN, |x, y| {
+        (disc(x, y, [107.0, 100.0, 50.0]) || disc(x, y, [228.0, 100.0, 45.0])).then_some(WHITE)
+    });
+    let said = said(&parts);
+    let advice = "set `join = 0.08` or more under `[cut_out.segment]` in a TOML list of photos";
+    assert!(said.contains(advice), "{said}");
+    let options = SegmentOptions {
+        join: 0.08,
+        ..SegmentOptions::default()
+    };
+    assert_box(
+        &segment(&parts, &options).unwrap(),
+        [57.0, 50.0, 273.0, 150.0],
+    );
+}
+
+#[test]
 fn a_picture_full_of_object_is_refused() {
     let stripes = photo(300, 200, GREEN, |x, y| {
         ((x + y) % 16.0 < 8.0).then_some(WHITE)

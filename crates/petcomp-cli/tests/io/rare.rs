@@ -160,6 +160,18 @@ fn tiles_of_lzw_that_reach_over_the_border_are_read() {
     assert!(e.ends_with("truncated TIFF"), "{e}");
 }
 
+/// Nothing is missing of a picture without compression whose strip is stated too long.
+#[test]
+fn a_strip_that_is_stated_too_long_is_read() {
+    let folder = Folder::new();
+    let strip: Vec<u8> = (0..=255).collect();
+    let tags = [(259, 3, 1, 1), (278, 3, 1, 16)];
+    let made = in_pieces(&about(16, 16, 4, 1), &tags, STRIPS, &[strip]);
+    let whole = codes_of(&folder.with("whole.tif", &made));
+    let ends_early = codes_of(&folder.with("early.tif", &made[..made.len() - 128]));
+    assert_eq!(ends_early.pixels(), whole.pixels());
+}
+
 /// As quad-tile.tif and cramps-tile.tif of libtiff's sample pictures: what is in tiles stands under
 /// the tags of strips.
 #[test]
