@@ -2,34 +2,35 @@
 
 use super::object::{interior, share, side_px};
 use super::tint::{MAX_SCATTERED, TintSamples};
-use super::uncertainty::OPAQUE_TRANSMITTANCE;
+use super::uncertainty::{ColorUncertainty, OPAQUE_TRANSMITTANCE};
 use super::{FilmInput, claimed};
 use crate::filter;
 use crate::image::{Image, Mask};
 use crate::matte::screen::other_channels;
 use crate::pixel::{Coverage, LinearRgb};
 
-/// Reflected light over the screen's from which on an area is as bright as paint. Of 24 rendered
-/// bottles at most 0.042 is that bright: glints.
+/// Reflected light over the screen's from which on an area is as bright as paint.
 const PAINT_REFLECTION: f32 = 0.66;
-/// Radius of the glints that are no area, as a share of the side of a square of the object's area.
-const GLINT_RADIUS: f64 = 0.01;
+/// Radius of the glints that are no area, as a share of the side of a square of the object's area:
+/// wider ones are up to 0.03 of rendered bottles.
+const GLINT_RADIUS: f64 = 0.015;
 /// The same in small pictures, pixels.
 const MIN_GLINT_RADIUS_PX: f64 = 1.0;
 
-/// Light that a pixel reflects, in the channels that the screen has little of, over that of the
-/// screen's strongest channel, `key`; 0 where it is opaque.
+/// Light that a pixel of this transmittance reflects, in the channels that the screen has little
+/// of; 0 where it is opaque.
 pub(super) fn reflected(pixel: LinearRgb, screen: LinearRgb, t: LinearRgb, key: usize) -> f32 {
     if t.channels()[key] <= OPAQUE_TRANSMITTANCE {
         return 0.0;
     }
     let (pixel, through) = (pixel.channels(), (t * screen).channels());
     let (a, b) = other_channels(std::array::from_fn(|c| pixel[c] - through[c]), key);
-    0.5 * (a + b) / screen.channels()[key].max(f32::MIN_POSITIVE)
+    0.5 * (a + b)
 }
 
-/// The share of the object that is an area as bright as paint; all of it where the pixels that show
-/// the plastic reflect more than it scatters. What a person says is see-through counts nowhere.
+/// The share of the object that is an area as bright as paint, 0 where it is no more than glints
+/// have; all of it where the pixels that show the plastic reflect more than it scatters. What a
+/// person says is see-through counts nowhere.
 ///
 /// `reflected` is what [`reflected`] gives of each pixel.
 pub(super) fn see_through(
@@ -38,17 +39,22 @@ pub(super) fn see_through(
     object: FilmInput<'_>,
 ) -> f32 {
     claimed::clear_paint(&mut reflected, object.claims);
-    if samples.median_of(&reflected) > MAX_SCATTERED {
+    let screen = object.screen.max_channel();
+    if samples.median_of(&reflected) > MAX_SCATTERED * screen {
         return 1.0;
     }
-    let painted = reflected.map(|r| r > PAINT_REFLECTION);
+    let painted = reflected.map(|r| r > PAINT_REFLECTION * screen);
     if !painted.pixels().contains(&true) {
         return 0.0;
     }
     let interior = interior(object.inside, object.longer_side);
     let painted = painted.zip_map(&interior, |painted, inner| painted && inner);
     let areas = without_glints(&painted, object.inside);
-    share(areas.pixels().iter().copied(), object.inside)
+    let share = share(areas.pixels().iter().copied(), object.inside);
+    match share > ColorUncertainty::NEEDS_REVIEW.paint {
+        true => share,
+        false => 0.0,
+    }
 }
 
 /// The mask opened by the radius of glints.

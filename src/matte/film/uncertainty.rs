@@ -26,8 +26,8 @@ pub struct ColorUncertainty {
     /// How far other tints, or opaque paint, that explain the photo as well differ in what they let
     /// through.
     pub tint: f32,
-    /// Share of the object that reflects as much as paint and was yet left see-through: all of it
-    /// where its darkest does.
+    /// Share of the object that reflects as much as paint and was yet left see-through, where it is
+    /// more than glints have; all of it where its darkest does.
     pub paint: f32,
 }
 
@@ -37,8 +37,8 @@ impl ColorUncertainty {
     /// most of the others is 0.0022, one of which had lost some, too. The tint of 9 of 10
     /// bottles of the screen's own hue is less certain, that of no other by more than 0.024.
     /// Hue: caps and labels (a fifth of a bottle) are treated as opaque, which they are; where more
-    /// has it, it is the plastic itself. Paint: 0.042 at most in those photos; in photos of opaque
-    /// things that were left see-through 0.12 and more.
+    /// has it, it is the plastic itself. Paint: wide glints of 24 rendered photos have 0.03 at
+    /// most; of most opaque things that were left see-through it is all, of others 0.05 and more.
     pub const NEEDS_REVIEW: Self = Self {
         keyed_away: 0.005,
         screen_hue: 0.25,

@@ -192,10 +192,8 @@ fn parts_that_are_refused_are_one_object_with_the_join_that_is_advised() {
         join: 0.08,
         ..SegmentOptions::default()
     };
-    assert_box(
-        &segment(&parts, &options).unwrap(),
-        [57.0, 50.0, 273.0, 150.0],
-    );
+    let found = segment(&parts, &options).unwrap();
+    assert_box(&found, [57.0, 50.0, 273.0, 150.0]);
 }
 
 #[test]
