@@ -520,8 +520,9 @@ pub(crate) fn apply_exif(label: &mut Label, header: &io::Header) {
 /// The focal length that the photo's file states, as a 35 mm camera's, where that can be right;
 /// some state 0 for none.
 pub(crate) fn equivalent_mm(label: &Label, header: &io::Header) -> Option<f64> {
+    let mm = header.focal_35mm.unwrap_or_default();
     let plausible = plausible_equivalents(label.taken_size());
-    header.focal_35mm.filter(|mm| plausible.contains(mm))
+    plausible.contains(&mm).then_some(mm)
 }
 
 /// Checks that a surface with objects on it can have the label's sides, which may be in centimetres

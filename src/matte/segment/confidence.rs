@@ -201,11 +201,9 @@ mod tests {
             faint_px: 9.0,
             ..SURE
         };
-        let [warning] = &swollen.diagnostics(1.0, 1.0)[..] else {
-            panic!("not one warning");
-        };
+        let told = swollen.diagnostics(1.0, 1.0);
         let advice = "in a small JPEG, its ringing (take a larger photo)";
-        assert!(warning.message.contains(advice), "{warning}");
+        assert!(told.iter().any(|d| d.message.contains(advice)), "{told:?}");
     }
 
     #[test]
