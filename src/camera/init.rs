@@ -16,7 +16,7 @@ use std::path::Path;
 /// below the label's folder.
 pub fn init_label(photo: &Path, path: &Path, like: Option<&Label>) -> Result<Label> {
     let header = io::read_header(photo)?;
-    io::check_square_pixels(photo)?;
+    header.check_square_pixels(photo)?;
     let mut label = Label::new(
         [header.width as u32, header.height as u32],
         [[0.0; 2]; 4],

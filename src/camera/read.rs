@@ -479,7 +479,7 @@ pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
     check_inside(&label, path)?;
     let header = io::read_header(&photo)?;
     check_photo_size(&label, &photo, &header).map_err(|e| e.in_file(path))?;
-    io::check_square_pixels(&photo)?;
+    header.check_square_pixels(&photo)?;
     apply_exif(&mut label, &header);
     Ok(label)
 }

@@ -215,9 +215,15 @@ pub(super) fn black_without_object(
         return Ok(());
     }
     let object = coverage.map(|c| c.0 > 0.5);
-    let all = photos
-        .iter()
-        .map(|(name, black)| (name.as_str(), visibility(black, frames, &object, free)));
+    let least = MIN_DIFFERENCE * median_where(&frames.light().map(grey), free);
+    // How much each differs from the empty display inside the object, in units of what it does
+    // around it.
+    let all = photos.iter().map(|(name, black)| {
+        let off = difference(black, frames);
+        let around = median_where(&off, free).max(least);
+        let seen = mean_where(&off, &object) / around.max(f32::MIN_POSITIVE);
+        (name.as_str(), seen)
+    });
     let all: Vec<(&str, f32)> = all.collect();
     let unseen = all.iter().filter(|(_, seen)| *seen < UNSEEN);
     let unseen: Vec<&str> = unseen.map(|(name, _)| *name).collect();
@@ -231,17 +237,14 @@ pub(super) fn black_without_object(
     )))
 }
 
-/// How much a black photo differs from the empty display inside an object, in units of what it does
-/// around it.
-fn visibility(black: &Image<f32>, frames: &BlackAndWhite<'_>, object: &Mask, free: &Mask) -> f32 {
+/// How much a black photo differs from the empty display, without noise.
+fn difference(black: &Image<f32>, frames: &BlackAndWhite<'_>) -> Image<f32> {
     let off = black.zip_map(frames.empty_black, |p, e| p - grey(e));
-    let off = filter::gaussian_blur(&off, DIFFERENCE_BLUR_PX).map(f32::abs);
-    let typical = |image: &Image<f32>| median(where_set(image, free), f32::total_cmp);
-    let white = typical(&frames.light().map(grey)).unwrap_or_default();
-    let around = typical(&off)
-        .unwrap_or_default()
-        .max(MIN_DIFFERENCE * white);
-    mean_where(&off, object) / around.max(f32::MIN_POSITIVE)
+    filter::gaussian_blur(&off, DIFFERENCE_BLUR_PX).map(f32::abs)
+}
+
+fn median_where(image: &Image<f32>, mask: &Mask) -> f32 {
+    median(where_set(image, mask), f32::total_cmp).unwrap_or_default()
 }
 
 fn mean_where(image: &Image<f32>, mask: &Mask) -> f32 {

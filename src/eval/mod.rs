@@ -25,6 +25,7 @@ mod coco;
 mod coco_json;
 mod confusion;
 mod curve;
+mod known_rows;
 mod matches;
 mod mistake;
 mod overlap;
@@ -51,6 +52,7 @@ pub use coco_json::{read_coco_results, read_coco_truth};
 pub use confusion::{Confusion, ConfusionOptions};
 #[doc(hidden)]
 pub use curve::{Curves, curves};
+pub(crate) use known_rows::KnownRows;
 #[doc(hidden)]
 pub use matches::Matches;
 #[doc(hidden)]

@@ -1,5 +1,6 @@
 //! Reads truth and detections from folders of YOLO text files.
 
+use super::known_rows::KnownRows;
 use super::{
     Detection, EvalImage, GroundTruth, Picture, check_confidence, filled_lines, in_line,
     is_confidence,
@@ -370,18 +371,14 @@ struct LabelTruth {
 }
 
 fn parse_truth(text: &str, size: [u32; 2], keypoints: usize) -> Parsed<LabelTruth> {
-    let rows = parse_rows(text, 0, keypoints)?;
-    let (count, mut known) = (rows.len(), Vec::new());
-    for row in rows {
-        if !known.contains(&row) {
-            known.push(row);
-        }
-    }
-    let boxes = known.iter();
+    let mut rows = parse_rows(text, 0, keypoints)?;
+    let (count, mut known) = (rows.len(), KnownRows::default());
+    rows.retain(|row| known.insert(row.numbers()));
+    let boxes = rows.iter();
     let boxes = boxes.map(|row| GroundTruth::new(row.class, row.bbox(size)));
     Ok(LabelTruth {
         boxes: boxes.collect(),
-        repeated: count - known.len(),
+        repeated: count - rows.len(),
     })
 }
 
@@ -456,7 +453,6 @@ fn image_size(image: &Path) -> Result<[u32; 2]> {
 }
 
 /// A line: class, box in shares of the image, and what stands behind.
-#[derive(PartialEq)]
 struct LabelRow {
     class: u32,
     shares: BBox,
@@ -599,6 +595,13 @@ fn too_few(numbers: &[f64], extra: usize) -> String {
 }
 
 impl LabelRow {
+    /// All that makes it another object than those of other rows.
+    fn numbers(&self) -> impl Iterator<Item = f64> {
+        let BBox { x0, y0, x1, y1 } = self.shares;
+        let place = [f64::from(self.class), x0, y0, x1, y1].into_iter();
+        place.chain(self.keypoints.iter().copied())
+    }
+
     fn bbox(&self, size: [u32; 2]) -> BBox {
         let ([w, h], shares) = (size.map(f64::from), self.shares);
         BBox {

@@ -1,6 +1,8 @@
 //! The description of a picture in front of its pixels.
 
 use super::format::Format;
+use crate::error::{Error, Result};
+use std::path::Path;
 
 /// Which part of an EXR is the picture. Other formats have only one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -85,6 +87,28 @@ pub struct Header {
     pub noted_adobe_rgb: bool,
     /// Texts that the file carries, by name.
     pub metadata: Vec<(String, String)>,
+}
+
+/// By how much the width of a square pixel may differ from its height, as a share.
+const SQUARE_TOLERANCE: f32 = 1e-3;
+
+impl Header {
+    /// Refuses a photo at a path whose pixels are not square, as an EXR may say: lengths and angles
+    /// in it are not those of its rows and columns.
+    ///
+    /// # Errors
+    /// [`Error::File`] with the shape of its pixels.
+    #[doc(hidden)]
+    pub fn check_square_pixels(&self, path: impl AsRef<Path>) -> Result<()> {
+        let aspect = self.canvas.pixel_aspect;
+        if (aspect - 1.0).abs() <= SQUARE_TOLERANCE {
+            return Ok(());
+        }
+        let what = format!(
+            "pixels are {aspect} times as wide as high, expected square ones: resample it to square pixels first"
+        );
+        Err(Error::file(path.as_ref(), what))
+    }
 }
 
 /// Named texts.

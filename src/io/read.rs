@@ -86,29 +86,18 @@ pub fn read_format(path: impl AsRef<Path>) -> Result<Format> {
     Ok(OpenedSource::open(path.as_ref(), &limits)?.format)
 }
 
-/// By how much the width of a square pixel may differ from its height, as a share.
-const SQUARE_TOLERANCE: f32 = 1e-3;
-
-/// Refuses a photo whose pixels are not square, as an EXR may say: lengths and angles in it are not
-/// those of its rows and columns.
+/// Refuses a photo whose pixels are not square, as an EXR may say.
 ///
 /// # Errors
-/// [`Error::File`] with the shape of its pixels; those of [`read_header`].
+/// Those of [`Header::check_square_pixels`] and [`read_header`].
 #[doc(hidden)]
 pub fn check_square_pixels(path: impl AsRef<Path>) -> Result<()> {
     let path = path.as_ref();
     // Headers of other formats may take long, and say nothing of it.
-    if read_format(path)? != Format::Exr {
-        return Ok(());
+    match read_format(path)? {
+        Format::Exr => read_header(path)?.check_square_pixels(path),
+        _ => Ok(()),
     }
-    let aspect = read_header(path)?.canvas.pixel_aspect;
-    if (aspect - 1.0).abs() <= SQUARE_TOLERANCE {
-        return Ok(());
-    }
-    let what = format!(
-        "pixels are {aspect} times as wide as high, expected square ones: resample it to square pixels first"
-    );
-    Err(Error::file(path, what))
 }
 
 /// How many pictures like these are worked on at once: as many as half of the machine's memory holds

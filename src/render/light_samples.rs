@@ -38,7 +38,8 @@ impl LitPatch {
     fn samples_along(&self, light: &AreaLight, most: usize) -> [usize; 2] {
         let [a, b] = light::side_lengths(light);
         let longer = a.max(b);
-        let wanted = [a, b].map(|side| self.wanted_samples(light, longer) * side / longer);
+        let wanted = self.wanted_samples(light, longer);
+        let wanted = [a, b].map(|side| wanted * side / longer);
         let most = light::samples_along(light, most);
         [0, 1].map(|k| (wanted[k].ceil() as usize).clamp(1, most[k]))
     }

@@ -2,6 +2,7 @@
 
 use crate::dataset::finding::Finding;
 use crate::diagnostic::Code;
+use crate::eval::KnownRows;
 use std::path::Path;
 
 /// Class of a row, and the sides of its box; none of an outline.
@@ -19,14 +20,15 @@ pub(super) fn read_rows(
 ) -> (Vec<LabelRow>, Vec<Finding>) {
     let rows = split_rows(text);
     let format = RowFormat::new(&rows, class_count);
-    let (mut known, mut findings) = (Vec::new(), Vec::new());
+    let (mut good, mut findings) = (Vec::new(), Vec::new());
+    let mut known = KnownRows::default();
     for (line, row) in rows {
-        match format.parse_new(&row, &known) {
-            Ok(values) => known.push(values),
+        match format.parse_new(&row, &mut known) {
+            Ok(values) => good.push(values),
             Err((code, message)) => findings.push(Finding::in_line(path, line, code, message)),
         }
     }
-    let good = known.iter().filter(|_| class_count.is_some());
+    let good = good.iter().filter(|_| class_count.is_some());
     let good = good.map(|values| format.label(values)).collect();
     (good, findings)
 }
@@ -72,11 +74,11 @@ impl RowFormat {
     }
 
     /// The numbers of a row that is none of those before.
-    fn parse_new(&self, row: &[&str], known: &[Vec<f64>]) -> Result<Vec<f64>, (Code, String)> {
+    fn parse_new(&self, row: &[&str], known: &mut KnownRows) -> Result<Vec<f64>, (Code, String)> {
         let values = self.parse(row).map_err(|what| (Code::BadLabelRow, what))?;
-        match known.contains(&values) {
-            false => Ok(values),
-            true => Err((Code::DuplicateLabelRow, "the same row stands above".into())),
+        match known.insert(values.iter().copied()) {
+            true => Ok(values),
+            false => Err((Code::DuplicateLabelRow, "the same row stands above".into())),
         }
     }
 

@@ -47,7 +47,7 @@ impl RectifyArgs {
     /// The size of the photo, which may be a reduced one of the label's.
     fn photo_size(&self, labelled: &LabelledPhoto) -> anyhow::Result<[u32; 2]> {
         let header = io::read_header(&self.photo)?;
-        io::check_square_pixels(&self.photo)?;
+        header.check_square_pixels(&self.photo)?;
         let (size, [w, h]) = (
             [header.width as u32, header.height as u32],
             labelled.label.image_size(),
