@@ -37,7 +37,9 @@ def full(options, cache, program):
     arms["reality"]["rooms"] = options.rooms or arms["reality"]["rooms"]
     if options.test_pictures:
         arms["reality"]["test_pictures"] = options.test_pictures
-    name = options.name or "rooms_" + "_".join(map(str, arms["reality"]["rooms"]))
+    if options.gpu:
+        arms["training"] |= arms["training"]["on_gpu"]
+    name = options.name or "_".join(["gpu"] * options.gpu + ["rooms", *map(str, arms["reality"]["rooms"])])
     return studies.Study(arms, cache / name, cache / "world", program)
 
 

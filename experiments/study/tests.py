@@ -1,13 +1,16 @@
 """Of what needs no training: `python -m unittest study.tests` in the folder of the experiments."""
 
+import importlib.util
 import tempfile
 import unittest
+import unittest.mock
 from pathlib import Path
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 
-from . import archive, bootstrap, chance, main, results, score
+from . import archive, bootstrap, chance, files, main, results, score
 
 # Half of an interval of 95 %, in standard deviations.
 REACH = 1.96
@@ -53,10 +56,53 @@ class Check(unittest.TestCase):
 
 def check_headline(cache, rooms, test_pictures):
     options = SimpleNamespace(
-        headline=True, screening=None, rooms=rooms, test_pictures=test_pictures, name=None, seeds=None
+        headline=True, screening=None, gpu=False, rooms=rooms, test_pictures=test_pictures, name=None, seeds=None
     )
     study = main.full(options, cache, None)
     main.check_planned(study, main.kept(study), main.chosen(options, study.arms), options.seeds)
+
+
+@unittest.skipUnless(importlib.util.find_spec("torch"), "PyTorch is not there")
+class Augmented(unittest.TestCase):
+    """Of the pictures that a GPU augments; a processor does the same."""
+
+    @unittest.mock.patch("study.augment.LEAST_AREA", 0)
+    @unittest.mock.patch("study.augment.LEAST_SIDE", 0)
+    @unittest.mock.patch("study.augment.MOST_ASPECT", np.inf)
+    def test_boxes_cover_what_was_in_them(self):
+        from . import augment
+
+        with tempfile.TemporaryDirectory() as folder:
+            pictures = augment.Pictures([red_rectangle(Path(folder), name) for name in range(4)], 1, "cpu")
+            loader = augment.Loader([pictures], SimpleNamespace(batch=4), 160, seed=0)
+            for is_mosaic in (True, False):
+                loader.is_mosaic = is_mosaic
+                batch = loader.made(np.random.default_rng(1), [0, 1, 2, 3])
+                is_red = (batch["img"][:, 0] - batch["img"][:, 2] > 15).numpy()
+                self.assertGreater(is_red.sum(), 1000)
+                self.assertTrue(is_red[boxed(batch, -1)].all())
+                self.assertFalse((is_red & ~boxed(batch, 1)).any())
+
+
+def red_rectangle(folder, name):
+    """Of a third of a black picture, with its label."""
+    picture = np.zeros((120, 160, 3), np.uint8)
+    left, top = 20 * name, 10 * name
+    picture[top : top + 40, left : left + 80] = (0, 0, 255)
+    path = folder / f"images/{name}.png"
+    path.parent.mkdir(exist_ok=True)
+    cv2.imwrite(str(path), picture)
+    files.write_text(files.label_of(path), f"0 {(left + 40) / 160} {(top + 20) / 120} {80 / 160} {40 / 120}\n")
+    return str(path)
+
+
+def boxed(batch, margin):
+    """Where boxes are, larger by so many pixels on each side."""
+    mask = np.zeros((len(batch["img"]), *batch["img"].shape[2:]), bool)
+    for owner, (x, y, width, height) in zip(batch["batch_idx"].int(), batch["bboxes"].numpy() * 160):
+        rows = slice(max(0, round(y - height / 2 - margin)), round(y + height / 2 + margin))
+        mask[owner, rows, max(0, round(x - width / 2 - margin)) : round(x + width / 2 + margin)] = True
+    return mask
 
 
 def some_matches(pictures=20):

@@ -22,7 +22,7 @@ from ultralytics.data.dataset import YOLODataset
 from ultralytics.models.yolo.detect import DetectionTrainer
 from ultralytics.nn.tasks import DetectionModel
 
-from . import files
+from . import augment, files
 
 # Equation 2 is that of `petcomp dataset train-kit`.
 sys.path.append(str(Path(__file__).parents[2] / "src/train/kit"))
@@ -42,6 +42,7 @@ MOST_DETECTIONS = 100
 def main(path):
     training = json.loads(path.read_text())
     torch.set_num_threads(training["threads"])
+    torch.backends.cudnn.benchmark = True
     cv2.setNumThreads(1)
     began = time.process_time()
     weights = train(training, path.parent)
@@ -49,6 +50,8 @@ def main(path):
     for room, pictures in training["test"].items():
         predict(training, weights, pictures, path.parent / "predictions" / room)
     done = {"cpu_seconds": round(seconds, 1), "ultralytics": ultralytics.__version__, "torch": torch.__version__}
+    if on_gpu(training):
+        done["device"] = torch.cuda.get_device_name()
     files.write_json(path.with_suffix(".done.json"), done)
 
 
@@ -80,7 +83,8 @@ def settings(training, folder, last):
         "single_cls": training["classes"] == 1,
         "seed": training["seed"],
         "device": training["device"],
-        "amp": training["device"] != "cpu" and "bf16",
+        "amp": on_gpu(training) and "bf16",
+        "deterministic": not on_gpu(training),
         "close_mosaic": WHOLE_PICTURE_PARTS,
         "optimizer": "AdamW",
         "lr0": 0.002,
@@ -98,6 +102,10 @@ def settings(training, folder, last):
     }
 
 
+def on_gpu(training):
+    return training["device"] != "cpu"
+
+
 def data_file(training, folder):
     """Ultralytics wants a list of pictures of its own; ours come by `Streams`."""
     pictures = training["real"] or training["synthetic"]
@@ -112,13 +120,12 @@ def list_file(folder, name, pictures):
 
 
 class Model(DetectionModel):
-    """Computes its loss with 16-bit floats on processors that have them (AVX-512), which Ultralytics does on GPUs alone.
+    """Computes its loss with 16-bit floats on processors that have them (AVX-512) too, which Ultralytics does on GPUs alone.
     Others are eight times as slow with them."""
 
     def loss(self, batch, preds=None):
-        device = batch["img"].device.type
-        is_quick = device == "cpu" and torch.ops.mkldnn._is_mkldnn_bf16_supported()
-        with torch.autocast(device, torch.bfloat16, enabled=is_quick):
+        is_quick = torch.ops.mkldnn._is_mkldnn_bf16_supported()
+        with torch.autocast("cpu", torch.bfloat16, enabled=is_quick):
             return super().loss(batch, preds)
 
 
@@ -137,8 +144,12 @@ class Streams(torch.utils.data.Sampler):
         return self.training["images"] // PARTS // self.batch
 
     def __iter__(self):
+        return map(self.indices, self.numbers())
+
+    def numbers(self):
+        """Of the batches of the part."""
         first = self.part() * len(self)
-        return (self.indices(first + k) for k in range(len(self)))
+        return range(first, first + len(self))
 
     def indices(self, number):
         size, mix = self.batch, self.training["mix"]
@@ -200,9 +211,12 @@ def trainer(training, folder):
             if mode != "train":
                 return super().get_dataloader(dataset_path, batch_size, rank, mode)
             sources = [name for name in ("real", "synthetic") if training[name]]
+            streams = Streams(training, lambda: self.epoch)
+            if on_gpu(training):
+                pictures = [augment.Pictures(training[name], training["classes"], self.device) for name in sources]
+                return augment.Loader(pictures, streams, training["image_size"], training["seed"])
             lists = [list_file(folder, name, training[name]) for name in sources]
             parts = [self.build_dataset(source, mode, batch_size) for source in lists]
-            streams = Streams(training, lambda: self.epoch)
             return balanced.Loader(balanced.Both(parts), batch_sampler=streams, collate_fn=YOLODataset.collate_fn)
 
         def preprocess_batch(self, batch):
