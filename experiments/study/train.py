@@ -208,13 +208,15 @@ def trainer(training, folder):
             return model.to(memory_format=torch.channels_last)
 
         def get_dataloader(self, dataset_path, batch_size=16, rank=0, mode="train"):
-            if mode != "train":
-                return super().get_dataloader(dataset_path, batch_size, rank, mode)
             sources = [name for name in ("real", "synthetic") if training[name]]
             streams = Streams(training, lambda: self.epoch)
             if on_gpu(training):
-                pictures = [augment.Pictures(training[name], training["classes"], self.device) for name in sources]
+                # Nothing is validated, and trainings side by side would write the same cache of labels.
+                names = sources if mode == "train" else []
+                pictures = [augment.Pictures(training[name], training["classes"], self.device) for name in names]
                 return augment.Loader(pictures, streams, training["image_size"], training["seed"])
+            if mode != "train":
+                return super().get_dataloader(dataset_path, batch_size, rank, mode)
             lists = [list_file(folder, name, training[name]) for name in sources]
             parts = [self.build_dataset(source, mode, batch_size) for source in lists]
             return balanced.Loader(balanced.Both(parts), batch_sampler=streams, collate_fn=YOLODataset.collate_fn)
