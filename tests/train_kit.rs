@@ -62,10 +62,10 @@ first, second = list(sampler), list(sampler)
 assert first != second and len(first) == len(sampler) == 12
 assert all(sum(i < 5 for i in batch) == 2 for batch in first)
 assert sorted(i for batch in first for i in batch if i >= 5) == list(range(5, 75))
-real = [i for batch in first for i in batch if i < 5]
-assert all(sorted(real[k : k + 5]) == list(range(5)) for k in range(0, 20, 5))
+real = [i for batch in first + second for i in batch if i < 5]
+assert all(sorted(real[k : k + 5]) == list(range(5)) for k in range(0, 45, 5))
 assert list(balanced.Shares(5, 70, 8, 0.25, seed=3)) == first
-for share in (0.01, 0.99):
+for share in (0, 0.01, 0.99):
     try:
         balanced.Shares(5, 70, 8, share)
     except ValueError as error:

@@ -57,16 +57,18 @@ class Shares(torch.utils.data.Sampler):
         self.of_real = round(share * batch)
         if not 0 < self.of_real < batch:
             raise ValueError(f"share {share}: {self.of_real} of {batch} images are real, expected some of both")
+        rng = random.Random(seed)
+        passes = (rng.sample(range(real), real) for _ in itertools.count())
+        # A pass goes on in the next epoch, so that all are seen equally often.
+        self.passes = itertools.chain.from_iterable(passes)
 
     def __iter__(self):
         rng = random.Random(self.seed * 1_000_003 + self.epoch)
         self.epoch += 1
-        passes = (rng.sample(range(self.real), self.real) for _ in itertools.count())
-        real = itertools.chain.from_iterable(passes)
         order = rng.sample(range(self.real, self.real + self.synthetic), self.synthetic)
         size = self.batch - self.of_real
         for i in range(0, len(order), size):
-            yield [*itertools.islice(real, self.of_real), *order[i : i + size]]
+            yield [*itertools.islice(self.passes, self.of_real), *order[i : i + size]]
 
     def __len__(self):
         return -(-self.synthetic // (self.batch - self.of_real))
@@ -123,17 +125,17 @@ def ultralytics_trainer(batch_size, seed, real_share=None):
             lists = [str(HERE / name) for name in ("real_train.txt", "synthetic_train.txt")]
             parts = [self.build_dataset(path, mode, batch_size) for path in lists]
             counts = map(len, parts)
-            if real_share:
-                sampler = Shares(*counts, batch_size, real_share, seed)
-            else:
+            if real_share is None:
                 sampler = SingleSource(*counts, batch_size, seed)
+            else:
+                sampler = Shares(*counts, batch_size, real_share, seed)
             return Loader(
                 Both(parts), batch_sampler=sampler, num_workers=self.args.workers, collate_fn=YOLODataset.collate_fn
             )
 
         def preprocess_batch(self, batch):
             batch = super().preprocess_batch(batch)
-            if real_share:
+            if real_share is not None:
                 return batch
             sources = {REAL if path in real else SYNTHETIC for path in batch["im_file"]}
             if len(sources) != 1:
@@ -149,7 +151,7 @@ def main():
     parser.add_argument("--model", default="yolov5s.pt")
     parser.add_argument("--epochs", type=int, default=300)
     parser.add_argument("--batch", type=int, default=32)
-    parser.add_argument("--real-share", type=float, help="of each batch, 0 to 1; default: batches of one source, weighted")
+    parser.add_argument("--real-share", type=float, help="of each batch, between 0 and 1; default: batches of one source, weighted")
     parser.add_argument("--img", type=int, default=640)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=8)
