@@ -171,6 +171,7 @@ c: packages
 	ln -sf libpetcomp.so.$(C_MAJOR) $(PREFIX)/lib/libpetcomp.so
 	sed 's|@PREFIX@|$(PREFIX)|; s|@VERSION@|$(C_VERSION)|' crates/petcomp-c/petcomp.pc.in > $(PREFIX)/lib/pkgconfig/petcomp.pc
 	@echo "cc -I$(PREFIX)/include examples/c/sample.c -L$(PREFIX)/lib -lpetcomp -o sample"
+	@echo "export LD_LIBRARY_PATH=$(PREFIX)/lib  # or, where PREFIX is /usr/local: sudo ldconfig"
 
 # The tests of the package for Python, on the extension that was built with all other tests, packed as a wheel and
 # installed into a fresh virtual environment. What cannot be installed is said, and its tests are skipped.

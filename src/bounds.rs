@@ -145,7 +145,8 @@ pub(crate) fn offset_above(offset: [f64; 2], limit: f64) -> String {
         true => v.signum() * v.abs().max(limit + 0.1),
         false => v,
     };
-    let [x, y] = offset.map(told);
+    // What rounds to 0 has no sign.
+    let [x, y] = offset.map(|v| (10.0 * told(v)).round() / 10.0 + 0.0);
     format!("({x:.1}, {y:.1})")
 }
 
@@ -191,6 +192,7 @@ mod tests {
         assert_eq!(above(5.501_f32, 5.5_f32), "5.6");
         assert_eq!(offset_above([-3.01, 0.04], 3.0), "(-3.1, 0.0)");
         assert_eq!(offset_above([2.99, 4.0], 3.0), "(3.0, 4.0)");
+        assert_eq!(offset_above([12.0, -0.04], 8.0), "(12.0, 0.0)");
         let told = [0.899, 0.4].map(|value| below(value, 0.9));
         assert_eq!(told, ["0.89", "0.40"]);
     }

@@ -8,11 +8,12 @@ use super::prepared::check_finite_photo;
 use super::register;
 use super::screen::{mean_color, screen_pixels, strongest_channel};
 use crate::bounds::{above, offset_above};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask, Roi};
 use crate::pixel::{Coverage, LinearRgb};
-use polynomial::Polynomial;
+use polynomial::{MAX_HOT_SPOT, Polynomial};
 use serde::{Deserialize, Serialize};
 
 /// How a screen plate is made.
@@ -49,6 +50,9 @@ pub struct ScreenPlate {
     pub image: Image<LinearRgb>,
     /// How uneven the screen is: 1 minus darkest over brightest, of its strongest channel.
     pub unevenness: f32,
+    /// By which share some of the screen is brighter than the light that fits most of it; 0 where
+    /// the plate is not fitted.
+    pub hot_spot: f32,
     /// Standard deviation of the photo around the plate where the screen is free: noise, and what
     /// the plate misses.
     pub residual: LinearRgb,
@@ -70,7 +74,8 @@ impl ScreenPlate {
     /// cells by iteratively reweighted least squares with [Tukey]'s biweight, narrower on the
     /// dark side, so that shadows and dirt do not count. Light falls off by factors and never
     /// goes below 0: hence the logarithm. The degree is the lowest that no higher one beats by
-    /// `least_gain` in the residual of cells that were left out of the fit.
+    /// `least_gain` in the residual of cells that were left out of the fit; the best one where that
+    /// leaves some of the screen much brighter than its fit (`hot_spot`).
     ///
     /// # Errors
     /// [`Error::Photo`](crate::Error::Photo) where there is not enough background, or no light on
@@ -88,7 +93,13 @@ impl ScreenPlate {
         let cells = cells::means(photo, background);
         let fitted = Polynomial::fit(&cells, photo.size(), options)?;
         let (image, degree) = (fitted.image(photo.size()), Some(fitted.degree));
-        Ok(Self::measured(image, photo, background, degree, [0.0; 2]))
+        let plate = Self::measured(image, photo, background, degree, [0.0; 2]);
+        let hot_spot = fitted.hot_spot;
+        Ok(Self {
+            unevenness: plate.unevenness.max(1.0 - (1.0 + hot_spot).recip()),
+            hot_spot,
+            ..plate
+        })
     }
 
     /// Takes a photo of the empty screen for the plate.
@@ -155,6 +166,7 @@ impl ScreenPlate {
         Self {
             image: Image::filled(width, height, color),
             unevenness: 0.0,
+            hot_spot: 0.0,
             residual: LinearRgb::BLACK,
             degree: Some(0),
             shift_px: [0.0; 2],
@@ -197,11 +209,25 @@ impl ScreenPlate {
         let residual = cells::deviation(photo, &image, background);
         Self {
             unevenness: unevenness(&image),
+            hot_spot: 0.0,
             image,
             residual,
             degree,
             shift_px,
         }
+    }
+
+    /// The warning about a screen with a hot spot, which goes on under the object nobody knows how.
+    pub(super) fn hot_spot_warning(&self) -> Option<Diagnostic> {
+        (self.hot_spot > MAX_HOT_SPOT).then(|| {
+            Diagnostic::warning(
+                Code::UnevenScreen,
+                format_args!(
+                    "some of the screen is {:.0} % brighter than the light that fits most of it: what is seen through the object may be wrong; light the screen evenly, or give a photo of it empty (--plate, or screen in a list)",
+                    100.0 * self.hot_spot
+                ),
+            )
+        })
     }
 
     /// By how much the plate differs from what the photo shows of the screen, as a share of the
@@ -230,11 +256,12 @@ impl PlateOptions {
     }
 
     fn check_shift(&self, shift_px: [f64; 2]) -> Result<()> {
-        let most = self.max_shift_px;
-        check_photo(shift_px.iter().all(|v| v.abs() <= most), || {
+        // Where it lies, not how it was moved.
+        let (offset, most) = (shift_px.map(|v| -v), self.max_shift_px);
+        check_photo(offset.iter().all(|v| v.abs() <= most), || {
             format!(
                 "the empty screen is offset by {} px from the photo, expected at most {most}; did the camera move?",
-                offset_above(shift_px, most)
+                offset_above(offset, most)
             )
         })
     }

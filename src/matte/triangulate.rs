@@ -136,7 +136,7 @@ pub fn triangulate(
     let told = moved_photos(&shift_px)
         .chain(open_channels(determined))
         .chain(doubt)
-        .chain(clipped_screens(shots, inside));
+        .chain(screen_warnings(shots, inside));
     Ok(Triangulated {
         residual: residual(&aligned, &solved, inside),
         diagnostics: told.collect(),
@@ -213,15 +213,16 @@ fn open_channels(determined: [bool; 3]) -> impl Iterator<Item = Diagnostic> {
     open.map(|(name, _)| similar_screens(name))
 }
 
-/// The warnings about screens that are clipped; photos count from 1.
-fn clipped_screens(
+/// The warnings about screens that are clipped or have a hot spot; photos count from 1.
+fn screen_warnings(
     shots: &[(&Image<LinearRgb>, &ScreenPlate)],
     inside: &Image<Coverage>,
 ) -> impl Iterator<Item = Diagnostic> {
     let photos = (1..).zip(shots);
-    photos.filter_map(move |(number, (photo, _))| {
-        let found = clipped_screen(photo, inside, CLIPPED)?;
-        Some(Diagnostic {
+    photos.flat_map(move |(number, (photo, plate))| {
+        let clipped = clipped_screen(photo, inside, CLIPPED);
+        let found = clipped.into_iter().chain(plate.hot_spot_warning());
+        found.map(move |found| Diagnostic {
             message: format!("photo {number}: {}", found.message),
             ..found
         })

@@ -84,6 +84,12 @@ fn label_of(
         let what = format_args!("{focal_px}, expected pixels, or 0 for an unknown focal length");
         return Err(Failure::argument("focal_px", what));
     }
+    check_finite("corners_px", &corners)?;
+    check_finite("size_m", &[width_m, height_m])?;
+    if width == 0 || height == 0 {
+        let what = format_args!("{width} x {height} pixels, expected at least 1 x 1");
+        return Err(Failure::argument("image", what));
+    }
     let known = (focal_px > 0.0).then_some(focal_px);
     Ok(Label {
         format: Default::default(),
@@ -110,6 +116,16 @@ fn label_of(
         points: Vec::new(),
         markers: None,
     })
+}
+
+fn check_finite(name: &str, numbers: &[f64]) -> Result<(), Failure> {
+    match numbers.iter().position(|v| !v.is_finite()) {
+        Some(i) => Err(Failure::argument(
+            name,
+            format_args!("{} at {i}, expected finite numbers", numbers[i]),
+        )),
+        None => Ok(()),
+    }
 }
 
 fn solved(label: &Label) -> Result<(CameraModel, String), Failure> {

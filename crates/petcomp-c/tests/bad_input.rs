@@ -193,6 +193,29 @@ fn corners_that_no_camera_can_have_seen_are_refused() {
 }
 
 #[test]
+fn arguments_that_cannot_be_right_are_no_matter_of_the_camera() {
+    let corners = [236.0, 239.0, 1020.0, 216.0, 1009.0, 701.0, 276.0, 739.0];
+    let refused = Status::BadArgument;
+    assert_fails(
+        solve(corners, [0.56, 0.37], [0, 853], 0.0),
+        refused,
+        "image: 0 x 853 pixels, expected at least 1 x 1",
+    );
+    assert_fails(
+        solve(corners, [f64::NAN, 0.37], [1280, 853], 0.0),
+        refused,
+        "size_m: NaN at 0, expected finite numbers",
+    );
+    let mut odd = corners;
+    odd[3] = f64::INFINITY;
+    assert_fails(
+        solve(odd, [0.56, 0.37], [1280, 853], 0.0),
+        refused,
+        "corners_px: inf at 3, expected finite numbers",
+    );
+}
+
+#[test]
 fn a_rectangle_in_millimetres_is_refused() {
     let corners = [236.0, 239.0, 1020.0, 216.0, 1009.0, 701.0, 276.0, 739.0];
     for (size, told) in [

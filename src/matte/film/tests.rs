@@ -277,6 +277,19 @@ fn a_screen_uneven_by_60_percent_costs_little() {
 }
 
 #[test]
+fn a_screen_with_a_hot_spot_is_warned_of() {
+    let photo = World::default().photo();
+    let warned = [0.0, 0.2].map(|hot_spot| {
+        let plate = ScreenPlate {
+            hot_spot,
+            ..fitted(&photo)
+        };
+        is_warned(&solved(&photo, &plate), Code::UnevenScreen)
+    });
+    assert_eq!(warned, [false, true]);
+}
+
+#[test]
 fn noise_of_3_percent_is_survived_and_told() {
     let world = World {
         noise: 0.03,

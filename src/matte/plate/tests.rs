@@ -85,6 +85,59 @@ fn the_degree_is_no_higher_than_needed() {
     assert!(degree(0.6) >= Some(2), "{:?}", degree(0.6));
 }
 
+/// Beside an object in the middle.
+fn free_around_small() -> Mask {
+    Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        !((90..150).contains(&x) && (50..110).contains(&y))
+    })
+}
+
+/// What is fitted to a screen of 0.8 of its light with a spot of 0.3 more, `spread` as a share of
+/// the picture's width squared.
+fn fitted_to_spot(at: [f32; 2], spread: f32) -> ScreenPlate {
+    let photo = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let [u, v] = [x as f32 / 240.0 - at[0], (y as f32 / 160.0 - at[1]) / 1.5];
+        GREEN.scale(0.8 + 0.3 * libm::expf(-(u * u + v * v) / spread))
+    });
+    ScreenPlate::fit(&photo, &free_around_small(), &PlateOptions::default()).unwrap()
+}
+
+fn warned_of(plate: &ScreenPlate) -> Option<Code> {
+    plate.hot_spot_warning().map(|warning| warning.code)
+}
+
+#[test]
+fn a_hot_spot_is_fitted_and_warned_of() {
+    let plate = fitted_to_spot([0.3, 0.3], 0.05);
+    // 1 - 0.8 / 1.1.
+    assert!(
+        (plate.unevenness - 0.273).abs() < 0.06,
+        "{}",
+        plate.unevenness
+    );
+    assert!(plate.degree > Some(0) && plate.hot_spot > 0.15);
+    assert_eq!(warned_of(&plate), Some(Code::UnevenScreen));
+}
+
+#[test]
+fn a_hot_spot_that_no_polynomial_follows_is_no_even_screen() {
+    let plate = fitted_to_spot([0.2, 0.2], 0.01);
+    assert!(plate.unevenness > 0.08, "{}", plate.unevenness);
+    assert_eq!(warned_of(&plate), Some(Code::UnevenScreen));
+}
+
+#[test]
+fn white_paper_on_the_screen_is_no_hot_spot() {
+    let photo = Image::from_fn(SIZE.0, SIZE.1, |x, y| match x < 60 && y < 40 {
+        true => LinearRgb::grey(0.7),
+        false => GREEN,
+    });
+    let free = free_around_small();
+    let plate = ScreenPlate::fit(&photo, &free, &PlateOptions::default()).unwrap();
+    assert_eq!((warned_of(&plate), plate.degree), (None, Some(0)));
+    assert!(plate.hot_spot < 0.01, "{}", plate.hot_spot);
+}
+
 #[test]
 fn noise_of_3_percent_is_survived() {
     let truth = screen(0.15);
@@ -171,6 +224,8 @@ fn an_empty_screen_that_lies_too_far_off_is_refused() {
         .unwrap_err()
         .to_string();
     assert!(said.contains("did the camera move?"), "{said}");
+    // It lies to the left.
+    assert!(said.contains("offset by (-"), "{said}");
 }
 
 #[test]
