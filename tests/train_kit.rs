@@ -65,6 +65,8 @@ assert sorted(i for batch in first for i in batch if i >= 5) == list(range(5, 75
 real = [i for batch in first + second for i in batch if i < 5]
 assert all(sorted(real[k : k + 5]) == list(range(5)) for k in range(0, 45, 5))
 assert list(balanced.Shares(5, 70, 8, 0.25, seed=3)) == first
+asked = balanced.Shares(5, 70, 8, 0.25, seed=3, epoch=lambda: 1)
+assert list(asked) == list(asked) == second
 for share in (0, 0.01, 0.99):
     try:
         balanced.Shares(5, 70, 8, share)

@@ -1,6 +1,7 @@
 """Ultralytics' augmentations on the GPU that trains, which would wait for processors that make them.
 
-Its default settings: mosaics of four pictures, scaled, shifted and mirrored, their hue, saturation and value changed.
+Its default settings without albumentations: mosaics of four pictures, scaled, shifted and mirrored, their hue, saturation
+and value changed.
 """
 
 import cv2
@@ -20,7 +21,7 @@ MOSAIC_CORNERS = np.array([[1, 1], [0, 1], [1, 0], [0, 0]])
 
 
 class Pictures:
-    """All pictures of a source, of one size: red, green and blue on the GPU, boxes of their corners in shares of them."""
+    """All pictures of a source, of one size as those of all sources: red, green and blue on the GPU, boxes of their corners in shares of them."""
 
     def __init__(self, paths, classes, device):
         self.paths = paths

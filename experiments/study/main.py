@@ -37,10 +37,21 @@ def full(options, cache, program):
     arms["reality"]["rooms"] = options.rooms or arms["reality"]["rooms"]
     if options.test_pictures:
         arms["reality"]["test_pictures"] = options.test_pictures
+    name = options.name or "rooms_" + "_".join(map(str, arms["reality"]["rooms"]))
     if options.gpu:
-        arms["training"] |= arms["training"]["on_gpu"]
-    name = options.name or "_".join(["gpu"] * options.gpu + ["rooms", *map(str, arms["reality"]["rooms"])])
+        train_on_gpu(arms)
+        name = f"gpu_{name}"
     return studies.Study(arms, cache / name, cache / "world", program)
+
+
+def train_on_gpu(arms):
+    """Another detector; what is trained longer or shorter than others is so by the same factor."""
+    training = arms["training"]
+    factor = training["on_gpu"]["images"] / training["images"]
+    for settings in (training["short"], *arms["arms"].values()):
+        if "images" in settings:
+            settings["images"] = round(factor * settings["images"])
+    training |= training["on_gpu"]
 
 
 def kept(study):

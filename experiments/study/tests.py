@@ -83,6 +83,21 @@ class Augmented(unittest.TestCase):
                 self.assertTrue(is_red[boxed(batch, -1)].all())
                 self.assertFalse((is_red & ~boxed(batch, 1)).any())
 
+    def test_colours_change_as_with_opencv(self):
+        import torch
+
+        from . import augment
+
+        rng = np.random.default_rng(0)
+        image, gains = rng.uniform(0, 255, (2, 3, 8, 8)).astype(np.float32), rng.uniform(-0.4, 0.4, (2, 3))
+        changed = augment.recoloured(torch.from_numpy(image), gains).numpy()
+        for before, after, gain in zip(image, changed, gains):
+            hsv = cv2.cvtColor(np.ascontiguousarray(before.transpose(1, 2, 0)) / 255, cv2.COLOR_RGB2HSV)
+            hsv = (hsv + (360 * gain[0], 0, 0)) * (1, 1 + gain[1], 1 + gain[2])
+            expected = np.dstack([hsv[..., 0] % 360, hsv[..., 1:].clip(0, 1)]).astype(np.float32)
+            rgb = 255 * cv2.cvtColor(expected, cv2.COLOR_HSV2RGB)
+            np.testing.assert_allclose(after.transpose(1, 2, 0), rgb, atol=0.01)
+
 
 def red_rectangle(folder, name):
     """Of a third of a black picture, with its label."""
@@ -100,9 +115,12 @@ def boxed(batch, margin):
     """Where boxes are, larger by so many pixels on each side."""
     mask = np.zeros((len(batch["img"]), *batch["img"].shape[2:]), bool)
     for owner, (x, y, width, height) in zip(batch["batch_idx"].int(), batch["bboxes"].numpy() * 160):
-        rows = slice(max(0, round(y - height / 2 - margin)), round(y + height / 2 + margin))
-        mask[owner, rows, max(0, round(x - width / 2 - margin)) : round(x + width / 2 + margin)] = True
+        mask[owner, side(y, height / 2 + margin), side(x, width / 2 + margin)] = True
     return mask
+
+
+def side(centre, reach):
+    return slice(max(0, round(centre - reach)), max(0, round(centre + reach)))
 
 
 def some_matches(pictures=20):

@@ -213,6 +213,8 @@ def trainer(training, folder):
             if on_gpu(training):
                 # Nothing is validated, and trainings side by side would write the same cache of labels.
                 names = sources if mode == "train" else []
+                if names and batch_size != training["batch"]:
+                    raise MemoryError(f"a batch of {training['batch']} is too large for the GPU; see --processes")
                 pictures = [augment.Pictures(training[name], training["classes"], self.device) for name in names]
                 return augment.Loader(pictures, streams, training["image_size"], training["seed"])
             if mode != "train":

@@ -22,8 +22,9 @@ use serde::{Deserialize, Serialize};
 pub struct PlateOptions {
     /// Highest degree of the polynomial, 0 to 6. Default: 4.
     pub max_degree: usize,
-    /// A higher degree must lower the residual by this share to be taken, 0 to 1. Default: 0.6:
-    /// around the object only, a higher degree fits shadows and swings beneath it.
+    /// A higher degree must lower the residual by this share to be taken, 0 to 1, but on a screen
+    /// with a hot spot. Default: 0.6: around the object only, a higher degree fits shadows and
+    /// swings beneath it.
     pub least_gain: f64,
     /// Largest shift of an empty-screen photo, pixels. Default: 8.
     pub max_shift_px: f64,
@@ -48,10 +49,11 @@ impl Default for PlateOptions {
 pub struct ScreenPlate {
     /// The empty screen as the camera sees it, its uneven light included; scene-linear.
     pub image: Image<LinearRgb>,
-    /// How uneven the screen is: 1 minus darkest over brightest, of its strongest channel.
+    /// How uneven the screen is: 1 minus darkest over brightest, of its strongest channel; where it
+    /// has a hot spot, of that at least.
     pub unevenness: f32,
-    /// By which share some of the screen is brighter than the light that fits most of it; 0 where
-    /// the plate is not fitted.
+    /// By which share a twentieth of a coloured screen is brighter than the light that fits most of
+    /// it; 0 where the plate is not fitted.
     pub hot_spot: f32,
     /// Standard deviation of the photo around the plate where the screen is free: noise, and what
     /// the plate misses.
@@ -74,8 +76,8 @@ impl ScreenPlate {
     /// cells by iteratively reweighted least squares with [Tukey]'s biweight, narrower on the
     /// dark side, so that shadows and dirt do not count. Light falls off by factors and never
     /// goes below 0: hence the logarithm. The degree is the lowest that no higher one beats by
-    /// `least_gain` in the residual of cells that were left out of the fit; the best one where that
-    /// leaves some of the screen much brighter than its fit (`hot_spot`).
+    /// `least_gain` in the residual of cells that were left out of the fit; where that leaves some
+    /// of the screen much brighter than its fit (`hot_spot`), one that has any gain.
     ///
     /// # Errors
     /// [`Error::Photo`](crate::Error::Photo) where there is not enough background, or no light on
@@ -95,8 +97,12 @@ impl ScreenPlate {
         let (image, degree) = (fitted.image(photo.size()), Some(fitted.degree));
         let plate = Self::measured(image, photo, background, degree, [0.0; 2]);
         let hot_spot = fitted.hot_spot;
+        let of_spot = match hot_spot > MAX_HOT_SPOT {
+            true => 1.0 - (1.0 + hot_spot).recip(),
+            false => 0.0,
+        };
         Ok(Self {
-            unevenness: plate.unevenness.max(1.0 - (1.0 + hot_spot).recip()),
+            unevenness: plate.unevenness.max(of_spot),
             hot_spot,
             ..plate
         })
@@ -223,7 +229,7 @@ impl ScreenPlate {
             Diagnostic::warning(
                 Code::UnevenScreen,
                 format_args!(
-                    "some of the screen is {:.0} % brighter than the light that fits most of it: what is seen through the object may be wrong; light the screen evenly, or give a photo of it empty (--plate, or screen in a list)",
+                    "some of the screen is {:.0} % brighter than the light that fits most of it: transparency may be wrong; light the screen evenly, or give a photo of it empty (--plate, or screen in a list)",
                     100.0 * self.hot_spot
                 ),
             )

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::image::Image;
 use crate::matte::arrays::index_of_largest;
 use crate::matte::check::refused;
-use crate::matte::screen::screen_shade;
+use crate::matte::screen::{is_keyable, strongest_channel};
 use crate::pixel::LinearRgb;
 use crate::quantile::{median, quantile};
 use nalgebra::{DMatrix, DVector};
@@ -16,7 +16,8 @@ use rayon::prelude::*;
 #[derive(Clone, Debug)]
 pub(super) struct Polynomial {
     pub(super) degree: usize,
-    /// By which share some of the screen is brighter than the lowest degree that fits most of it.
+    /// By which share a twentieth of the screen is brighter than the lowest degree that fits most
+    /// of it.
     pub(super) hot_spot: f32,
     /// What is added to each channel before its logarithm.
     lifts: [f64; 3],
@@ -48,6 +49,14 @@ pub(super) const MAX_HOT_SPOT: f32 = 0.08;
 /// The share of the screen that is darker than what is taken for a hot spot: a speck is none.
 const BELOW_HOT_SPOT: f64 = 0.95;
 
+/// How bright a coloured screen is, by its strongest channel, 1 as its plate. Sheen makes it paler;
+/// what has no colour is paper on it.
+fn shade(seen: LinearRgb, screen: LinearRgb) -> Option<f32> {
+    let key = strongest_channel(screen);
+    let is_screen = is_keyable(screen) && is_keyable(seen) && strongest_channel(seen) == key;
+    is_screen.then(|| seen.channels()[key] / screen.channels()[key])
+}
+
 /// A cell as the fit sees it: the monomials of its place, lower degrees first, and its channels'
 /// logarithms.
 struct FitSample {
@@ -59,7 +68,8 @@ impl Polynomial {
     /// Fits all channels, with the lowest degree that is good enough.
     ///
     /// A hot spot on less than half of the cells does not count in the error by which the degree is
-    /// chosen. But where there is one, the lowest degree is wrong, and the best is taken.
+    /// chosen. But where there is one, the lowest degree is wrong, and one that fits most of the
+    /// screen better is taken, if there is any.
     pub(super) fn fit(
         cells: &[Cell],
         size: (usize, usize),
@@ -69,8 +79,8 @@ impl Polynomial {
         let samples = samples(cells, lifts, size, options.max_degree)?;
         let [enough, best] = chosen_degrees(&samples, options);
         let lowest = Self::of_degree(enough, &samples, lifts);
-        let hot_spot = lowest.brightest_shade(cells, &samples) - 1.0;
-        let fitted = if hot_spot > MAX_HOT_SPOT {
+        let hot_spot = lowest.bright_shade(cells, &samples) - 1.0;
+        let fitted = if hot_spot > MAX_HOT_SPOT && best != enough {
             Self::of_degree(best, &samples, lifts)
         } else {
             lowest
@@ -88,21 +98,24 @@ impl Polynomial {
         }
     }
 
-    /// How bright the brightest of the screen is, 1 as the fit and at least that. Objects only
-    /// darken the screen around them; what has another hue is no screen.
-    fn brightest_shade(&self, cells: &[Cell], samples: &[FitSample]) -> f32 {
+    /// What the brightest of the screen exceeds, 1 as the fit and at least that. Objects darken the
+    /// screen around them, but for the caustics of clear ones.
+    fn bright_shade(&self, cells: &[Cell], samples: &[FitSample]) -> f32 {
         let pairs = cells.iter().zip(samples);
         let shades = pairs.filter_map(|(cell, sample)| {
-            screen_shade(cell.color.map(|v| v as f32), self.color(sample))
+            let seen = cell.color.map(|v| v as f32).into();
+            shade(seen, self.color(sample))
         });
-        let brightest = quantile(shades.collect(), BELOW_HOT_SPOT, f32::total_cmp);
-        brightest.unwrap_or(1.0).max(1.0)
+        let bright = quantile(shades.collect(), BELOW_HOT_SPOT, f32::total_cmp);
+        bright.unwrap_or(1.0).max(1.0)
     }
 
     /// The screen where a sample is.
-    fn color(&self, sample: &FitSample) -> [f32; 3] {
+    fn color(&self, sample: &FitSample) -> LinearRgb {
         let log = |c: usize| value(&self.coefficients[c], sample);
-        [0, 1, 2].map(|c| (libm::exp(log(c)) - self.lifts[c]) as f32)
+        [0, 1, 2]
+            .map(|c| (libm::exp(log(c)) - self.lifts[c]) as f32)
+            .into()
     }
 
     /// The screen in every pixel.

@@ -50,28 +50,34 @@ class SingleSource(torch.utils.data.Sampler):
 
 class Shares(torch.utils.data.Sampler):
     """The same, each list with a share of real images, which are shuffled anew whenever all were seen; an epoch is one
-    pass over the synthetic ones."""
+    pass over the synthetic ones. `epoch` gives its number, where a trainer counts them: some ask for more lists than they
+    use."""
 
-    def __init__(self, real, synthetic, batch, share, seed=0):
-        self.real, self.synthetic, self.batch, self.seed, self.epoch = real, synthetic, batch, seed, 0
+    def __init__(self, real, synthetic, batch, share, seed=0, epoch=None):
+        self.real, self.synthetic, self.batch, self.seed = real, synthetic, batch, seed
+        self.epoch = epoch or itertools.count().__next__
         self.of_real = round(share * batch)
         if not 0 < self.of_real < batch:
             raise ValueError(f"share {share}: {self.of_real} of {batch} images are real, expected some of both")
-        rng = random.Random(seed)
-        passes = (rng.sample(range(real), real) for _ in itertools.count())
-        # A pass goes on in the next epoch, so that all are seen equally often.
-        self.passes = itertools.chain.from_iterable(passes)
 
     def __iter__(self):
-        rng = random.Random(self.seed * 1_000_003 + self.epoch)
-        self.epoch += 1
+        epoch = self.epoch()
+        rng = random.Random(self.seed * 1_000_003 + epoch)
+        # A pass over the real images goes on in the next epoch, so that all are seen equally often.
+        real = self.passes(epoch * len(self) * self.of_real)
         order = rng.sample(range(self.real, self.real + self.synthetic), self.synthetic)
         size = self.batch - self.of_real
         for i in range(0, len(order), size):
-            yield [*itertools.islice(self.passes, self.of_real), *order[i : i + size]]
+            yield [*itertools.islice(real, self.of_real), *order[i : i + size]]
 
     def __len__(self):
         return -(-self.synthetic // (self.batch - self.of_real))
+
+    def passes(self, first):
+        """Real images without end, from the one on that is `first` of all passes."""
+        for number in itertools.count(first // self.real):
+            order = random.Random(f"{self.seed} {number}").sample(range(self.real), self.real)
+            yield from order[max(0, first - number * self.real) :]
 
 
 class Both(torch.utils.data.ConcatDataset):
@@ -128,7 +134,7 @@ def ultralytics_trainer(batch_size, seed, real_share=None):
             if real_share is None:
                 sampler = SingleSource(*counts, batch_size, seed)
             else:
-                sampler = Shares(*counts, batch_size, real_share, seed)
+                sampler = Shares(*counts, batch_size, real_share, seed, lambda: self.epoch)
             return Loader(
                 Both(parts), batch_sampler=sampler, num_workers=self.args.workers, collate_fn=YOLODataset.collate_fn
             )
