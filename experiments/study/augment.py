@@ -21,7 +21,8 @@ MOSAIC_CORNERS = np.array([[1, 1], [0, 1], [1, 0], [0, 0]])
 
 
 class Pictures:
-    """All pictures of a source, of one size as those of all sources: red, green and blue on the GPU, boxes of their corners in shares of them."""
+    """All pictures of a source, of one size as those of all sources: red, green and blue on the GPU, and boxes by their
+    corners, in shares of them."""
 
     def __init__(self, paths, classes, device):
         self.paths = paths
@@ -80,8 +81,8 @@ class Loader:
         is_mirrored = rng.random(len(indices)) < 0.5
         gains = rng.uniform(-1, 1, (len(indices), 3)) * (HUE, SATURATION, VALUE)
         boxes = [
-            boxes_of(source, parts, place, self.size, mirrored)
-            for (source, parts), place, mirrored in zip(chosen, places, is_mirrored)
+            boxes_of(source, parts, place, self.size, flipped)
+            for (source, parts), place, flipped in zip(chosen, places, is_mirrored)
         ]
         rows = np.concatenate(boxes)
         owner = np.repeat(np.arange(len(boxes)), [len(each) for each in boxes])
@@ -148,7 +149,8 @@ def sources(places, part, axis, size, device):
 def boxes_of(source, parts, place, size, is_mirrored):
     """Rows of class, centre and size, in shares of the result, of what is left of boxes."""
     kinds = np.concatenate([source.kinds[part] for part in parts])
-    on_canvas = [source.boxes[part] * np.tile(place["sides"], 2) + np.tile(corner, 2) for part, corner in zip(parts, place["corners"])]
+    sides = np.tile(place["sides"], 2)
+    on_canvas = [source.boxes[part] * sides + np.tile(corner, 2) for part, corner in zip(parts, place["corners"])]
     whole = np.concatenate(on_canvas).clip(0, place["canvas"])
     whole = (whole - place["canvas"] / 2) * place["scale"] + np.tile(place["shift"], 2)
     seen = whole.clip(0, size)

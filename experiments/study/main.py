@@ -46,12 +46,12 @@ def full(options, cache, program):
 
 def train_on_gpu(arms):
     """Another detector; what is trained longer or shorter than others is so by the same factor."""
-    training = arms["training"]
-    factor = training["on_gpu"]["images"] / training["images"]
+    training, on_gpu = arms["training"], arms["on_gpu"]
+    factor = on_gpu["images"] / training["images"]
     for settings in (training["short"], *arms["arms"].values()):
         if "images" in settings:
             settings["images"] = round(factor * settings["images"])
-    training |= training["on_gpu"]
+    training |= on_gpu
 
 
 def kept(study):

@@ -65,7 +65,7 @@ class Study:
 
     def training(self, arm):
         """How its detectors are trained."""
-        settings = {key: value for key, value in self.arms["training"].items() if key != "on_gpu"}
+        settings = dict(self.arms["training"])
         short = settings.pop("short", {})
         return settings | (short if self.arms["arms"][arm].get("short") else {})
 
