@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask, Roi};
 use crate::pixel::{Coverage, LinearRgb};
-use polynomial::{MAX_HOT_SPOT, Polynomial};
+use polynomial::Polynomial;
 use serde::{Deserialize, Serialize};
 
 /// How a screen plate is made.
@@ -52,8 +52,8 @@ pub struct ScreenPlate {
     /// How uneven the screen is: 1 minus darkest over brightest, of its strongest channel; where it
     /// has a hot spot, of that at least.
     pub unevenness: f32,
-    /// By which share a twentieth of a coloured screen is brighter than the light that fits most of
-    /// it; 0 where the plate is not fitted.
+    /// By which share a hot spot, a twentieth of a coloured screen at least, is brighter than the
+    /// light that fits most of it; 0 without one, and where the plate is not fitted.
     pub hot_spot: f32,
     /// Standard deviation of the photo around the plate where the screen is free: noise, and what
     /// the plate misses.
@@ -96,14 +96,10 @@ impl ScreenPlate {
         let fitted = Polynomial::fit(&cells, photo.size(), options)?;
         let (image, degree) = (fitted.image(photo.size()), Some(fitted.degree));
         let plate = Self::measured(image, photo, background, degree, [0.0; 2]);
-        let hot_spot = fitted.hot_spot;
-        let of_spot = match hot_spot > MAX_HOT_SPOT {
-            true => 1.0 - (1.0 + hot_spot).recip(),
-            false => 0.0,
-        };
+        let of_spot = 1.0 - (1.0 + fitted.hot_spot).recip();
         Ok(Self {
             unevenness: plate.unevenness.max(of_spot),
-            hot_spot,
+            hot_spot: fitted.hot_spot,
             ..plate
         })
     }
@@ -225,7 +221,7 @@ impl ScreenPlate {
 
     /// The warning about a screen with a hot spot, which goes on under the object nobody knows how.
     pub(super) fn hot_spot_warning(&self) -> Option<Diagnostic> {
-        (self.hot_spot > MAX_HOT_SPOT).then(|| {
+        (self.hot_spot > 0.0).then(|| {
             Diagnostic::warning(
                 Code::UnevenScreen,
                 format_args!(

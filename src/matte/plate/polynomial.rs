@@ -16,8 +16,8 @@ use rayon::prelude::*;
 #[derive(Clone, Debug)]
 pub(super) struct Polynomial {
     pub(super) degree: usize,
-    /// By which share a twentieth of the screen is brighter than the lowest degree that fits most
-    /// of it.
+    /// By which share a hot spot is brighter than the lowest degree that fits most of the screen; 0
+    /// without one.
     pub(super) hot_spot: f32,
     /// What is added to each channel before its logarithm.
     lifts: [f64; 3],
@@ -45,7 +45,7 @@ const HELD_OUT_STRIDE: usize = 3;
 
 /// What is brighter by more than this share than the light that fits most of the screen is a hot
 /// spot: at most 0.03 on 24 rendered photos under several lamps, 0.1 to 0.36 with a spot on them.
-pub(super) const MAX_HOT_SPOT: f32 = 0.08;
+const MIN_HOT_SPOT: f32 = 0.08;
 /// The share of the screen that is darker than what is taken for a hot spot: a speck is none.
 const BELOW_HOT_SPOT: f64 = 0.95;
 
@@ -79,8 +79,8 @@ impl Polynomial {
         let samples = samples(cells, lifts, size, options.max_degree)?;
         let [enough, best] = chosen_degrees(&samples, options);
         let lowest = Self::of_degree(enough, &samples, lifts);
-        let hot_spot = lowest.bright_shade(cells, &samples) - 1.0;
-        let fitted = if hot_spot > MAX_HOT_SPOT && best != enough {
+        let hot_spot = lowest.hot_spot_over(cells, &samples);
+        let fitted = if hot_spot > 0.0 && best != enough {
             Self::of_degree(best, &samples, lifts)
         } else {
             lowest
@@ -98,16 +98,17 @@ impl Polynomial {
         }
     }
 
-    /// What the brightest of the screen exceeds, 1 as the fit and at least that. Objects darken the
-    /// screen around them, but for the caustics of clear ones.
-    fn bright_shade(&self, cells: &[Cell], samples: &[FitSample]) -> f32 {
+    /// By which share a hot spot is brighter than the fit; 0 without one. Objects darken the screen
+    /// around them, but for the caustics of clear ones.
+    fn hot_spot_over(&self, cells: &[Cell], samples: &[FitSample]) -> f32 {
         let pairs = cells.iter().zip(samples);
         let shades = pairs.filter_map(|(cell, sample)| {
             let seen = cell.color.map(|v| v as f32).into();
             shade(seen, self.color(sample))
         });
         let bright = quantile(shades.collect(), BELOW_HOT_SPOT, f32::total_cmp);
-        bright.unwrap_or(1.0).max(1.0)
+        let excess = bright.map_or(0.0, |shade| shade - 1.0);
+        if excess > MIN_HOT_SPOT { excess } else { 0.0 }
     }
 
     /// The screen where a sample is.

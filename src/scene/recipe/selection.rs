@@ -28,7 +28,8 @@ pub enum Selections {
     /// A new choice for every scene.
     #[default]
     Unique,
-    /// This many; scene `k` has choice `k` modulo this, and on a belt sequence `k`.
+    /// This many; scene `k`, on a belt sequence `k`, has choice `k + k / n` modulo this `n`: each round
+    /// begins with another one, so that a split that takes every fifth scene takes all of them.
     Count(u64),
 }
 
@@ -69,7 +70,7 @@ impl Selections {
         match self {
             Self::Unique => Ok(place.first),
             Self::Count(0) => Err(Error::value("selections", "0, expected at least 1")),
-            Self::Count(n) => Ok(place.sequence % n),
+            Self::Count(n) => Ok(place.sequence.wrapping_add(place.sequence / n) % n),
         }
     }
 }
@@ -250,6 +251,27 @@ impl AssetVariant {
         match collider {
             Collider::Box => Vec::new(),
             Collider::Hull => self.photo_outlines.get(photo).cloned().unwrap_or_default(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Recipe;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_fifth_scene_comes_to_all_selections_and_so_do_the_others() {
+        let selections = Selections::Count(50);
+        let of_scene = |k| {
+            let place = Recipe::default().place_in_sequence(k);
+            selections.index_for(place).unwrap()
+        };
+        for is_val in [true, false] {
+            let part = (0..250).filter(|k| (k % 5 == 0) == is_val);
+            let found: BTreeSet<u64> = part.map(of_scene).collect();
+            assert!(found.into_iter().eq(0..50), "for validation: {is_val}");
         }
     }
 }

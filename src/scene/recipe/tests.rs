@@ -542,7 +542,7 @@ fn a_selection_used_again_starts_anew() {
         selections: Selections::Count(2),
         ..Recipe::default()
     };
-    let (a, b) = (scene(&recipe, 1), scene(&recipe, 3));
+    let (a, b) = (scene(&recipe, 1), scene(&recipe, 2));
     assert_eq!(names(&a), names(&b));
     assert!(
         a.objects

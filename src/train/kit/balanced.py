@@ -5,7 +5,8 @@ As a program it trains an Ultralytics detector on the images that combined.yaml 
     python balanced.py --epochs 300 --batch 32 --seed 1 --name combined/1
 
 or, with `--real-share 0.125`, of batches in which that share is real, unweighted: where real images are few, that keeps
-them from being seen too often.
+them from being seen too often. With `--data real.yaml`, or another list of the kit, the same detector is trained with
+the same settings in the ordinary way, to compare with.
 
 As a module it serves any other loop: `SingleSource` and `Shares` are batch samplers, `weights` gives the factor per source.
 """
@@ -19,6 +20,7 @@ import random
 import torch
 
 HERE = pathlib.Path(__file__).resolve().parent
+COMBINED = "combined.yaml"
 REAL, SYNTHETIC = 0, 1
 
 
@@ -154,7 +156,8 @@ def ultralytics_trainer(batch_size, seed, real_share=None):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--model", default="yolov5s.pt")
+    parser.add_argument("--data", default=COMBINED, help="which images, a file of this folder; default: %(default)s, balanced")
+    parser.add_argument("--model", default="yolov5su.pt", help="default: %(default)s, learned from COCO; the paper's from ImageNet")
     parser.add_argument("--epochs", type=int, default=300)
     parser.add_argument("--batch", type=int, default=32)
     parser.add_argument("--real-share", type=float, help="of each batch, between 0 and 1; default: batches of one source, weighted")
@@ -164,13 +167,23 @@ def main():
     parser.add_argument("--device", default=None)
     parser.add_argument("--name", default="combined")
     args = parser.parse_args()
+    if args.data != COMBINED and args.real_share is not None:
+        parser.error(f"--real-share: of {args.data}, expected {COMBINED}")
     settings = dict(
-        model=args.model, data=str(HERE / "combined.yaml"), epochs=args.epochs, batch=args.batch, imgsz=args.img,
+        model=args.model, data=str(HERE / args.data), epochs=args.epochs, batch=args.batch, imgsz=args.img,
         seed=args.seed, workers=args.workers, device=args.device, name=args.name, project=str(HERE / "runs"),
         optimizer="SGD", lr0=0.01, lrf=0.2, momentum=0.937, weight_decay=0.0005, warmup_epochs=3.0, cos_lr=True,
         mosaic=1.0, hsv_h=0.015, hsv_s=0.7, hsv_v=0.4, fliplr=0.5, close_mosaic=0,
     )
-    ultralytics_trainer(args.batch, args.seed, args.real_share)(overrides=settings).train()
+    trainer_of(args)(overrides=settings).train()
+
+
+def trainer_of(args):
+    if args.data == COMBINED:
+        return ultralytics_trainer(args.batch, args.seed, args.real_share)
+    from ultralytics.models.yolo.detect import DetectionTrainer
+
+    return DetectionTrainer
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ struct Variant {
     val: &'static [&'static str],
 }
 
-/// Concatenation comes in the paper's two forms; `combined` is trained by `balanced.py`.
+/// Concatenation comes in the paper's two forms; `balanced.py` trains `combined` by equation 2.
 const VARIANTS: [Variant; 5] = [
     Variant {
         name: "real",
@@ -262,18 +262,13 @@ fn training_commands(options: &KitOptions, variants: &[&Variant]) -> String {
         batch,
         ..
     } = options;
-    let mut text = String::new();
-    for Variant { name, .. } in variants.iter().filter(|v| v.name != "combined") {
-        text += &format!(
-            "\n# {name}\nfor seed in $(seq 1 {seeds}); do\n  python \"$YOLOV5/train.py\" --data {name}.yaml --hyp hyp.yaml \
-             --weights yolov5s.pt --img 640 --epochs {epochs} --batch-size {batch} --cos-lr --seed \"$seed\" \
-             --project runs/{name} --name \"$seed\"\ndone\n"
-        );
-    }
-    text + &format!(
-        "\n# combined (equation 2)\nfor seed in $(seq 1 {seeds}); do\n  python balanced.py --epochs {epochs} --batch {batch} \
-         --seed \"$seed\" --name \"combined/$seed\"\ndone\n"
-    )
+    let trainings = variants.iter().map(|Variant { name, .. }| {
+        format!(
+            "\n# {name}\nfor seed in $(seq 1 {seeds}); do\n  python balanced.py --data {name}.yaml --epochs {epochs} \
+             --batch {batch} --seed \"$seed\" --name \"{name}/$seed\"\ndone\n"
+        )
+    });
+    trainings.collect()
 }
 
 /// What the trainings need, and how long each source alone takes for equally many updates.
@@ -283,9 +278,11 @@ fn commands_head(options: &KitOptions, [real, synthetic]: [u64; 2]) -> String {
         .map(|images| combined.epochs_of(batches_per_epoch(images, options.batch)));
     let Updates { batches, total, .. } = combined;
     format!(
-        "#!/bin/sh\n# Start in this folder. YOLOV5 is the folder of a clone of YOLOv5; combined trainings need Ultralytics.\n\
+        "#!/bin/sh\n# Start in this folder, with Ultralytics in Python: one detector for all, so that they can be compared;\n\
+         # combined weights its loss by equation 2.\n\
+         # YOLOv5's own train.py takes the same files, and hyp.yaml; its results are not comparable with these.\n\
          # One epoch over both sources: {batches} batches; {total} updates in all. Equally many updates take {synthetic:.1} epochs of the\n\
-         # synthetic images alone and {real:.1} of the real ones.\nset -eu\n: \"${{YOLOV5:?}}\"\nexport PYTHONPATH=\"$PWD\"\n"
+         # synthetic images alone and {real:.1} of the real ones.\nset -eu\n"
     )
 }
 
@@ -355,7 +352,13 @@ mod tests {
             serde_json::json!({ "real": 1.0, "synthetic": 8.0 / 12.0 * 0.5 })
         );
         let commands = io::read_text(kit.join("commands.sh")).unwrap();
-        assert!(commands.contains("seq 1 6") && commands.contains("--cos-lr"));
+        assert_eq!(commands.matches("seq 1 6").count(), VARIANTS.len());
+        // One program, and so one detector, for all: they are compared with each other.
+        let trained = |name| commands.contains(&format!("python balanced.py --data {name}.yaml "));
+        assert!(
+            VARIANTS.iter().all(|variant| trained(variant.name)),
+            "{commands}"
+        );
     }
 
     #[test]
