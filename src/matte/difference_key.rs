@@ -75,15 +75,15 @@ impl DifferenceKeyOptions {
         }
     }
 
-    /// As Blender 4.5 computes it.
+    /// As Blender 4.5 computes it: what is not a number is background.
     #[inline]
     fn late_matte(&self, difference: f32, alpha: f32) -> f32 {
-        if difference <= self.tolerance + self.falloff {
+        if difference > self.tolerance + self.falloff {
+            alpha
+        } else {
             let beyond = difference - self.tolerance;
             let beyond = if beyond > 0.0 { beyond } else { 0.0 };
-            lesser(quotient_or_zero(beyond, self.falloff), alpha)
-        } else {
-            alpha
+            lesser(alpha, quotient_or_zero(beyond, self.falloff))
         }
     }
 }
@@ -112,6 +112,25 @@ fn quotient_or_zero(dividend: f32, divisor: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nan_is_background_from_blender_4_5_on() {
+        let plate = Image::filled(1, 1, PremulRgba::new(0.1, 0.7, 0.2, 1.0));
+        let photo = Image::filled(1, 1, PremulRgba::new(f32::NAN, 0.4, 0.3, 1.0));
+        for (_, profile) in Profile::ALL {
+            let options = DifferenceKeyOptions {
+                profile,
+                ..DifferenceKeyOptions::default()
+            };
+            let matte = difference_key(&photo, &plate, &options).unwrap();
+            let expected = if profile == Profile::Blender45 {
+                0.0
+            } else {
+                1.0
+            };
+            assert_eq!(matte[(0, 0)].0, expected, "{profile:?}");
+        }
+    }
 
     #[test]
     fn background_of_negative_alpha_is_0_before_blender_4_5() {

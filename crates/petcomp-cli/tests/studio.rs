@@ -22,7 +22,10 @@ fn status(address: &str) -> String {
 #[test]
 fn the_studio_answers_at_its_address_until_it_is_interrupted() {
     let folder = tempfile::tempdir().unwrap();
-    let mut studio = Command::new(env!("CARGO_BIN_EXE_petcomp"))
+    // What a script runs in the background is started to ignore it.
+    let mut studio = Command::new("env")
+        .arg("--default-signal=INT")
+        .arg(env!("CARGO_BIN_EXE_petcomp"))
         .arg("studio")
         .arg(folder.path())
         .stdout(Stdio::piped())

@@ -93,7 +93,8 @@ impl DisplayCode for u16 {
     const FULL_SCALE: Self = Self::MAX;
     #[inline]
     fn from_value(v: f32) -> Self {
-        (v.clamp(0.0, 1.0) * 65_535.0 + 0.5) as Self
+        // In single precision a product near 65535 may be off by 0.002.
+        (f64::from(v.clamp(0.0, 1.0)) * 65_535.0 + 0.5) as Self
     }
     #[inline]
     fn from_light(light: LinearRgb) -> [Self; 3] {

@@ -265,13 +265,13 @@ impl SampleRows<'_> {
             return Ok(picked[0]);
         };
         let colored = self.count_colored([r, g, b]);
-        match alpha.first() {
+        let alpha = alpha.iter().find(|&&a| self.count_transparent(a) > 0);
+        match alpha {
             None if colored == 0 => Ok(r),
             None => {
                 let expected = Wanted::Coverage.expected();
                 Err(format!("{colored} coloured pixels, expected {expected}"))
             }
-            Some(&a) if colored == 0 && self.count_transparent(a) == 0 => Ok(r),
             Some(&a) if r != g => Ok(a),
             Some(_) => Err(Wanted::Coverage.missing_among(&self.raster.names)),
         }
@@ -563,10 +563,12 @@ mod tests {
             matte(&[51, 51, 51, 255, 0, 0, 0, 0], "R G B A").unwrap(),
             [full, none]
         );
-        assert_eq!(matte(&[51, 0, 0, 255], "R G B A").unwrap(), [full]);
         let expected = "expected one channel, three equal ones R G B, or one named A or Y";
         let coloured = matte(&[51, 51, 51, 51, 0, 51], "R G B").unwrap_err();
         assert_eq!(coloured, format!("1 coloured pixels, {expected}"));
+        // An alpha that is 1 everywhere is none.
+        let opaque = matte(&[51, 0, 0, 255], "R G B A").unwrap_err();
+        assert_eq!(opaque, coloured);
         assert_eq!(
             matte(&[51, 128], "Y A").unwrap_err(),
             format!("has the channels Y A, {expected}")

@@ -58,7 +58,7 @@ pub(crate) enum NodeCommand {
     },
     /// Take the screen's light from the subject
     ColorSpill(NodePicture),
-    /// Make a plate from points where the screen is seen
+    /// Make a plate from points where the screen is seen, as Blender 4.5 does
     KeyingScreen(KeyingScreenArgs),
 }
 

@@ -160,10 +160,22 @@ fn a_worker_tells_the_shape_before_it_decodes() {
     stdin.write_all(request.as_bytes()).unwrap();
     stdin.write_all(cut).unwrap();
     drop(stdin);
-    let told = String::from_utf8(worker.wait_with_output().unwrap().stdout).unwrap();
-    let lines: Vec<&str> = told.lines().collect();
-    assert!(lines[1].starts_with("{\"picture\":{\"width\":2"), "{told}");
-    assert!(lines[2].starts_with("{\"refused\":"), "{told}");
+    let output = worker.wait_with_output().unwrap();
+    let told = String::from_utf8(output.stdout).unwrap();
+    let starts = [
+        "{\"petcomp\":",
+        "{\"picture\":{\"width\":2",
+        "{\"refused\":",
+    ];
+    let is_each = told
+        .lines()
+        .zip(starts)
+        .all(|(line, start)| line.starts_with(start));
+    assert!(
+        is_each && told.lines().count() == 3,
+        "{}: {told}",
+        output.status
+    );
 }
 
 /// A program that takes no chance does not ask a worker that the system leaves loose.
