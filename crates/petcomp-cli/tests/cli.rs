@@ -291,8 +291,8 @@ fn lists_without_images_are_refused() {
     write_unsplit_set(&desk, "set", 12, "[cap]");
     for (line, why) in [
         (
-            "split set --guard 2",
-            "split: 10 images for training and 0 for validation: too few images for --ratio 0.8 with --guard 2",
+            "split set --guard 3",
+            "split: 9 images for training and 0 for validation: too few images for --ratio 0.8 with --guard 3",
         ),
         (
             "subset set --head 0.04",
