@@ -64,12 +64,14 @@ struct Focus<'a> {
 /// The samples of every object, in the picture and around it.
 type Objects = BTreeMap<ObjectId, Vec<PlacedSample>>;
 
-/// A deep sample, where it is, and what it hides per channel.
+/// A deep sample, where it is, and per channel what it hides and how much is seen of it.
 struct PlacedSample {
     /// Column and row, which may be beyond the picture's border.
     at: [isize; 2],
     sample: DeepSample,
     hidden: LinearRgb,
+    /// Its `visible`, in the colour that what is nearer lets pass.
+    seen: LinearRgb,
 }
 
 /// Sums over the samples of an object whose circles of confusion reach a pixel.
@@ -80,6 +82,7 @@ struct SoftPixel {
     alpha_depth: f32,
     light: LinearRgb,
     hidden: LinearRgb,
+    seen: LinearRgb,
 }
 
 /// An object out of focus, in the part of the picture that it reaches.
@@ -312,16 +315,18 @@ fn add_samples(objects: &mut Objects, deep: &DeepImage, margin: usize) {
     let is_inside = |x: usize, y: usize| inside[0].contains(&x) && inside[1].contains(&y);
     for (x, y) in pixels_of(deep).filter(|&(x, y)| margin == 0 || !is_inside(x, y)) {
         let tints = deep.tints(x, y);
+        let mut passed = LinearRgb::WHITE;
         for (i, sample) in deep.at(x, y).iter().enumerate() {
             let tint = tints.get(i).copied();
-            objects
-                .entry(sample.object)
-                .or_default()
-                .push(PlacedSample {
-                    at: [x, y].map(|i| i as isize - margin as isize),
-                    sample: *sample,
-                    hidden: tint.unwrap_or(LinearRgb::grey(sample.visible)),
-                });
+            let hidden = tint.unwrap_or(LinearRgb::grey(sample.visible));
+            let placed = PlacedSample {
+                at: [x, y].map(|i| i as isize - margin as isize),
+                sample: *sample,
+                hidden,
+                seen: hue_of(passed).scale(sample.visible),
+            };
+            passed = passed.add_scaled(-1.0, hidden).map(|share| share.max(0.0));
+            objects.entry(sample.object).or_default().push(placed);
         }
     }
 }
@@ -386,12 +391,14 @@ impl SoftObject {
 
 impl SoftPixel {
     #[inline]
-    fn add(&mut self, PlacedSample { sample, hidden, .. }: &PlacedSample, weight: f32) {
+    fn add(&mut self, placed: &PlacedSample, weight: f32) {
+        let PlacedSample { sample, .. } = placed;
         self.alpha += weight * sample.alpha;
         self.visible += weight * sample.visible;
         self.alpha_depth += weight * sample.alpha * sample.depth.0;
         self.light = self.light.add_scaled(weight, sample.light);
-        self.hidden = self.hidden.add_scaled(weight, *hidden);
+        self.hidden = self.hidden.add_scaled(weight, placed.hidden);
+        self.seen = self.seen.add_scaled(weight, placed.seen);
     }
 
     /// Adds what is seen of another pixel of the same object.
@@ -399,6 +406,7 @@ impl SoftPixel {
         self.visible += weight * other.visible;
         self.light = self.light.add_scaled(weight, other.light);
         self.hidden = self.hidden.add_scaled(weight, other.hidden);
+        self.seen = self.seen.add_scaled(weight, other.seen);
     }
 }
 
@@ -463,10 +471,12 @@ impl SoftSample<'_> {
                 hidden: LinearRgb::grey(self.pixel.alpha),
             };
         }
-        let whole = self.pixel.alpha / seen.visible;
+        // By channel: dyed film in front has dyed what is seen.
+        let least = KNOWN_SHARE * seen.visible;
+        let whole = seen.seen.map(|share| self.pixel.alpha / share.max(least));
         PixelEffect {
-            light: seen.light.scale(whole),
-            hidden: seen.hidden.scale(whole),
+            light: seen.light * whole,
+            hidden: seen.hidden * whole,
         }
     }
 
@@ -485,6 +495,14 @@ impl SoftSample<'_> {
 
 fn mixed(a: LinearRgb, b: LinearRgb, share: f32) -> LinearRgb {
     a.scale(1.0 - share).add_scaled(share, b)
+}
+
+/// A colour with a mean of 1; white for one that is as good as black.
+fn hue_of(color: LinearRgb) -> LinearRgb {
+    match mean(color) {
+        bright if bright > LEAST_ALPHA => color.scale(1.0 / bright),
+        _ => LinearRgb::WHITE,
+    }
 }
 
 fn mean(color: LinearRgb) -> f32 {

@@ -298,6 +298,25 @@ fn film_keeps_its_tint() {
 }
 
 #[test]
+fn what_dyed_film_covers_has_its_tint_once() {
+    let (dye, passed) = (LinearRgb::new(0.2, 0.8, 0.8), LinearRgb::new(0.8, 0.2, 0.2));
+    let behind = DeepSample {
+        light: passed.scale(0.5),
+        visible: 0.4,
+        ..sample(2, 0.4, 1.0, 1.0)
+    };
+    let deep = picture(|_, _| vec![sample(1, 0.3, 0.6, 1.0), behind]);
+    let deep = deep.with_tints([dye, passed].repeat(64 * 48));
+    let light = |deep: &DeepImage| deep.flat(32, 24).color;
+    let (soft, sharp) = (light(&softened(&deep, LENS)), light(&deep));
+    let error = soft.add_scaled(-1.0, sharp).map(f32::abs);
+    assert!(
+        error.r.max(error.g).max(error.b) < 1e-3,
+        "{soft:?} {sharp:?}"
+    );
+}
+
+#[test]
 fn the_surface_is_seen_where_the_axis_meets_it() {
     let shot = shot(Some(LENS));
     let focus = Focus::new(&shot, LENS);
