@@ -134,7 +134,7 @@ codes! {
     Specks "matte.specks" "There are specks on the screen"
     SmallObject "matte.small_object" "The object is only a few pixels wide"
     ClippedScreen "matte.clipped_screen" "The screen is overexposed"
-    UnevenScreen "matte.uneven_screen" "Some of the screen is much brighter than the light that fits most of it"
+    UnevenScreen "matte.uneven_screen" "Some of the screen is much brighter or darker than the light that fits the rest"
     ResidualMatte "matte.residual_matte" "The key leaves some of the screen"
     ScreenHue "matte.screen_hue" "A part of the object has the hue of the screen"
     KeyedAway "matte.keyed_away" "A part of the object looks like bare screen"

@@ -397,7 +397,7 @@ fn diagnostics(
     // An outline alone does not depend on the screen.
     if matted.method != MatteMethod::Outline {
         diagnostics.extend(clipped_screen(photo, &found.mask, options.film.clipped));
-        diagnostics.extend(screen.plate.hot_spot_warning());
+        diagnostics.extend(screen.plate.unevenness_warning());
     }
     diagnostics
 }

@@ -138,7 +138,7 @@ pub fn film(
     let mut matte = solve_film(whole, options)?;
     let clipped = clipped_screen(photo, inside, options.clipped);
     matte.diagnostics.extend(clipped);
-    matte.diagnostics.extend(plate.hot_spot_warning());
+    matte.diagnostics.extend(plate.unevenness_warning());
     Ok(matte)
 }
 

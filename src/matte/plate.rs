@@ -50,11 +50,14 @@ pub struct ScreenPlate {
     /// The empty screen as the camera sees it, its uneven light included; scene-linear.
     pub image: Image<LinearRgb>,
     /// How uneven the screen is: 1 minus darkest over brightest, of its strongest channel; where it
-    /// has a hot spot, of that at least.
+    /// has a hot spot or an `overshoot`, of that at least.
     pub unevenness: f32,
     /// By which share a hot spot, a twentieth of a coloured screen at least, is brighter than the
     /// light that fits most of it; 0 without one, and where the plate is not fitted.
     pub hot_spot: f32,
+    /// By which share most of a coloured screen is darker than a fitted plate, where bands, folds or
+    /// shadows drew it to what is bright between them; 0 elsewhere.
+    pub overshoot: f32,
     /// Standard deviation of the photo around the plate where the screen is free: noise, and what
     /// the plate misses.
     pub residual: LinearRgb,
@@ -98,8 +101,9 @@ impl ScreenPlate {
         let plate = Self::measured(image, photo, background, degree, [0.0; 2]);
         let of_spot = 1.0 - (1.0 + fitted.hot_spot).recip();
         Ok(Self {
-            unevenness: plate.unevenness.max(of_spot),
+            unevenness: plate.unevenness.max(of_spot).max(fitted.overshoot),
             hot_spot: fitted.hot_spot,
+            overshoot: fitted.overshoot,
             ..plate
         })
     }
@@ -169,6 +173,7 @@ impl ScreenPlate {
             image: Image::filled(width, height, color),
             unevenness: 0.0,
             hot_spot: 0.0,
+            overshoot: 0.0,
             residual: LinearRgb::BLACK,
             degree: Some(0),
             shift_px: [0.0; 2],
@@ -212,6 +217,7 @@ impl ScreenPlate {
         Self {
             unevenness: unevenness(&image),
             hot_spot: 0.0,
+            overshoot: 0.0,
             image,
             residual,
             degree,
@@ -219,17 +225,24 @@ impl ScreenPlate {
         }
     }
 
-    /// The warning about a screen with a hot spot, which goes on under the object nobody knows how.
-    pub(super) fn hot_spot_warning(&self) -> Option<Diagnostic> {
-        (self.hot_spot > 0.0).then(|| {
-            Diagnostic::warning(
-                Code::UnevenScreen,
-                format_args!(
-                    "some of the screen is {:.0} % brighter than the light that fits most of it: transparency may be wrong; light the screen evenly, or give a photo of it empty (--plate, or screen in a list)",
-                    100.0 * self.hot_spot
-                ),
-            )
-        })
+    /// The warning about light that no smooth plate follows, and that goes on under the object
+    /// nobody knows how.
+    pub(super) fn unevenness_warning(&self) -> Option<Diagnostic> {
+        let seen = match (self.hot_spot > 0.0, self.overshoot > 0.0) {
+            (true, _) => format!(
+                "some of the screen is {:.0} % brighter than the light that fits most of it",
+                100.0 * self.hot_spot
+            ),
+            (false, true) => format!(
+                "bands, folds or shadows make most of the screen {:.0} % darker than the light that fits the rest",
+                100.0 * self.overshoot
+            ),
+            (false, false) => return None,
+        };
+        let remedy =
+            "light the screen evenly, or give a photo of it empty (--plate, or screen in a list)";
+        let message = format!("{seen}: transparency may be wrong; {remedy}");
+        Some(Diagnostic::warning(Code::UnevenScreen, message))
     }
 
     /// By how much the plate differs from what the photo shows of the screen, as a share of the

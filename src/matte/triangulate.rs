@@ -221,7 +221,7 @@ fn screen_warnings(
     let photos = (1..).zip(shots);
     photos.flat_map(move |(number, (photo, plate))| {
         let clipped = clipped_screen(photo, inside, CLIPPED);
-        let found = clipped.into_iter().chain(plate.hot_spot_warning());
+        let found = clipped.into_iter().chain(plate.unevenness_warning());
         found.map(move |found| Diagnostic {
             message: format!("photo {number}: {}", found.message),
             ..found

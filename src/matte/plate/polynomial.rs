@@ -19,6 +19,9 @@ pub(super) struct Polynomial {
     /// By which share a hot spot is brighter than the lowest degree that fits most of the screen; 0
     /// without one.
     pub(super) hot_spot: f32,
+    /// By which share most of the screen is darker than the fit, where bands, folds or shadows drew
+    /// it to what is bright between them; 0 elsewhere.
+    pub(super) overshoot: f32,
     /// What is added to each channel before its logarithm.
     lifts: [f64; 3],
     coefficients: [DVector<f64>; 3],
@@ -48,6 +51,9 @@ const HELD_OUT_STRIDE: usize = 3;
 const MIN_HOT_SPOT: f32 = 0.08;
 /// The share of the screen that is darker than what is taken for a hot spot: a speck is none.
 const BELOW_HOT_SPOT: f64 = 0.95;
+/// A fit that most of the screen is darker than by more than this share is that of its bright parts:
+/// at most 0.08 on 24 rendered photos, 0.10 to 0.24 with bands of 10 % and more, or folds.
+const MIN_OVERSHOOT: f32 = 0.09;
 
 /// How bright a coloured screen is, by its strongest channel, 1 as its plate. Sheen makes it paler;
 /// what has no colour is paper on it.
@@ -55,6 +61,11 @@ fn shade(seen: LinearRgb, screen: LinearRgb) -> Option<f32> {
     let key = strongest_channel(screen);
     let is_screen = is_keyable(screen) && is_keyable(seen) && strongest_channel(seen) == key;
     is_screen.then(|| seen.channels()[key] / screen.channels()[key])
+}
+
+/// A value that exceeds a bound, or 0.
+fn at_least(bound: f32, value: f32) -> f32 {
+    if value > bound { value } else { 0.0 }
 }
 
 /// A cell as the fit sees it: the monomials of its place, lower degrees first, and its channels'
@@ -85,7 +96,12 @@ impl Polynomial {
         } else {
             lowest
         };
-        Ok(Self { hot_spot, ..fitted })
+        let overshoot = fitted.overshoot_over(cells, &samples);
+        Ok(Self {
+            hot_spot,
+            overshoot,
+            ..fitted
+        })
     }
 
     fn of_degree(degree: usize, samples: &[FitSample], lifts: [f64; 3]) -> Self {
@@ -93,6 +109,7 @@ impl Polynomial {
         Self {
             degree,
             hot_spot: 0.0,
+            overshoot: 0.0,
             lifts,
             coefficients: [0, 1, 2].map(|c| robust_fit(&all, degree, c)),
         }
@@ -101,14 +118,23 @@ impl Polynomial {
     /// By which share a hot spot is brighter than the fit; 0 without one. Objects darken the screen
     /// around them, but for the caustics of clear ones.
     fn hot_spot_over(&self, cells: &[Cell], samples: &[FitSample]) -> f32 {
+        let bright = self.shade_below(BELOW_HOT_SPOT, cells, samples);
+        at_least(MIN_HOT_SPOT, bright - 1.0)
+    }
+
+    /// By which share most of the screen is darker than the fit; 0 where that is chance.
+    fn overshoot_over(&self, cells: &[Cell], samples: &[FitSample]) -> f32 {
+        at_least(MIN_OVERSHOOT, 1.0 - self.shade_below(0.5, cells, samples))
+    }
+
+    /// The shade that a share of the screen is darker than, 1 as the fit.
+    fn shade_below(&self, share: f64, cells: &[Cell], samples: &[FitSample]) -> f32 {
         let pairs = cells.iter().zip(samples);
         let shades = pairs.filter_map(|(cell, sample)| {
             let seen = cell.color.map(|v| v as f32).into();
             shade(seen, self.color(sample))
         });
-        let bright = quantile(shades.collect(), BELOW_HOT_SPOT, f32::total_cmp);
-        let excess = bright.map_or(0.0, |shade| shade - 1.0);
-        if excess > MIN_HOT_SPOT { excess } else { 0.0 }
+        quantile(shades.collect(), share, f32::total_cmp).unwrap_or(1.0)
     }
 
     /// The screen where a sample is.

@@ -103,7 +103,7 @@ fn fitted_to_spot(at: [f32; 2], spread: f32) -> ScreenPlate {
 }
 
 fn warned_of(plate: &ScreenPlate) -> Option<Code> {
-    plate.hot_spot_warning().map(|warning| warning.code)
+    plate.unevenness_warning().map(|warning| warning.code)
 }
 
 #[test]
@@ -117,6 +117,20 @@ fn a_hot_spot_takes_a_higher_degree_and_is_warned_of() {
     );
     assert!(plate.degree > Some(0));
     assert_eq!(warned_of(&plate), Some(Code::UnevenScreen));
+}
+
+#[test]
+fn bands_across_the_screen_are_warned_of() {
+    let of_bands = |depth: f32| {
+        let photo = Image::from_fn(SIZE.0, SIZE.1, |_, y| {
+            GREEN.scale(1.0 + depth * libm::sinf(0.2 * y as f32))
+        });
+        ScreenPlate::fit(&photo, &free_around_small(), &PlateOptions::default()).unwrap()
+    };
+    assert_eq!(warned_of(&of_bands(0.02)), None);
+    let plate = of_bands(0.2);
+    assert_eq!(warned_of(&plate), Some(Code::UnevenScreen));
+    assert!(plate.overshoot > 0.09 && plate.unevenness >= plate.overshoot);
 }
 
 #[test]
