@@ -208,6 +208,17 @@ impl DeepImage {
         self.tiles[tile].tints.get(range).unwrap_or_default()
     }
 
+    /// The samples of a pixel, and what each hides of what is behind, per channel, as far as it is
+    /// itself seen.
+    pub(crate) fn hiding(
+        &self,
+        x: usize,
+        y: usize,
+    ) -> impl Iterator<Item = (&DeepSample, LinearRgb)> {
+        let (tile, range) = self.place(x, y);
+        self.tiles[tile].hiding(range)
+    }
+
     /// All that the objects do to one pixel: their light, and what they hide of what is behind, per
     /// channel.
     #[inline(always)]
@@ -426,6 +437,11 @@ fn flat_of(samples: &[DeepSample], tints: &[LinearRgb]) -> Film {
             .fold(LinearRgb::BLACK, |sum, s| sum + s.light),
         opacity: hidden.map(|o| o.min(1.0)),
     }
+}
+
+/// What is left per channel, and no less than nothing.
+pub(crate) fn less(all: LinearRgb, part: LinearRgb) -> LinearRgb {
+    all.add_scaled(-1.0, part).map(|left| left.max(0.0))
 }
 
 /// `a / b` per channel; 0 where `b` is.

@@ -284,13 +284,10 @@ fn tinted_values((p, hidden): (PremulRgba, LinearRgb)) -> [f32; 7] {
 
 /// Light and coverage of an object in one pixel, and what it hides per channel.
 fn own_light(deep: &DeepImage, (x, y): (usize, usize), id: ObjectId) -> (PremulRgba, LinearRgb) {
-    let tints = deep.tints(x, y);
     let (mut sum, mut hidden) = (PremulRgba::TRANSPARENT, LinearRgb::BLACK);
-    let samples = deep.at(x, y).iter().enumerate();
-    for (i, s) in samples.filter(|(_, s)| s.object == id) {
-        let tint = tints.get(i).copied();
-        sum = sum.plus(seen_light(s));
-        hidden = hidden + tint.unwrap_or(LinearRgb::grey(s.visible));
+    for (sample, hides) in deep.hiding(x, y).filter(|(s, _)| s.object == id) {
+        sum = sum.plus(seen_light(sample));
+        hidden = hidden + hides;
     }
     (sum, hidden)
 }

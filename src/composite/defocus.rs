@@ -15,7 +15,7 @@ mod disc;
 
 use crate::camera::{Camera, RadialDistortion};
 use crate::composite::part::pixels_of;
-use crate::deep::{DeepImage, DeepSample};
+use crate::deep::{DeepImage, DeepSample, less};
 use crate::geom::{Plane, Point2};
 use crate::image::Image;
 use crate::pixel::{Depth, LinearRgb, Mix, ObjectId};
@@ -314,18 +314,15 @@ fn add_samples(objects: &mut Objects, deep: &DeepImage, margin: usize) {
     let inside = [deep.width(), deep.height()].map(|side| margin..side - margin);
     let is_inside = |x: usize, y: usize| inside[0].contains(&x) && inside[1].contains(&y);
     for (x, y) in pixels_of(deep).filter(|&(x, y)| margin == 0 || !is_inside(x, y)) {
-        let tints = deep.tints(x, y);
         let mut passed = LinearRgb::WHITE;
-        for (i, sample) in deep.at(x, y).iter().enumerate() {
-            let tint = tints.get(i).copied();
-            let hidden = tint.unwrap_or(LinearRgb::grey(sample.visible));
+        for (sample, hidden) in deep.hiding(x, y) {
             let placed = PlacedSample {
                 at: [x, y].map(|i| i as isize - margin as isize),
                 sample: *sample,
                 hidden,
                 seen: hue_of(passed).scale(sample.visible),
             };
-            passed = passed.add_scaled(-1.0, hidden).map(|share| share.max(0.0));
+            passed = less(passed, hidden);
             objects.entry(sample.object).or_default().push(placed);
         }
     }

@@ -1,6 +1,6 @@
 //! Deep samples of a square of pixels.
 
-use super::DeepSample;
+use super::{DeepSample, less};
 use crate::pixel::{LinearRgb, Mix};
 use std::ops::Range;
 
@@ -107,17 +107,24 @@ impl DeepTile {
         all: LinearRgb,
     ) -> Vec<(LinearRgb, LinearRgb)> {
         let (mut behind, mut passes) = (all, LinearRgb::WHITE);
-        let backdrops = samples.map(|i| {
-            let sample = &self.samples[i];
-            let hidden = self.tints.get(i).copied();
-            let hidden = hidden.unwrap_or(LinearRgb::grey(sample.visible));
-            passes = passes.add_scaled(-1.0, hidden).map(|p| p.max(0.0));
-            behind = behind
-                .add_scaled(-1.0, sample.light)
-                .map(|light| light.max(0.0));
+        let backdrops = self.hiding(samples).map(|(sample, hidden)| {
+            passes = less(passes, hidden);
+            behind = less(behind, sample.light);
             (behind, passes)
         });
         backdrops.collect()
+    }
+
+    /// Samples, and what each hides of what is behind, per channel.
+    pub(super) fn hiding(
+        &self,
+        samples: Range<usize>,
+    ) -> impl Iterator<Item = (&DeepSample, LinearRgb)> {
+        samples.map(|i| {
+            let sample = &self.samples[i];
+            let tint = self.tints.get(i).copied();
+            (sample, tint.unwrap_or(LinearRgb::grey(sample.visible)))
+        })
     }
 }
 

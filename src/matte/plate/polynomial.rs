@@ -64,7 +64,7 @@ fn shade(seen: LinearRgb, screen: LinearRgb) -> Option<f32> {
 }
 
 /// A value that exceeds a bound, or 0.
-fn at_least(bound: f32, value: f32) -> f32 {
+fn if_above(bound: f32, value: f32) -> f32 {
     if value > bound { value } else { 0.0 }
 }
 
@@ -119,12 +119,12 @@ impl Polynomial {
     /// around them, but for the caustics of clear ones.
     fn hot_spot_over(&self, cells: &[Cell], samples: &[FitSample]) -> f32 {
         let bright = self.shade_below(BELOW_HOT_SPOT, cells, samples);
-        at_least(MIN_HOT_SPOT, bright - 1.0)
+        if_above(MIN_HOT_SPOT, bright - 1.0)
     }
 
     /// By which share most of the screen is darker than the fit; 0 where that is chance.
     fn overshoot_over(&self, cells: &[Cell], samples: &[FitSample]) -> f32 {
-        at_least(MIN_OVERSHOOT, 1.0 - self.shade_below(0.5, cells, samples))
+        if_above(MIN_OVERSHOOT, 1.0 - self.shade_below(0.5, cells, samples))
     }
 
     /// The shade that a share of the screen is darker than, 1 as the fit.

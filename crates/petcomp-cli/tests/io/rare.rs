@@ -489,7 +489,7 @@ fn chroma_lines(by: [f32; 4], ry: [f32; 4]) -> [Vec<u8>; 4] {
     })
 }
 
-/// `RY = (R - Y) / Y` and `BY = (B - Y) / Y`; OpenImageIO does not read such files.
+/// `RY = (R - Y) / Y` and `BY = (B - Y) / Y`; OpenImageIO before 2.5 does not read such files.
 #[test]
 fn luminance_with_colour_of_half_the_size_is_read() {
     let folder = Folder::new();
