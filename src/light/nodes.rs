@@ -75,6 +75,40 @@ fn half_sides(light: &AreaLight) -> [f64; 2] {
     side_lengths(light).map(|side| 0.5 * side)
 }
 
+/// The middles of equal pieces of a light, so many along each side; of an oblong ellipse its
+/// [`nodes`].
+///
+/// Shadows blurred by each piece's width are as soft as the whole light's: the middles' second
+/// moment and the pieces' own are the light's together.
+fn pieces(light: &AreaLight, counts: [usize; 2]) -> Vec<Node> {
+    match light.shape {
+        LightShape::Rectangle => rectangle_nodes(light, counts.map(equal_parts)),
+        LightShape::Ellipse if counts[0] == counts[1] => ellipse_pieces(light, counts[0]),
+        LightShape::Ellipse => oblong_ellipse_nodes(light, counts),
+    }
+}
+
+/// Middles in -1..1 and lengths of equal parts.
+fn equal_parts(count: usize) -> Vec<(f64, f64)> {
+    let length = 2.0 / count as f64;
+    let middles = (0..count).map(|i| (i as f64 + 0.5) * length - 1.0);
+    middles.map(|middle| (middle, length)).collect()
+}
+
+/// Nodes drawn in by as much as squares of their areas add to the second moment.
+fn ellipse_pieces(light: &AreaLight, per_side: usize) -> Vec<Node> {
+    let center = frame(light).center;
+    let own_moment = PI / (3 * per_side * per_side) as f64;
+    let drawn_in = (1.0 - own_moment).max(0.0).sqrt();
+    let nodes = ellipse_nodes(light, per_side).into_iter();
+    nodes
+        .map(|node| Node {
+            point: center + (node.point - center) * drawn_in,
+            ..node
+        })
+        .collect()
+}
+
 fn ellipse_nodes(light: &AreaLight, per_side: usize) -> Vec<Node> {
     let (frame, area) = (frame(light), face_area(light));
     let half = half_sides(light);
@@ -142,7 +176,7 @@ fn ring_radius(shares: usize, n: usize) -> f64 {
 }
 
 /// Sample points of the part of a light that is above the plane through `point` with unit `normal`:
-/// those of [`nodes`] where the plane does not cut the light, else as many on what it leaves.
+/// those of [`pieces`] where the plane does not cut the light, else as many on what it leaves.
 ///
 /// # Method
 /// What is left of a rectangle is strips across the side that the plane turns away from fastest,
@@ -157,9 +191,10 @@ pub(crate) fn nodes_above(
 ) -> Vec<Node> {
     let frame = frame(light);
     let [a, b] = half_sides(light);
+    let counts = counts.map(|n| n.max(1));
     let horizon = LightHorizon::new(&frame, [a, b], point, normal);
-    let Some(left) = horizon.visible_part(light.shape, counts.map(|n| n.max(1))) else {
-        return nodes(light, counts);
+    let Some(left) = horizon.visible_part(light.shape, counts) else {
+        return pieces(light, counts);
     };
     left.into_iter()
         .map(|([x, y], area)| Node {
@@ -378,12 +413,36 @@ mod tests {
     }
 
     #[test]
-    fn a_light_that_the_horizon_does_not_cut_keeps_its_nodes() {
+    fn a_light_that_the_horizon_does_not_cut_is_whole() {
         let light = square();
         assert_eq!(
             nodes_above(&light, [3; 2], Point3::origin(), &Vector3::z()),
-            nodes(&light, [3; 2])
+            pieces(&light, [3; 2])
         );
+    }
+
+    #[test]
+    fn pieces_with_their_widths_have_the_second_moment_of_the_light() {
+        // Of the shorter side: a square of side 2 has a third, a unit disk a quarter.
+        for (shape, moment) in [
+            (LightShape::Rectangle, 1.0 / 3.0),
+            (LightShape::Ellipse, 0.25),
+        ] {
+            let light = AreaLight { shape, ..square() };
+            for per_side in [2, 3, 8] {
+                let pieces = pieces(&light, [per_side; 2]);
+                let (frame, half) = (frame(&light), half_sides(&light)[0]);
+                let moments = pieces.iter().map(|piece| {
+                    let x = frame.x.dot(&(piece.point - frame.center));
+                    piece.area * (x * x + piece.area / 12.0)
+                });
+                let found = moments.sum::<f64>() / (face_area(&light) * half * half);
+                assert!(
+                    (found / moment - 1.0).abs() < 1e-9,
+                    "{shape:?} {per_side}: {found}"
+                );
+            }
+        }
     }
 
     #[test]

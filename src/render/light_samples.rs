@@ -403,10 +403,8 @@ mod tests {
     }
 
     #[test]
-    fn small_lights_and_those_that_touch_stay_as_they_are() {
+    fn lights_that_touch_stay_as_they_are() {
         for quality in Quality::ALL {
-            let small = factor(disk(0.3, 0.8), quality, 0.1);
-            assert!((small - 1.0).abs() < 1e-3, "{quality:?}: {small}");
             assert_eq!(factor(disk(1.0, 0.01), quality, 0.1), 1.0, "{quality:?}");
         }
     }

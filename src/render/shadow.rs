@@ -5,7 +5,7 @@ use crate::geom::Vector3;
 use crate::render::float4::Float4;
 use crate::render::half_plane::{ConvexShape, nodes_inside, quad_sides};
 use crate::render::lattice::Lattice;
-use crate::render::light_samples::LightSample;
+use crate::render::light_samples::{LightSample, LightSampleKind};
 use crate::render::occluders::{Occluder, Occluders};
 use crate::render::opacity::OpacityLevel;
 use crate::render::texel_grid::{TexelLine, texel_line};
@@ -19,12 +19,12 @@ use std::sync::Arc;
 /// Heights and distances below this are contact.
 pub(super) const CONTACT_EPSILON_M: f64 = 1e-9;
 
-/// How much of the blur by a piece of light is given to a card's shadow.
+/// How much of the blur by a piece of the sky is given to a card's shadow.
 ///
-/// All of it would be right for one card. Piles are darkened by it, since a product of blurred
-/// shadows is not the blurred product (bias -0.003 in a pile of 20); a quarter takes the facets out
-/// of soft shadows and biases by 1e-4.
-const PENUMBRA_BLUR_SHARE: f64 = 0.25;
+/// All of it would be right for one card. Pieces are so wide, and shadows on each other so many,
+/// that pictures are darkened by it, since a product of blurred shadows is not the blurred product
+/// (bias -0.0005); a quarter takes the facets out of soft shadows and biases by 1e-4.
+const SKY_BLUR_SHARE: f64 = 0.25;
 
 /// A receiver as shadows fall on it.
 #[derive(Clone, Copy)]
@@ -151,7 +151,7 @@ impl<'a> ShadowProjection<'a> {
             return None;
         }
         let (mips, from_behind) = occluder.side_facing(toward);
-        let opacity = mips.level_for(plane.size, self.receiver.cell_m, self.blur_m(plane));
+        let opacity = mips.level_for(plane.size, self.cell_m(plane), self.blur_m(plane));
         let area = self.shadow_area(&plane.grown_by(opacity.grid.reach));
         if self.misses(&area) {
             return None;
@@ -185,18 +185,33 @@ impl<'a> ShadowProjection<'a> {
         CardMap { u, v, w, below }
     }
 
+    /// Distance of nodes on a card that their light crosses: the nearer to the light, the shorter.
+    fn cell_m(&self, plane: &ScenePlane) -> f64 {
+        let way = self.sample.at.w * self.height_of(&plane.center) / self.height;
+        (1.0 - way).max(0.0) * self.receiver.cell_m
+    }
+
     /// How far the piece of light that a sample stands for blurs a card's shadow, metres on the
     /// card, as the side of a texel whose bilinear reading has the same variance.
     ///
     /// A square of side b has variance `b^2 / 12`, texels of side t read bilinearly have `t^2 / 4`.
     fn blur_m(&self, plane: &ScenePlane) -> f64 {
-        let corners = plane.corners();
-        let heights = corners.iter().map(|corner| self.height_of(corner));
-        let lowest = heights.fold(f64::INFINITY, f64::min);
-        // Cards that lean on the receiver are sharp where they touch it and blurred at the other
-        // end.
-        let way = 0.5 * (lowest + self.height_of(&plane.center)) / self.height;
-        PENUMBRA_BLUR_SHARE * self.sample.width * way * libm::sqrt(4.0 / 12.0)
+        let way = self.blurring_height(plane) / self.height;
+        self.sample.width * way * libm::sqrt(4.0 / 12.0)
+    }
+
+    /// The height over the receiver by which a card's shadow is blurred. Cards that lean on the
+    /// receiver are sharp where they touch it and blurred at the other end: by a lamp all of the
+    /// shadow is as sharp as where it is sharpest.
+    fn blurring_height(&self, plane: &ScenePlane) -> f64 {
+        let heights = plane.corners().map(|corner| self.height_of(&corner));
+        let lowest = heights.into_iter().fold(f64::INFINITY, f64::min);
+        match self.sample.kind {
+            LightSampleKind::Face { .. } => lowest,
+            LightSampleKind::Sky { .. } => {
+                SKY_BLUR_SHARE * 0.5 * (lowest + self.height_of(&plane.center))
+            }
+        }
     }
 
     fn height_of(&self, point: &Vector3<f64>) -> f64 {

@@ -139,6 +139,21 @@ fn shadows_of_a_square_hit_the_published_numbers() {
     }
 }
 
+/// A card 20 cm above the surface: its penumbrae are 12 to 16 times as wide as a node of the lattice.
+#[test]
+fn wide_penumbrae_have_no_steps() {
+    let shot = Shot::new(above(96, 72, 90.0))
+        .with_light(AreaLight::new([0.4, 0.3, 0.9], [0.4; 2], 10.0))
+        .with_card(level(1, [0.1, 0.1, 0.2], 0.25, grey(1.0)));
+    let plain = render_reference(&shot, &sharp());
+    let fast = render(&shot, &RenderOptions::default());
+    let pixels = (0..72).flat_map(|y| (0..96).map(move |x| (x, y)));
+    let bare = pixels.filter(|&(x, y)| fast.at(x, y).is_empty() && plain.at(x, y).is_empty());
+    let errors = bare.map(|at| (fast.shadow()[at].g - plain.shadow()[at].g).abs());
+    let worst = errors.fold(0.0, f32::max);
+    assert!(worst < 0.1, "{worst}");
+}
+
 /// The same shot seen along a low ray from `-x`, `-y`, with the surface point in the middle pixel.
 fn seen_from_the_side(mut shot: Shot, x: f64, y: f64) -> Shot {
     let target = Point3::new(x, y, 0.0);
