@@ -1,8 +1,8 @@
 //! Partitioning images for training and validation, and what leaks from one to the other.
 
-use crate::dataset::YoloSet;
 use crate::dataset::listing::{record_of, sidecar_of};
 use crate::dataset::near_duplicates::{NearDuplicate, near_pairs};
+use crate::dataset::yolo_set::{YoloSet, whole_share};
 use crate::error::{Error, Result};
 use crate::scene::{Draws, Scene};
 use rayon::prelude::*;
@@ -182,11 +182,6 @@ fn shuffled_groups(groups: &[String], seed: u64) -> Vec<(&str, usize)> {
     order
 }
 
-/// So much of a count, rounded down; what is whole but for the ratio's rounding stays whole.
-fn whole_share(count: usize, ratio: f64) -> usize {
-    (count as f64 * ratio + 1e-9) as usize
-}
-
 fn check_ratio(ratio: f64) -> Result<()> {
     if ratio > 0.0 && ratio < 1.0 {
         return Ok(());
@@ -289,6 +284,9 @@ mod tests {
     fn the_head_is_taken_of_both_parts() {
         let split = cut(100, 0).head(0.25).unwrap();
         assert_eq!((split.train.len(), split.val.len()), (20, 5));
+        // 20 % of 1624 is 324.8, and of 407 81.4.
+        let fifth = cut(2031, 0).head(0.2).unwrap();
+        assert_eq!((fifth.train.len(), fifth.val.len()), (324, 81));
         assert!(
             listing(3).head(1.5).is_err()
                 && listing(3).partitioned(Partition::Random, 1.0, 0).is_err()

@@ -132,8 +132,8 @@ impl YoloSet {
         all
     }
 
-    /// The first part of the images for training and the first part of those for validation, as the
-    /// paper takes 25 % of its photos "from the beginning".
+    /// The first part of the images for training and the first part of those for validation, each
+    /// rounded down, as the paper takes 25 % of its photos "from the beginning".
     ///
     /// # Errors
     /// A share that is not in `0..=1`.
@@ -236,7 +236,12 @@ fn compare_names(a: &Path, b: &Path) -> Ordering {
 }
 
 fn first_share(images: &[PathBuf], share: f64) -> Vec<PathBuf> {
-    images[..(images.len() as f64 * share).round() as usize].to_vec()
+    images[..whole_share(images.len(), share)].to_vec()
+}
+
+/// So much of a count, rounded down; what is whole but for the ratio's rounding stays whole.
+pub(super) fn whole_share(count: usize, ratio: f64) -> usize {
+    (count as f64 * ratio + 1e-9) as usize
 }
 
 /// Images as lines of a list.

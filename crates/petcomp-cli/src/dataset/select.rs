@@ -51,7 +51,7 @@ enum SplitMethod {
 pub(crate) struct SubsetArgs {
     /// Folder with a data.yaml: a dataset or a split of one
     folder: PathBuf,
-    /// Share of each part that is kept, from the beginning
+    /// Share of each part that is kept, from the beginning, rounded down
     #[arg(long, value_name = "SHARE")]
     head: f64,
     /// Folder to write train.txt, val.txt and data.yaml into
