@@ -1,6 +1,9 @@
 //! `petcomp studio`: an address is printed, answers, and is gone after Ctrl-C.
 #![cfg(feature = "studio")]
 
+mod hearing;
+
+use hearing::hearing;
 use rustix::process::{Pid, Signal, kill_process};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -22,15 +25,9 @@ fn status(address: &str) -> String {
 #[test]
 fn the_studio_answers_at_its_address_until_it_is_interrupted() {
     let folder = tempfile::tempdir().unwrap();
-    // What a script runs in the background is started to ignore it.
-    let mut studio = Command::new("env")
-        .arg("--default-signal=INT")
-        .arg(env!("CARGO_BIN_EXE_petcomp"))
-        .arg("studio")
-        .arg(folder.path())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_petcomp"));
+    command.arg("studio").arg(folder.path());
+    let mut studio = hearing(&command).stdout(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(studio.stdout.take().unwrap()).lines();
     let address = lines.next().unwrap().unwrap();
     assert_eq!(status(&address), "HTTP/1.1 200 OK");

@@ -3,8 +3,10 @@
 #![cfg(unix)]
 
 mod desk;
+mod hearing;
 
 use desk::{Desk, PETCOMP, SAMPLES, text, words};
+use hearing::hearing;
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
@@ -210,20 +212,6 @@ fn send(signal: &str, child: &std::process::Child) {
     let line = format!("kill -s {signal} {}", child.id());
     let sent = Command::new("sh").args(["-c", &line]).status();
     assert!(sent.unwrap().success(), "{line}");
-}
-
-/// The same command, which hears interrupts also where the tests run in the background of a script,
-/// which has them ignored.
-fn hearing(command: &Command) -> Command {
-    let mut hearing = Command::new("env");
-    hearing
-        .arg("--default-signal=INT")
-        .arg(command.get_program())
-        .args(command.get_args());
-    if let Some(folder) = command.get_current_dir() {
-        hearing.current_dir(folder);
-    }
-    hearing
 }
 
 #[test]
