@@ -10,6 +10,10 @@
 # make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
 
 CARGO     := cargo
+# Where cargo builds: target/, or what CARGO_TARGET_DIR or build.target-dir says; the scripts get the program by PETCOMP.
+TARGET    := $(shell $(CARGO) metadata --format-version 1 --no-deps --offline 2>/dev/null | sed 's/.*"target_directory":"\([^"]*\)".*/\1/')
+RELEASE   := $(or $(TARGET),target)/release
+export PETCOMP := $(RELEASE)/petcomp
 SUDO      := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 # Of HEIC the decoder itself, which is a package of its own from Debian 13 on.
 DE265     := $(shell . /etc/os-release; [ "$$VERSION_ID" -ge 13 ] 2>/dev/null && echo libheif-plugin-libde265)
@@ -31,9 +35,11 @@ WORLD     := experiments/cache/world
 # What the package for Python is tested with, in a virtual environment of its own.
 PACKAGE   := target/package
 PYTEST    := numpy pytest hypothesis mypy nbclient nbformat ipykernel
-# Where `make c` installs, an absolute path as petcomp.pc needs it, and the major version that programs ask for when they start.
+# Where `make c` installs, an absolute path as petcomp.pc needs it, below DESTDIR where a package is made; and the major
+# version that programs ask for when they start.
 PREFIX    := $(CURDIR)/target/c
 override PREFIX := $(abspath $(patsubst ~/%,$(HOME)/%,$(PREFIX)))
+DEST      := $(DESTDIR)$(PREFIX)
 C_VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' crates/petcomp-c/Cargo.toml)
 C_MAJOR   := $(firstword $(subst ., ,$(C_VERSION)))
 # A manylinux wheel must not be larger.
@@ -41,6 +47,9 @@ MOST_WHEEL_MB := 15
 BENCHES   := $(notdir $(basename $(wildcard tests/benches/*.rs)))
 # Each set of features that stands alone; the first, empty one is the matte without a C++ compiler.
 FEATURES  := "" pipeline markers oiio settle
+# The sets that are documented: the default, all, and that of docs.rs.
+DOCUMENTED := "" --all-features "--no-default-features --features markers,pipeline,settle"
+PUBLISHED := petcomp petcomp-cli petcomp-store petcomp-studio
 
 # Seconds for each door of fuzz/.
 FUZZ      := 60
@@ -55,7 +64,7 @@ CORE         := 0
 
 demo: packages
 	$(CARGO) build --release --locked -p petcomp-cli
-	target/release/petcomp demo -o $(OUT)
+	$(PETCOMP) demo -o $(OUT)
 
 test: packages python valgrind browser
 	PETCOMP_PYTHON=$(PYTHON) PROPTEST_RNG_SEED=1 $(CARGO) test --release --locked --workspace
@@ -65,7 +74,7 @@ test: packages python valgrind browser
 	done
 	$(MAKE) examples
 	@if [ -x $(PYTHON) ]; then \
-	  $(PYTHON) tests/cluster/object_store.py target/release/petcomp $(EXAMPLES)/demo/recipe.toml; \
+	  $(PYTHON) tests/cluster/object_store.py $(PETCOMP) $(EXAMPLES)/demo/recipe.toml; \
 	else echo "object stores are not tested"; fi
 	$(MAKE) python-package
 	experiments/run --smoke
@@ -92,15 +101,15 @@ experiment-smoke: packages
 examples: packages
 	$(CARGO) test --release --locked --workspace --no-run --quiet
 	rm -rf $(EXAMPLES) && mkdir -p $(EXAMPLES)
-	target/release/examples/cut_out tests/samples/bottles/b0002_0.png $(EXAMPLES)/cut_out.exr
-	target/release/examples/key_like_blender
-	target/release/examples/render_shot $(EXAMPLES)/shot.png
-	target/release/examples/own_generator $(EXAMPLES)/own
-	target/release/petcomp demo -q -n 2 -o $(EXAMPLES)/demo
+	$(RELEASE)/examples/cut_out tests/samples/bottles/b0002_0.png $(EXAMPLES)/cut_out.exr
+	$(RELEASE)/examples/key_like_blender
+	$(RELEASE)/examples/render_shot $(EXAMPLES)/shot.png
+	$(RELEASE)/examples/own_generator $(EXAMPLES)/own
+	$(PETCOMP) demo -q -n 2 -o $(EXAMPLES)/demo
 	for k in 0 1; do \
-	  target/release/petcomp scene draw $(EXAMPLES)/demo/recipe.toml -k $$k -o $(EXAMPLES)/$$k.toml || exit 1; \
+	  $(PETCOMP) scene draw $(EXAMPLES)/demo/recipe.toml -k $$k -o $(EXAMPLES)/$$k.toml || exit 1; \
 	done
-	target/release/examples/yolo_from_scenes $(EXAMPLES)/scenes $(EXAMPLES)/0.toml $(EXAMPLES)/1.toml
+	$(RELEASE)/examples/yolo_from_scenes $(EXAMPLES)/scenes $(EXAMPLES)/0.toml $(EXAMPLES)/1.toml
 
 # 100,000 damaged pictures.
 soak: packages
@@ -128,7 +137,10 @@ fuzz: packages
 lint: packages
 	$(CARGO) fmt --check
 	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps --lib -p petcomp
+	@for f in $(DOCUMENTED); do \
+	  RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps --lib -p petcomp $$f || exit 1; \
+	done
+	$(CARGO) package --locked --no-verify --allow-dirty --quiet $(addprefix -p ,$(PUBLISHED))
 
 # Only the tests that ask the programs that datasets are written for, and what those say.
 formats: packages python
@@ -139,7 +151,7 @@ formats: packages python
 bench: packages
 	$(CARGO) build --release --locked --bins
 	$(CARGO) bench --locked -p petcomp $(addprefix --bench ,$(BENCHES)) -- --warm-up-time 1 --measurement-time 2
-	target/release/petcomp-report all -o $(REPORT)
+	$(RELEASE)/petcomp-report all -o $(REPORT)
 
 # petcomp and other programs on the same input and core, by turns: target/peers/*.json and a table. What cannot be
 # installed is named there as absent.
@@ -151,7 +163,8 @@ peers: packages
 	done
 	$(CARGO) build --release --locked --bins --bench peers
 	@code=0; for stage in matte camera warp convert render settle eval; do \
-	  taskset -c $(CORE) target/peers-python/bin/python tests/benches/peers/$$stage.py -o target/peers || code=1; \
+	  taskset -c $(CORE) target/peers-python/bin/python tests/benches/peers/$$stage.py -o target/peers \
+	    --petcomp $(PETCOMP) --report $(RELEASE)/petcomp-report || code=1; \
 	done; exit $$code
 
 # Remakes every reference with the other programs; `git diff --stat golden` then shows whether they moved.
@@ -161,23 +174,22 @@ golden: blender
 # Everything that a C program needs; cargo-c does the same (`cargo cinstall -p petcomp-c`).
 c: packages
 	$(CARGO) build --release --locked -p petcomp-c
-	$(CARGO) rustc --release --locked -p petcomp-c --crate-type staticlib
-	install -d $(PREFIX)/include $(PREFIX)/lib/pkgconfig
-	install -m 644 crates/petcomp-c/include/petcomp.h $(PREFIX)/include
-	install -m 644 target/release/libpetcomp_c.a $(PREFIX)/lib/libpetcomp.a
-	install target/release/libpetcomp_c.so $(PREFIX)/lib/libpetcomp.so.$(C_VERSION)
-	strip --strip-unneeded $(PREFIX)/lib/libpetcomp.so.$(C_VERSION)
-	ln -sf libpetcomp.so.$(C_VERSION) $(PREFIX)/lib/libpetcomp.so.$(C_MAJOR)
-	ln -sf libpetcomp.so.$(C_MAJOR) $(PREFIX)/lib/libpetcomp.so
-	sed 's|@PREFIX@|$(PREFIX)|; s|@VERSION@|$(C_VERSION)|' crates/petcomp-c/petcomp.pc.in > $(PREFIX)/lib/pkgconfig/petcomp.pc
-	@echo "cc -I$(PREFIX)/include examples/c/sample.c -L$(PREFIX)/lib -lpetcomp -o sample"
-	@echo "export LD_LIBRARY_PATH=$(PREFIX)/lib  # or, where PREFIX is /usr/local: sudo ldconfig"
+	install -d $(DEST)/include $(DEST)/lib/pkgconfig
+	install -m 644 crates/petcomp-c/include/petcomp.h $(DEST)/include
+	install -m 644 $(RELEASE)/libpetcomp_c.a $(DEST)/lib/libpetcomp.a
+	install $(RELEASE)/libpetcomp_c.so $(DEST)/lib/libpetcomp.so.$(C_VERSION)
+	strip --strip-unneeded $(DEST)/lib/libpetcomp.so.$(C_VERSION)
+	ln -sf libpetcomp.so.$(C_VERSION) $(DEST)/lib/libpetcomp.so.$(C_MAJOR)
+	ln -sf libpetcomp.so.$(C_MAJOR) $(DEST)/lib/libpetcomp.so
+	sed 's|@PREFIX@|$(PREFIX)|; s|@VERSION@|$(C_VERSION)|' crates/petcomp-c/petcomp.pc.in > $(DEST)/lib/pkgconfig/petcomp.pc
+	@echo "cc -I$(DEST)/include examples/c/sample.c -L$(DEST)/lib -lpetcomp -o sample"
+	@echo "export LD_LIBRARY_PATH=$(DEST)/lib  # or, where PREFIX is /usr/local: sudo ldconfig"
 
 # The tests of the package for Python, on the extension that was built with all other tests, packed as a wheel and
 # installed into a fresh virtual environment. What cannot be installed is said, and its tests are skipped.
 python-package: packages
 	$(CARGO) test --release --locked --workspace --no-run --quiet
-	python3 crates/petcomp-python/pack.py target/release/deps/lib_petcomp.so $(PACKAGE)/wheel
+	python3 crates/petcomp-python/pack.py $(RELEASE)/deps/lib_petcomp.so $(PACKAGE)/wheel
 	@$(call pytest_of,$(PACKAGE)/wheel)
 
 # Compiles everything once more, for an old system (manylinux_2_28) and without OpenImageIO.

@@ -64,7 +64,7 @@
 //! * **Documents** (JSON, TOML) are by default at most 16 MiB and nested 64 deep, without duplicate
 //!   keys or numbers that are not finite; a mistake is named with its line.
 //!
-//! Not guaranteed: that decoders have no bugs ([`oiio::read`] and [`Fallback::InProcess`] let
+//! Not guaranteed: that decoders have no bugs (`oiio::read` and `Fallback::InProcess` let
 //! OpenImageIO's into this process, and Debian does not fix them), that a kernel without Landlock
 //! or seccomp has an equal sandbox (one warning reports it; [`Fallback::StrictWorker`] refuses),
 //! that the stages behind reading fit into any memory, or anything against a person with an account

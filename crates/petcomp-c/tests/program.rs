@@ -189,6 +189,79 @@ fn program_labels(folder: &Path, mask: &str) -> Vec<serde_json::Value> {
     labels
 }
 
+/// What `make c` installs, of libraries that are built already, below a folder.
+fn make_c(prefix: &str, folder: &Path) {
+    let done = Command::new("make")
+        .args(["-o", "packages", "c", "CARGO=true"])
+        .arg(format!(
+            "RELEASE={}",
+            built_library().parent().unwrap().display()
+        ))
+        .arg(format!("PREFIX={prefix}"))
+        .arg(format!("DESTDIR={}", folder.display()))
+        .env_remove("MAKEFLAGS")
+        .current_dir(repository())
+        .output()
+        .unwrap();
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+}
+
+/// What pkg-config says of petcomp, installed below a folder.
+fn pkg_config(prefix: &Path, folder: &Path) -> Vec<String> {
+    let done = Command::new("pkg-config")
+        .args(["--cflags", "--libs", "--static", "petcomp"])
+        .env("PKG_CONFIG_LIBDIR", prefix.join("lib/pkgconfig"))
+        .env("PKG_CONFIG_SYSROOT_DIR", folder)
+        .output()
+        .unwrap();
+    let said = String::from_utf8(done.stdout).unwrap();
+    said.split_whitespace().map(str::to_owned).collect()
+}
+
+#[test]
+fn a_staged_static_library_links_by_pkg_config() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    make_c("/opt/petcomp", folder);
+    let prefix = folder.join("opt/petcomp");
+    let about = std::fs::read_to_string(prefix.join("lib/pkgconfig/petcomp.pc")).unwrap();
+    assert!(about.starts_with("prefix=/opt/petcomp\n"), "{about}");
+    // The linker prefers shared ones.
+    std::fs::remove_file(prefix.join("lib/libpetcomp.so")).unwrap();
+
+    let arguments = pkg_config(&prefix, folder);
+    let mut arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    arguments.extend(["-o", "sample"]);
+    let source = repository().join("examples/c/sample.c");
+    compile(folder, "cc", &source, &arguments);
+    // It links; without a recipe it does no more than the functions that need none.
+    let done = run(
+        Command::new(folder.join("sample")),
+        folder,
+        "none.toml".as_ref(),
+    );
+    let said = String::from_utf8_lossy(&done.stdout);
+    let version = concat!("petcomp ", env!("CARGO_PKG_VERSION"), "\n");
+    assert!(said.starts_with(version), "{said}");
+}
+
+#[test]
+fn the_shared_library_exports_its_own_functions_alone() {
+    let done = Command::new("nm")
+        .args(["-D", "--defined-only", "--format=just-symbols"])
+        .arg(built_library())
+        .output()
+        .unwrap();
+    let exported = String::from_utf8(done.stdout).unwrap();
+    assert!(exported.contains("petcomp_version"), "{exported}");
+    let other = exported.lines().find(|name| !name.starts_with("petcomp_"));
+    assert_eq!(other, None);
+}
+
 #[test]
 fn header_is_one_of_cpp_too() {
     let folder = tempfile::tempdir().unwrap();
