@@ -231,8 +231,8 @@ def load_scene(path, needs_pose):
             _fail("render", "missing key: %s" % key)
     bounces = _number(r.get("max_bounces", 4), "render.max_bounces", 0, 1024, True)
     out["render"] = {
-        "width": _number(r["width"], "render.width", 4, 16384, True),
-        "height": _number(r["height"], "render.height", 4, 16384, True),
+        "width": _number(r["width"], "render.width", 4, 65536, True),
+        "height": _number(r["height"], "render.height", 4, 65536, True),
         "samples": _number(r.get("samples", 128), "render.samples", 1, 1 << 24, True),
         "seed": _number(r.get("seed", 0), "render.seed", 0, 2 ** 31 - 1, True),
         "threads": _number(r.get("threads", 0), "render.threads", 0, 1024, True),
@@ -252,7 +252,7 @@ def load_scene(path, needs_pose):
 
     c = _keys(raw["camera"], ("K", "R", "t", "resolution", "pixel_center", "blender", "clip",
                               "k1", "aperture"), "camera")
-    cam = {"clip": _vector(c.get("clip", [0.01, 100.0]), 2, "camera.clip", 1e-4),
+    cam = {"clip": _vector(c.get("clip", [0.01, 100.0]), 2, "camera.clip", 1e-6),
            "k1": _number(c.get("k1", 0.0), "camera.k1")}
     if "aperture" in c:
         a = _keys(c["aperture"], ("diameter", "focus"), "camera.aperture")
@@ -298,7 +298,7 @@ def load_scene(path, needs_pose):
     t = _keys(raw["tray"], ("size",), "tray")
     if "size" not in t:
         _fail("tray", "missing key: size")
-    out["tray"] = {"size": _vector(t["size"], 2, "tray.size", 1e-4)}
+    out["tray"] = {"size": _vector(t["size"], 2, "tray.size", 1e-9)}
 
     if "plate" in raw:
         p = _keys(raw["plate"], ("path", "encoding"), "plate")
@@ -324,7 +324,7 @@ def load_scene(path, needs_pose):
         default_alpha = "premultiplied" if full.lower().endswith(".exr") else "straight"
         quad = {
             "id": ident,
-            "size": _vector(q["size"], 2, where + ".size", 1e-5),
+            "size": _vector(q["size"], 2, where + ".size", 1e-9),
             "texture": full,
             "alpha": _choice(q.get("alpha", default_alpha), ("premultiplied", "straight"),
                              where + ".alpha"),
@@ -395,7 +395,7 @@ def load_scene(path, needs_pose):
     out["ground"] = {
         "mode": _choice(g.get("mode", "catcher"), ("catcher", "projected"), "ground.mode"),
         "extent": _vector(g.get("extent", [3.0 * v for v in out["tray"]["size"]]), 2,
-                          "ground.extent", 1e-4),
+                          "ground.extent", 1e-9),
         "albedo": _number(g.get("albedo", 0.8), "ground.albedo", 0.001, 1.0),
         "gain": _number(g.get("gain", 1.0), "ground.gain", 0.0),
     }

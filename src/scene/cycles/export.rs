@@ -25,6 +25,15 @@ const SCRIPT_TEXT: &str = include_str!("../../../golden/render/scene_reference.p
 const SAMPLES_PER_PIXEL: u32 = 1024;
 /// Side of an endless surface for a program that needs a number, metres.
 const ENDLESS_SIDE_M: f64 = 1000.0;
+/// Between these depths the camera sees, metres: all of what a scene may hold. To a ray tracer the
+/// range costs no precision: pictures differ by 1e-6 from those between 0.01 and 100.
+const CLIP_M: [f64; 2] = [1e-6, 1e7];
+/// Side of the smallest picture that Blender renders, pixels.
+const LEAST_SIDE_PX: u32 = 4;
+/// Side of the smallest light, metres: of one of 1e-5 Cycles makes pixels of 200 in place of 0.6.
+const LEAST_LIGHT_M: f64 = 1e-4;
+/// The darkest surface that Cycles' shadow catcher tells from none; its bounces are 1e-5 bright.
+const LEAST_ALBEDO: f32 = 1e-3;
 /// How far off the middle the script takes a principal point for the middle where a lens bends
 /// lines, pixels; and how far pixels that are not square may move the picture's side.
 const OFF_AXIS_PX: f64 = 0.05;
@@ -39,14 +48,40 @@ const OFF_AXIS_PX: f64 = 0.05;
 ///
 /// # Errors
 /// [`Error::File`] for what cannot be written; [`Error::Value`] for ids beyond 65 535, which
-/// Blender does not have, and for a k1 beside an aperture, a principal point off the middle or
-/// pixels that are not square, which Cycles' bent lenses do not have.
+/// Blender does not have, pictures and lights that are too small for it, and for a k1 beside an
+/// aperture, a principal point off the middle or pixels that are not square, which Cycles' bent
+/// lenses do not have.
 pub fn export(shot: &Shot, size: [f64; 2], folder: impl AsRef<Path>) -> Result<()> {
+    check_image(shot.camera.image)?;
+    check_lights(&shot.lights)?;
     check_lens(shot)?;
     let folder = folder.as_ref();
     io::create_folder(folder)?;
     io::write_json(folder.join("scene.json"), &scene_file(shot, size, folder)?)?;
     io::write_text(folder.join(SCRIPT), SCRIPT_TEXT)
+}
+
+fn check_image([width, height]: [u32; 2]) -> Result<()> {
+    if width.min(height) >= LEAST_SIDE_PX {
+        return Ok(());
+    }
+    let what = format!(
+        "{width} x {height}, expected at least {LEAST_SIDE_PX} x {LEAST_SIDE_PX}: Blender renders nothing smaller"
+    );
+    Err(Error::value("image", what))
+}
+
+fn check_lights(lights: &[AreaLight]) -> Result<()> {
+    let sides = lights.iter().map(|light| light.size[0].min(light.size[1]));
+    match sides.enumerate().find(|&(_, side)| side < LEAST_LIGHT_M) {
+        None => Ok(()),
+        Some((i, side)) => {
+            let what = format!(
+                "{side} m, expected at least {LEAST_LIGHT_M}: Cycles makes noise of smaller lights"
+            );
+            Err(Error::value(format!("lights[{i}].size"), what))
+        }
+    }
 }
 
 /// What the script refuses.
@@ -99,9 +134,14 @@ fn scene_file(shot: &Shot, size: [f64; 2], folder: &Path) -> Result<CyclesFile> 
         environment: Some(write_environment(folder, shot)?),
         ground: Some(CyclesGround {
             extent: shot.catcher.map(|side| side.min(ENDLESS_SIDE_M)),
-            albedo: Some(shot.interreflection.luminance()).filter(|&albedo| albedo > 0.0),
+            albedo: bounced_albedo(shot.interreflection),
         }),
     })
+}
+
+fn bounced_albedo(surface: LinearRgb) -> Option<f32> {
+    let albedo = surface.luminance();
+    (albedo > 0.0).then(|| albedo.max(LEAST_ALBEDO))
 }
 
 fn render_settings(shot: &Shot) -> CyclesRender {
@@ -143,6 +183,7 @@ fn cycles_camera(shot: &Shot) -> CyclesCamera {
         R: matrix_rows(*pose.rotation.to_rotation_matrix().matrix()),
         t: pose.translation.vector.into(),
         resolution: Some(camera.image),
+        clip: Some(CLIP_M),
         k1: shot.k1,
         aperture: shot.thin_lens.map(|lens| CyclesAperture {
             diameter: lens.aperture_m,

@@ -39,6 +39,9 @@ pub(super) struct CyclesCamera {
     pub(super) t: [f64; 3],
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) resolution: Option<[u32; 2]>,
+    /// The least and the greatest depth that is seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) clip: Option<[f64; 2]>,
     /// OpenCV's first coefficient of radial distortion.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub(super) k1: f64,

@@ -437,6 +437,43 @@ mod tests {
     }
 
     #[test]
+    fn what_is_too_small_for_blender_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let refused = |shot: &Shot| {
+            let written = export(shot, [0.4, 0.3], folder.path().join("scene"));
+            written.unwrap_err().to_string()
+        };
+        let mut narrow = shot();
+        narrow.camera.image = [3, 6];
+        let said = refused(&narrow);
+        assert!(
+            said.starts_with("image: 3 x 6, expected at least 4 x 4"),
+            "{said}"
+        );
+        let mut point = shot();
+        point
+            .lights
+            .push(AreaLight::new([0.0, 0.0, 1.0], [0.1, 1e-5], 1.0));
+        let said = refused(&point);
+        assert!(
+            said.starts_with("lights[1].size: 0.00001 m, expected at least 0.0001"),
+            "{said}"
+        );
+        assert!(!folder.path().join("scene").exists());
+    }
+
+    #[test]
+    fn the_camera_sees_all_and_a_dark_surface_catches_shadows() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut dark = shot();
+        dark.interreflection = LinearRgb::grey(1e-6);
+        export(&dark, [0.4, 0.3], folder.path()).unwrap();
+        let file: CyclesFile = io::read_json(folder.path().join("scene.json")).unwrap();
+        assert_eq!(file.camera.clip, Some([1e-6, 1e7]));
+        assert_eq!(file.ground.unwrap().albedo, Some(1e-3));
+    }
+
+    #[test]
     fn averaging_keeps_the_mean_and_the_places() {
         let photo = Image::from_fn(4, 1, |x, _| LinearRgb::grey(x as f32));
         let values = |w| {
