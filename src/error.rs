@@ -44,10 +44,10 @@ pub enum Error {
         /// What was found instead, and what to do.
         what: String,
     },
-    /// A rectangle that no camera can have seen.
+    /// A rectangle that no camera can have seen; of a file it is a [`Error::Field`].
     #[error("{what}")]
     Camera {
-        /// What is wrong with its corners, and what was expected.
+        /// Where it is wrong, `surface.corners_px` as a rule, how, and what was expected.
         what: String,
     },
     /// Dropped objects that would not come to rest.
@@ -98,13 +98,23 @@ impl Error {
         let path = path.as_ref().to_path_buf();
         match self {
             Self::Value { at, what } => Self::Field { path, at, what },
-            Self::Photo { .. } | Self::Camera { .. } => Self::File {
+            Self::Camera { what } => {
+                let (at, what) = field_and_rest(&what);
+                Self::Field { path, at, what }
+            }
+            Self::Photo { .. } => Self::File {
                 path,
                 what: self.to_string(),
             },
             other => other,
         }
     }
+}
+
+/// A message as the field that it begins with, and what is wrong there.
+fn field_and_rest(message: &str) -> (String, String) {
+    let (at, what) = message.split_once(": ").unwrap_or(("surface", message));
+    (at.into(), what.into())
 }
 
 /// The system's message without its number, in our spelling: `no such file or directory`.

@@ -70,7 +70,7 @@ pub enum SolveError {
         what: String,
     },
     /// There are points instead of corners, and not both sides: in words, which are missing.
-    #[error("points alone need surface.width_m and surface.height_m: {0}")]
+    #[error("surface: points alone need width_m and height_m: {0}")]
     PointsNeedSides(&'static str),
     /// There are markers instead of corners, and none was looked for.
     #[error(
@@ -116,7 +116,7 @@ pub enum SolveError {
     /// Photos that should be of one camera differ in the shape of the picture, or in the principal
     /// point or k1 that their labels state, or one was cropped nobody knows where.
     #[error(
-        "photo {photo} differs from another in shape, principal point or k1, or one of them was cropped and states no \
+        "photos[{photo}]: differs from another in shape, principal point or k1, or one of them was cropped and states no \
          principal point: not one camera"
     )]
     DifferentPictures {
@@ -238,5 +238,23 @@ mod tests {
         }
         let folded = Error::from(SolveError::NotConvex);
         assert!(matches!(folded, Error::Camera { .. }), "{folded}");
+    }
+
+    #[test]
+    fn corners_that_are_no_rectangle_s_are_a_wrong_field_of_their_file() {
+        let unfit = [
+            (SolveError::NotConvex, "surface.corners_px"),
+            (SolveError::NoPose, "surface.corners_px"),
+            (SolveError::NoScale, "surface"),
+            (SolveError::PointsNeedSides("both are missing"), "surface"),
+            (SolveError::DifferentPictures { photo: 1 }, "photos[1]"),
+        ];
+        for (refusal, field) in unfit {
+            let message = refusal.to_string();
+            let Error::Field { at, what, .. } = Error::from(refusal).in_file("a.label.json") else {
+                panic!("{message}")
+            };
+            assert_eq!((at.as_str(), format!("{at}: {what}")), (field, message));
+        }
     }
 }

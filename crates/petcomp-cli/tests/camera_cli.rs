@@ -317,6 +317,18 @@ fn a_camera_too_far_away_is_refused_however_it_is_solved() {
 }
 
 #[test]
+fn corners_on_a_line_are_wrong_data_and_not_an_unusable_file() {
+    let desk = Desk::with_recipe();
+    let mut label = desk.photo("a", IMAGE);
+    label["surface"]["corners_px"] = json!([[10, 10], [20, 10], [30, 10], [40, 10]]);
+    desk.label("a", &label);
+    let args = ["camera", "solve", "bg/a.label.json"];
+    let said = desk.refused(&args);
+    assert!(said.contains("surface.corners_px: the "), "{said}");
+    assert_eq!(desk.run(&args).status.code(), Some(3), "{said}");
+}
+
+#[test]
 fn a_lens_that_folds_the_photo_over_is_refused_wherever_its_label_is_read() {
     let desk = Desk::with_recipe();
     let mut label = desk.photo("a", [1280, 960]);
