@@ -61,7 +61,7 @@ pub struct ScreenPlate {
     /// Standard deviation of the photo around the plate where the screen is free: noise, and what
     /// the plate misses.
     pub residual: LinearRgb,
-    /// Degree of the fitted polynomial; nothing where the plate is a photo.
+    /// Highest degree of the fitted polynomials; nothing where the plate is a photo.
     pub degree: Option<usize>,
     /// How far a photographed plate was moved to lie on the photo, pixels right and down; 0 for a
     /// fitted one.
@@ -78,9 +78,9 @@ impl ScreenPlate {
     /// The logarithm of each channel is a polynomial of the position, fitted to the means of small
     /// cells by iteratively reweighted least squares with [Tukey]'s biweight, narrower on the
     /// dark side, so that shadows and dirt do not count. Light falls off by factors and never
-    /// goes below 0: hence the logarithm. The degree is the lowest that no higher one beats by
-    /// `least_gain` in the residual of cells that were left out of the fit; where that leaves some
-    /// of the screen much brighter than its fit (`hot_spot`), one that has any gain.
+    /// goes below 0: hence the logarithm. The degree of each channel is the lowest that no higher
+    /// one beats by `least_gain` in the residual of cells that were left out of the fit; where that
+    /// leaves some of the screen much brighter than its fit (`hot_spot`), one that has any gain.
     ///
     /// # Errors
     /// [`Error::Photo`](crate::Error::Photo) where there is not enough background, or no light on

@@ -4,7 +4,6 @@ use super::PlateOptions;
 use super::cells::{self, Cell};
 use crate::error::Result;
 use crate::image::Image;
-use crate::matte::arrays::index_of_largest;
 use crate::matte::check::refused;
 use crate::matte::screen::{is_keyable, strongest_channel};
 use crate::pixel::LinearRgb;
@@ -12,9 +11,11 @@ use crate::quantile::{median, quantile};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// A polynomial in x and y of a total degree for each channel of the screen's logarithm.
+/// A polynomial in x and y for each channel of the screen's logarithm, each of a total degree of its
+/// own: two lamps of different colours may light the screen evenly in one channel alone.
 #[derive(Clone, Debug)]
 pub(super) struct Polynomial {
+    /// The highest of the three degrees.
     pub(super) degree: usize,
     /// By which share a hot spot is brighter than the lowest degree that fits most of the screen; 0
     /// without one.
@@ -76,11 +77,11 @@ struct FitSample {
 }
 
 impl Polynomial {
-    /// Fits all channels, with the lowest degree that is good enough.
+    /// Fits all channels, each with the lowest degree that is good enough.
     ///
-    /// A hot spot on less than half of the cells does not count in the error by which the degree is
-    /// chosen. But where there is one, the lowest degree is wrong, and one that fits most of the
-    /// screen better is taken, if there is any.
+    /// A hot spot on less than half of the cells does not count in the errors by which the degrees are
+    /// chosen. But where there is one, the lowest degrees are wrong, and those that fit most of the
+    /// screen better are taken, if there are any.
     pub(super) fn fit(
         cells: &[Cell],
         size: (usize, usize),
@@ -89,10 +90,10 @@ impl Polynomial {
         let lifts = [0, 1, 2].map(|c| lift(cells, c));
         let samples = samples(cells, lifts, size, options.max_degree)?;
         let [enough, best] = chosen_degrees(&samples, options);
-        let lowest = Self::of_degree(enough, &samples, lifts);
+        let lowest = Self::of_degrees(enough, &samples, lifts);
         let hot_spot = lowest.hot_spot_over(cells, &samples);
         let fitted = if hot_spot > 0.0 && best != enough {
-            Self::of_degree(best, &samples, lifts)
+            Self::of_degrees(best, &samples, lifts)
         } else {
             lowest
         };
@@ -104,14 +105,14 @@ impl Polynomial {
         })
     }
 
-    fn of_degree(degree: usize, samples: &[FitSample], lifts: [f64; 3]) -> Self {
+    fn of_degrees(degrees: [usize; 3], samples: &[FitSample], lifts: [f64; 3]) -> Self {
         let all: Vec<&FitSample> = samples.iter().collect();
         Self {
-            degree,
+            degree: degrees.into_iter().max().unwrap_or(0),
             hot_spot: 0.0,
             overshoot: 0.0,
             lifts,
-            coefficients: [0, 1, 2].map(|c| robust_fit(&all, degree, c)),
+            coefficients: [0, 1, 2].map(|c| robust_fit(&all, degrees[c], c)),
         }
     }
 
@@ -285,15 +286,24 @@ fn monomials(exponents: &[[usize; 2]], [u, v]: [f64; 2]) -> Vec<f64> {
         .collect()
 }
 
-/// The lowest degree that no higher one beats by the least gain, and the best one, by the error at
-/// cells that are left out.
-fn chosen_degrees(samples: &[FitSample], options: &PlateOptions) -> [usize; 2] {
-    let degrees = usable_degrees(samples.len(), options.max_degree);
+/// For each channel the lowest degree that no higher one beats by the least gain; and for each the
+/// best one.
+fn chosen_degrees(samples: &[FitSample], options: &PlateOptions) -> [[usize; 3]; 2] {
     let split = HeldOut::new(samples);
-    let errors: Vec<f64> = degrees.iter().map(|&d| split.error(d)).collect();
+    let degrees = usable_degrees(samples.len(), options.max_degree);
+    let chosen = [0, 1, 2].map(|channel| {
+        let errors: Vec<f64> = degrees.iter().map(|&d| split.error(d, channel)).collect();
+        lowest_and_best(&degrees, &errors, options.least_gain)
+    });
+    [0, 1].map(|i| chosen.map(|of_channel| of_channel[i]))
+}
+
+/// The lowest degree that no higher one beats by the least gain, and the best one, by their errors at
+/// cells that are left out.
+fn lowest_and_best(degrees: &[usize], errors: &[f64], least_gain: f64) -> [usize; 2] {
     let best = errors.iter().copied().fold(f64::MAX, f64::min);
     let best = best.max(CELL_NOISE);
-    let enough = best / (1.0 - options.least_gain).max(f64::MIN_POSITIVE);
+    let enough = best / (1.0 - least_gain).max(f64::MIN_POSITIVE);
     [enough, best].map(|most| {
         let lowest = errors.iter().position(|e| *e <= most);
         degrees[lowest.unwrap_or(degrees.len() - 1)]
@@ -323,24 +333,17 @@ impl<'a> HeldOut<'a> {
         }
     }
 
-    /// Median absolute error at the cells that were left out, of the brightest channel: the others
-    /// have its shape and more noise.
-    fn error(&self, degree: usize) -> f64 {
+    /// Median absolute error of a channel at the cells that were left out.
+    fn error(&self, degree: usize, channel: usize) -> f64 {
         if self.fitted.len() < terms(degree) {
             return f64::MAX;
         }
-        let channel = self.brightest_channel();
         let k = robust_fit(&self.fitted, degree, channel);
         let errors = self
             .left_out
             .iter()
             .map(|s| (s.log[channel] - value(&k, s)).abs());
         median(errors, f64::total_cmp).unwrap_or(f64::MAX)
-    }
-
-    fn brightest_channel(&self) -> usize {
-        let logs = self.fitted.iter().map(|sample| &sample.log);
-        index_of_largest([0, 1, 2].map(|c: usize| logs.clone().map(|log| log[c]).sum::<f64>()))
     }
 }
 

@@ -85,6 +85,24 @@ fn the_degree_is_no_higher_than_needed() {
     assert!(degree(0.6) >= Some(2), "{:?}", degree(0.6));
 }
 
+#[test]
+fn lamps_of_two_colours_are_found_in_each_channel_under_the_object() {
+    // Red from the left and blue from the right; green is even.
+    let truth = Image::from_fn(SIZE.0, SIZE.1, |x, _| {
+        let slope = x as f32 / SIZE.0 as f32 - 0.5;
+        let [red, blue] = [-slope, slope].map(libm::expf);
+        LinearRgb::new(GREEN.r * red, GREEN.g, GREEN.b * blue)
+    });
+    let found = fitted(&photo(&truth, 0.002)).image;
+    for at in [(40, 80), (120, 80), (200, 80)] {
+        let [seen, expected] = [found[at], truth[at]].map(LinearRgb::channels);
+        for c in 0..3 {
+            let error = (seen[c] / expected[c] - 1.0).abs();
+            assert!(error < 0.05, "channel {c} at {at:?}: off by {error}");
+        }
+    }
+}
+
 /// Beside an object in the middle.
 fn free_around_small() -> Mask {
     Image::from_fn(SIZE.0, SIZE.1, |x, y| {
