@@ -2,6 +2,7 @@
 
 mod matted;
 mod options;
+mod pieces;
 
 pub use options::{Boundary, CutOutOptions, MatteMethod};
 
@@ -24,6 +25,7 @@ use crate::image::{Image, Mask, Roi};
 use crate::pixel::{Coverage, Film, LinearRgb, Mix, PremulRgba};
 use crate::stopwatch::Stopwatch;
 use matted::Matted;
+use pieces::separate_piece;
 
 /// An object without its background.
 #[derive(Clone, Debug)]
@@ -128,7 +130,8 @@ fn cut_segmented(
 ) -> Result<CutOut> {
     let matted = Matted::new(prepared, screen, region, options)?;
     watch.lap("matte");
-    let told = diagnostics(prepared.photo, &segmentation, screen, &matted, options);
+    let mut told = diagnostics(prepared.photo, &segmentation, screen, &matted, options);
+    told.extend(separate_piece(&matted.film, region, prepared.photo.size()));
     let cut = region.cut_out(matted, segmentation, screen, told);
     watch.lap("trim");
     Ok(cut)
@@ -580,6 +583,30 @@ mod tests {
         };
         let ear = painted(Claim::Object, 10.0, &[[60.0, 25.0], [60.0, 15.0]]);
         assert_eq!([warned(&[]), warned(&[ear])], [false, true]);
+    }
+
+    #[test]
+    fn a_coin_beside_the_object_is_told_unless_a_person_says_that_it_is_the_object() {
+        let with_coin = |gap: usize| {
+            let mut photo = slab(GREEN);
+            for (x, y) in (0..8).flat_map(|x| (36..44).map(move |y| (x, y))) {
+                photo[(90 + gap + x, y)] = LinearRgb::grey(0.3);
+            }
+            photo
+        };
+        let told = |gap: usize, strokes: &[Stroke]| {
+            let cut = corrected(&with_coin(gap), strokes).unwrap();
+            let mut told = cut.diagnostics.into_iter();
+            told.map(|d| d.message)
+                .find(|m| m.contains("bare screen separates"))
+        };
+        let said = told(4, &[]).unwrap();
+        assert!(
+            said.contains("at 82 % of the width and 50 % of the height"),
+            "{said}"
+        );
+        let coin = painted(Claim::Object, 3.0, &[[98.0, 40.0]]);
+        assert_eq!([told(0, &[]), told(4, &[coin])], [None, None]);
     }
 
     #[test]
