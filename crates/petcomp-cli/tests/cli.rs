@@ -1328,7 +1328,12 @@ fn write_slab(path: &Path) {
 fn every_step_of_a_search_is_a_picture() {
     let desk = Desk::new();
     write_slab(&desk.path("slab.png"));
-    desk.ok(&["matte", "segment", "slab.png", "-o", "steps"]);
+    let done = desk.run(&["matte", "segment", "slab.png", "-o", "steps", "-v"]);
+    let told = text(&done.stderr);
+    assert!(
+        told.contains("slab.png: searched with band 2 of the pyramid"),
+        "{told}"
+    );
     let step = |name: &str| {
         let mut files = desk.files().into_iter();
         let found = files.find(|file| file.to_string_lossy().ends_with(name));

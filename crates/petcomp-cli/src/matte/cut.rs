@@ -1,6 +1,7 @@
 //! `petcomp matte cut`: the object without its background.
 
 use super::picture_files::canvas_of_cut_out;
+use super::segment::log_search;
 use crate::diagnostics::report_diagnostics;
 use crate::documents::read_options;
 use crate::global::GlobalArgs;
@@ -33,6 +34,7 @@ pub(crate) fn run(args: &CutArgs, global: &GlobalArgs) -> anyhow::Result<()> {
         ..WriteOptions::default()
     };
     io::write_with(&args.output, &cut.to_rgba(), &written)?;
+    log_search(&args.photo, &cut.segmentation);
     report_diagnostics(args.photo.display(), &cut.diagnostics);
     let (w, h) = cut.film.size();
     let method = cut.method;

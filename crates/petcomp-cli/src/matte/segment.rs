@@ -30,12 +30,23 @@ pub(crate) fn run(args: &SegmentArgs, global: &GlobalArgs) -> anyhow::Result<()>
     let inputs = args.options.iter().chain([&args.photo]);
     io::check_distinct(inputs, numbered.iter().map(|(path, _)| path))?;
     io::create_folder(&args.output)?;
+    log_search(&args.photo, &found);
     report_diagnostics(args.photo.display(), &found.diagnostics);
     for (path, picture) in &numbered {
         io::write(path, picture)?;
         global.print_status(path.display());
     }
     Ok(())
+}
+
+/// Tells how the object was found.
+pub(super) fn log_search(photo: &Path, found: &Segmentation) {
+    log::info!(
+        "{}: searched with band {} of the pyramid as the coarse one, {:.2} pixels of the photo for one of the search",
+        photo.display(),
+        found.levels,
+        found.reduction
+    );
 }
 
 /// Where each picture goes.
