@@ -132,15 +132,12 @@ fn points_instead_of_corners_need_both_sides() {
     label.surface.height_m = None;
     let one = refusal(&label).to_string();
     assert!(
-        one.ends_with("surface.height_m: surface.height_m is missing"),
+        one.ends_with("and height_m: surface.height_m is missing"),
         "{one}"
     );
     label.surface.width_m = None;
     let both = refusal(&label).to_string();
-    assert!(
-        both.ends_with("surface.height_m: both are missing"),
-        "{both}"
-    );
+    assert!(both.ends_with("and height_m: both are missing"), "{both}");
     label.surface.width_m = Some(0.6);
     label.points.clear();
     assert_eq!(refusal(&label), SolveError::NoCorners);
