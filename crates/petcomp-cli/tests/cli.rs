@@ -1331,7 +1331,7 @@ fn every_step_of_a_search_is_a_picture() {
     let done = desk.run(&["matte", "segment", "slab.png", "-o", "steps", "-v"]);
     let told = text(&done.stderr);
     assert!(
-        told.contains("slab.png: searched with band 2 of the pyramid"),
+        told.contains("slab.png: segmented at level 3 of the Laplacian pyramid"),
         "{told}"
     );
     let step = |name: &str| {

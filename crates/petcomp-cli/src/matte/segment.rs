@@ -42,7 +42,7 @@ pub(crate) fn run(args: &SegmentArgs, global: &GlobalArgs) -> anyhow::Result<()>
 /// Tells how the object was found.
 pub(super) fn log_search(photo: &Path, found: &Segmentation) {
     log::info!(
-        "{}: searched with band {} of the pyramid as the coarse one, {:.2} pixels of the photo for one of the search",
+        "{}: segmented at level {} of the Laplacian pyramid; a pixel of the search is {:.2} of the photo",
         photo.display(),
         found.levels,
         found.reduction

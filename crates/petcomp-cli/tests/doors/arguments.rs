@@ -23,7 +23,7 @@ const LINES: [&str; 34] = [
     "dataset ablate recipe.toml -n 0 --switch scene.friction=0.1 -o out",
     "dataset split dataset --ratio 0.5 --guard 0 --seed 1 --by consecutive -o out",
     "dataset split dataset --ratio 0.5 --seed 1 --by random -o out",
-    "dataset subset dataset --head 0.5 -o out",
+    "dataset subset dataset --head 1 -o out",
     "dataset sheet dataset -n 3 -o sheet.png",
     "dataset report dataset -n 2 -o report.html",
     "dataset anchors dataset -n 3 --side 640 --seed 0",
