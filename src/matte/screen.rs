@@ -83,10 +83,15 @@ const MAX_SCREEN_DEVIATION: f32 = 0.06;
 
 /// How bright a pixel that is the screen in some shade is, 1 as its plate; none for one that is not.
 pub(super) fn screen_shade(pixel: [f32; 3], screen: [f32; 3]) -> Option<f32> {
+    shade_within(MAX_SCREEN_DEVIATION, pixel, screen)
+}
+
+/// The same for a pixel that differs from its shade by at most a share of the screen's strongest
+/// channel.
+pub(super) fn shade_within(deviation: f32, pixel: [f32; 3], screen: [f32; 3]) -> Option<f32> {
     let shade = dot(pixel, screen) / dot(screen, screen).max(f32::MIN_POSITIVE);
     let strongest = largest(screen);
-    let is_screen =
-        (0..3).all(|c| (pixel[c] - shade * screen[c]).abs() <= MAX_SCREEN_DEVIATION * strongest);
+    let is_screen = (0..3).all(|c| (pixel[c] - shade * screen[c]).abs() <= deviation * strongest);
     is_screen.then_some(shade)
 }
 

@@ -10,6 +10,7 @@ pub(super) mod hull;
 mod mattes;
 mod options;
 mod pass;
+mod shadow;
 mod shape;
 mod snap;
 mod threshold;
@@ -104,7 +105,8 @@ impl SegmentStep {
 /// * it is done at several depths and, against noise, picture sizes; the result that agrees best
 ///   with the others and with the edges is taken, and how well it agrees is its [`Confidence`];
 /// * what the edges enclose, gaps bridged, is the object, and its outline is moved to where the
-///   photo itself changes.
+///   photo itself changes;
+/// * on a coloured screen the hard shadow that lies beside the object within sharp edges is left out.
 /// # Errors
 /// [`Error::Photo`](crate::Error::Photo) when there is nothing, only a speck, more than one object,
 /// or no background around the object; [`Error::Value`](crate::Error::Value) for an option that
@@ -130,11 +132,11 @@ pub(super) fn segment_prepared(
     watch.lap("search");
     let object = chosen.object_area();
     watch.lap("holes");
-    let shape = ObjectShape::new(prepared, &chosen, &object.solid, strokes);
+    let shape = ObjectShape::new(prepared, &chosen, &object, strokes);
     let confidence = shape.confidence(prepared, chosen.confidence);
     watch.lap("outline");
     let mut diagnostics = chosen.diagnostics(prepared.small.width());
-    diagnostics.extend(object.diagnostic());
+    diagnostics.extend(object.diagnostics(&chosen.pass.inside));
     diagnostics.extend(confidence.diagnostics(prepared.reduction(), shape.scale.reduction()));
     let found = Segmentation {
         confidence,

@@ -3,10 +3,11 @@
 use super::confidence::Confidence;
 use super::holes::{self, ObjectArea};
 use super::pass::{Pass, Search};
-use super::{SegmentOptions, SegmentStep, band};
+use super::{SegmentOptions, SegmentStep, band, cluster, hull};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::filter;
+use crate::geom::Point2;
 use crate::image::{Image, Mask};
 use crate::matte::prepared::{longer_side, scaled_sides};
 use crate::matte::stroke::{Claims, StrokesOnPhoto};
@@ -323,6 +324,18 @@ impl ChosenSearch<'_> {
     pub(super) fn object_area(&self) -> ObjectArea {
         let found = holes::object_area(&self.picture, &self.pass.inside);
         found.corrected(self.claims.as_ref())
+    }
+
+    /// The hull of the object's edges, but those of its shadow.
+    pub(super) fn hull_of(&self, area: &ObjectArea) -> Cow<'_, [Point2<f64>]> {
+        if !area.shadow.pixels().contains(&true) {
+            return Cow::Borrowed(&self.pass.hull);
+        }
+        let near = filter::dilate(&area.shadow, EDGE_REACH_PX);
+        Cow::Owned(hull::convex_hull(&cluster::without(
+            &self.pass.object,
+            &near,
+        )))
     }
 
     /// The pictures (a) to (e) of the paper's Figure 2, and what lies between; `whole` is the

@@ -81,6 +81,16 @@ impl PixelGroups {
     }
 }
 
+/// What two sets have in common.
+pub(super) fn both(a: &Mask, b: &Mask) -> Mask {
+    a.zip_map(b, |a, b| a && b)
+}
+
+/// What of a set is not in another one.
+pub(super) fn without(set: &Mask, taken: &Mask) -> Mask {
+    set.zip_map(taken, |kept, taken| kept && !taken)
+}
+
 /// The runs of set pixels in a row.
 fn runs_of(row: &[bool]) -> impl Iterator<Item = Range<usize>> {
     let mut at = 0;

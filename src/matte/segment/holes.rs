@@ -1,6 +1,7 @@
 //! Holes: where the screen is seen through an opaque object, as in a ring.
 
-use super::cluster::PixelGroups;
+use super::cluster::{PixelGroups, without};
+use super::shadow::{cast_shadow, shadow_left_out};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::filter;
 use crate::image::{Image, Mask};
@@ -8,7 +9,7 @@ use crate::matte::arrays::{differences, largest};
 use crate::matte::plate::{PlateOptions, ScreenPlate};
 use crate::matte::prepared::longer_side;
 use crate::matte::screen::{is_keyable, masked_pixels, screen_shade};
-use crate::matte::stroke::{Claims, corrected};
+use crate::matte::stroke::{Claims, corrected, unclaimed};
 use crate::pixel::LinearRgb;
 
 /// Width of the zone around the object that is not used as background, as a share of the longer
@@ -37,43 +38,65 @@ const RIM_PX: [f64; 2] = [3.0, 5.0];
 pub(super) struct ObjectArea {
     /// What its edges enclose, without holes where the screen has the colour to recognise them.
     pub(super) solid: Mask,
+    /// What they enclose of its shadow, which is not part of it.
+    pub(super) shadow: Mask,
     /// Something inside looks like the screen.
     has_screen_like_parts: bool,
 }
 
 impl ObjectArea {
+    /// All that the edges enclose.
+    fn all(inside: &Mask) -> Self {
+        Self {
+            solid: inside.clone(),
+            shadow: Image::new(inside.width(), inside.height()),
+            has_screen_like_parts: false,
+        }
+    }
+
     /// With what a person says is in it, without what is not.
     pub(super) fn corrected(self, claims: Option<&Claims>) -> Self {
         Self {
             solid: corrected(self.solid, claims),
+            shadow: unclaimed(self.shadow, claims),
             ..self
         }
     }
 
-    /// The warning about parts that look like the screen.
-    pub(super) fn diagnostic(&self) -> Option<Diagnostic> {
-        self.has_screen_like_parts.then(|| {
+    /// The warnings about what looks like the screen; the edges enclose `inside`.
+    pub(super) fn diagnostics(&self, inside: &Mask) -> impl Iterator<Item = Diagnostic> {
+        let parts = self.has_screen_like_parts.then(|| {
             Diagnostic::warning(
                 Code::ScreenLikeParts,
                 "parts of the object look like the screen: treated as holes, or on a grey board as clear plastic; are they?",
             )
-        })
+        });
+        parts
+            .into_iter()
+            .chain(shadow_left_out(&self.shadow, inside))
     }
 }
 
 /// The area of the object whose edges enclose `inside`.
 pub(super) fn object_area(picture: &Image<LinearRgb>, inside: &Mask) -> ObjectArea {
     let background = background(inside, BACKGROUND_MARGIN * longer_side(picture) as f64);
-    let holed = without_holes(picture, inside, &background);
+    let Ok(plate) = ScreenPlate::fit(picture, &background, &PlateOptions::default()) else {
+        return ObjectArea::all(inside);
+    };
+    let smooth = filter::box_blur(picture, 1);
+    let holed = without_holes(&smooth, &plate, inside);
     let has_screen_like_parts = holed != *inside;
     // What is like a grey board may be clear plastic before it.
-    let solid = if are_distinguishable(picture, &background) {
-        holed
-    } else {
-        inside.clone()
-    };
+    if !are_distinguishable(picture, &background) {
+        return ObjectArea {
+            has_screen_like_parts,
+            ..ObjectArea::all(inside)
+        };
+    }
+    let shadow = cast_shadow(&smooth, &plate, inside);
     ObjectArea {
-        solid,
+        solid: without(&holed, &shadow),
+        shadow,
         has_screen_like_parts,
     }
 }
@@ -82,14 +105,10 @@ pub(super) fn object_area(picture: &Image<LinearRgb>, inside: &Mask) -> ObjectAr
 ///
 /// A hole looks like the screen all over and has a rim that does not: a rim of clear plastic
 /// encloses clear plastic.
-fn without_holes(picture: &Image<LinearRgb>, inside: &Mask, background: &Mask) -> Mask {
-    let Ok(plate) = ScreenPlate::fit(picture, background, &PlateOptions::default()) else {
-        return inside.clone();
-    };
-    let smooth = filter::box_blur(picture, 1);
-    let like = screen_like(&smooth, &plate, inside);
+fn without_holes(smooth: &Image<LinearRgb>, plate: &ScreenPlate, inside: &Mask) -> Mask {
+    let like = screen_like(smooth, plate, inside);
     let candidates = large_groups(
-        &with_shadows(&smooth, &plate, inside, &like),
+        &with_shadows(smooth, plate, inside, &like),
         &like,
         inside.count(),
     );
@@ -101,10 +120,6 @@ fn without_holes(picture: &Image<LinearRgb>, inside: &Mask, background: &Mask) -
     holes
         .filter(|hole| hole.has_opaque_rim(inside, &unlike))
         .fold(inside.clone(), |kept, hole| without(&kept, &hole.area))
-}
-
-fn without(set: &Mask, taken: &Mask) -> Mask {
-    set.zip_map(taken, |kept, taken| kept && !taken)
 }
 
 /// The pixels inside that have the plate's colour.
@@ -209,7 +224,7 @@ mod tests {
             &inner,
             |outer, inner| if outer && !inner { rim } else { GREEN },
         );
-        without_holes(&photo, &outer, &background(&outer, 3.0))
+        object_area(&photo, &outer).solid
     }
 
     #[test]
@@ -236,7 +251,7 @@ mod tests {
             });
             let photo = filter::gaussian_blur(&sharp, 1.0);
             let outer = disc(40.0);
-            let kept = without_holes(&photo, &outer, &background(&outer, 8.0));
+            let kept = object_area(&photo, &outer).solid;
             assert!(
                 !kept[(60, 50)] && !kept[(60, 66)] && kept[(60, 75)],
                 "{rim:?}"
@@ -264,6 +279,6 @@ mod tests {
     fn a_picture_without_background_keeps_what_is_enclosed() {
         let full = Image::filled(40, 40, true);
         let photo = Image::filled(40, 40, GREEN);
-        assert_eq!(without_holes(&photo, &full, &background(&full, 3.0)), full);
+        assert_eq!(object_area(&photo, &full).solid, full);
     }
 }

@@ -3,7 +3,7 @@
 
 use super::SegmentOptions;
 use super::band::{self, Bands};
-use super::cluster::{self, PixelGroups};
+use super::cluster::{self, PixelGroups, both};
 use super::hull;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
@@ -161,11 +161,6 @@ fn clusters_with(others: &Mask, edges: &Mask, join_px: f64) -> Mask {
     let groups = PixelGroups::new(&filter::dilate(&all, join_px / 2.0));
     let sizes = groups.sizes(edges);
     both(&groups.only(|i| sizes[i] > 0), &all)
-}
-
-/// What two sets have in common.
-fn both(a: &Mask, b: &Mask) -> Mask {
-    a.zip_map(b, |a, b| a && b)
 }
 
 /// Where a band has at least a share of the strongest value nearby.

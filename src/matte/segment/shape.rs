@@ -2,10 +2,11 @@
 
 use super::choose::ChosenSearch;
 use super::confidence::Confidence;
+use super::holes::ObjectArea;
 use super::{blur, hull, snap};
 use crate::filter;
 use crate::geom::Point2;
-use crate::image::{Image, Mask};
+use crate::image::Image;
 use crate::matte::Outline;
 use crate::matte::prepared::Prepared;
 use crate::matte::stroke::{StrokesOnPhoto, corrected_coverage};
@@ -53,15 +54,16 @@ impl ObjectShape {
     pub(super) fn new(
         prepared: &Prepared<'_>,
         chosen: &ChosenSearch<'_>,
-        area: &Mask,
+        area: &ObjectArea,
         strokes: StrokesOnPhoto<'_>,
     ) -> Self {
-        let scale = PixelScale::new(prepared.photo.size(), area.size());
-        let soft = filter::gaussian_blur(&area.to_coverage(), CRACK_BLUR_PX);
+        let scale = PixelScale::new(prepared.photo.size(), area.solid.size());
+        let soft = filter::gaussian_blur(&area.solid.to_coverage(), CRACK_BLUR_PX);
         let rough = Outline::around(&soft).map(|p| scale.to_photo(p));
         let snapped = snap::snapped(&rough, &prepared.sqrt, scale.reduction());
         let outline = painted(snapped, strokes);
-        let tips = inset(&chosen.pass.hull, TIP_INSET_PX).map(|p| scale.to_photo(p));
+        let tips = chosen.hull_of(area);
+        let tips = inset(&tips, TIP_INSET_PX).map(|p| scale.to_photo(p));
         let mut rings = outline.rings.clone();
         rings.push(tips.collect());
         Self {

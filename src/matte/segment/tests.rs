@@ -1,5 +1,6 @@
 use super::*;
 use crate::diagnostic::Code;
+use crate::filter;
 use crate::matte::arrays::largest_difference;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -88,6 +89,56 @@ fn a_soft_shadow_is_not_the_object() {
         }
     }));
     assert_box(&found.unwrap(), [60.0, 50.0, 160.0, 150.0]);
+}
+
+fn is_slab(x: f64, y: f64) -> bool {
+    (100.0..200.0).contains(&x) && (70.0..130.0).contains(&y)
+}
+
+/// A slab of 100 x 60 pixels and its shadow, which hangs together with it as it lies on the screen,
+/// and what is left of the screen's light there.
+fn slab_with_shadow(paint: LinearRgb, shade: f32) -> Image<LinearRgb> {
+    let is_shadow = |x: f64, y: f64| (1..=12).any(|d| is_slab(x - f64::from(d), y - f64::from(d)));
+    let sharp = photo(300, 200, GREEN, |x, y| {
+        let shadow = is_shadow(x, y).then(|| GREEN.scale(shade));
+        is_slab(x, y).then_some(paint).or(shadow)
+    });
+    filter::gaussian_blur(&sharp, 0.6)
+}
+
+#[test]
+fn a_hard_shadow_on_a_coloured_screen_is_left_out_and_told() {
+    let dark_green = LinearRgb::new(0.03, 0.1, 0.05);
+    for paint in [
+        LinearRgb::new(0.5, 0.04, 0.05),
+        LinearRgb::grey(0.01),
+        dark_green,
+    ] {
+        for shade in [0.4, 0.6] {
+            let found = find(&slab_with_shadow(paint, shade)).unwrap();
+            assert_box(&found, [100.0, 70.0, 200.0, 130.0]);
+            assert!(found.tight[(206, 100)].0 < 0.1 && found.tight[(190, 120)].0 > 0.9);
+            let told = found.diagnostics.iter().any(|d| d.code == Code::LeftOut);
+            assert!(told, "{:?}", found.diagnostics);
+        }
+    }
+}
+
+#[test]
+fn what_has_a_sheen_or_a_tint_or_is_shaded_unevenly_is_no_shadow() {
+    // Plastic that passes half of the light adds 2 % of grey; dyed plastic has another hue; paint of
+    // the screen's hue is shaded by its shape.
+    let parts: [fn(f64) -> LinearRgb; 3] = [
+        |_| GREEN.scale(0.5) + LinearRgb::grey(0.02),
+        |_| LinearRgb::new(0.01, 0.22, 0.045),
+        |y| GREEN.scale(0.35 + 0.35 * (y - 70.0) as f32 / 60.0),
+    ];
+    for part in parts {
+        let found = find(&photo(300, 200, GREEN, |x, y| {
+            is_slab(x, y).then(|| if x < 180.0 { WHITE } else { part(y) })
+        }));
+        assert_box(&found.unwrap(), [100.0, 70.0, 200.0, 130.0]);
+    }
 }
 
 #[test]
