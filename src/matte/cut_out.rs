@@ -596,7 +596,7 @@ mod tests {
         };
         let told = |gap: usize, strokes: &[Stroke]| {
             let cut = corrected(&with_coin(gap), strokes).unwrap();
-            let mut told = cut.diagnostics.into_iter();
+            let told = cut.diagnostics.into_iter();
             told.map(|d| d.message)
                 .find(|m| m.contains("bare screen separates"))
         };
