@@ -403,6 +403,19 @@ mod tests {
     }
 
     #[test]
+    fn a_small_light_is_as_bright_beside_the_middle_of_what_it_lights() {
+        let light = disk(0.3, 0.8);
+        for quality in Quality::ALL {
+            let group = face(light, quality, Vector3::z(), 0.1);
+            let beside = Vector3::new(0.1, 0.0, 0.0);
+            let exact = light::irradiance(&light, Point3::from(beside), Vector3::z());
+            let sum = group.unit_irradiance(&beside, &Vector3::z());
+            let ratio = f64::from(group.radiance.g / exact.g) * sum;
+            assert!((ratio - 1.0).abs() < 1e-3, "{quality:?}: {ratio}");
+        }
+    }
+
+    #[test]
     fn lights_that_touch_stay_as_they_are() {
         for quality in Quality::ALL {
             assert_eq!(factor(disk(1.0, 0.01), quality, 0.1), 1.0, "{quality:?}");

@@ -29,19 +29,18 @@ pub(super) fn separate_piece(
     by_size.sort_by_key(|&i| Reverse(sizes[i]));
     let second = *by_size.get(1)?;
     let share = sizes[second] as f64 / opaque.count() as f64;
+    if share < MIN_PIECE_SHARE {
+        return None;
+    }
     let piece = pieces.only(|i| i == second);
-    (share >= MIN_PIECE_SHARE && !is_claimed(&piece, region))
-        .then(|| warning(share, middle(&piece, region, photo)))
+    (!is_claimed(&piece, region)).then(|| warning(share, middle(&piece, region, photo)))
 }
 
 /// A person says that some of it is the object.
 fn is_claimed(piece: &Mask, region: &ObjectRegion) -> bool {
     region.drawn.as_ref().is_some_and(|claims| {
-        let claimed = claims.map(|claim| claim == Some(true));
-        claimed
-            .zip_map(piece, |claimed, piece| claimed && piece)
-            .count()
-            > 0
+        let mut pixels = claims.pixels().iter().zip(piece.pixels());
+        pixels.any(|(claim, is_piece)| *is_piece && *claim == Some(true))
     })
 }
 
