@@ -18,44 +18,43 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub(crate) enum AssetCommand {
-    /// Cut out all photos of a list
+    /// Cut out all photos in a list
     Build {
         /// List (TOML or CSV), or a folder with photos.toml or photos.csv: file, asset, class and
-        /// length (metres, by a tape measure), px_per_metre, screen_size (0.60x0.40 in
-        /// CSV) or marker_size; role = distractor for what has no label, matte = outline for what
-        /// lets no light through
+        /// length (metres, by tape measure), px_per_metre, screen_size (0.60x0.40 in CSV) or
+        /// marker_size; role = distractor for objects without labels, matte = outline for opaque
+        /// objects
         list: PathBuf,
-        /// Asset folder; what it has of photos that are not in the list stays, and so do classes,
-        /// until the folder is deleted
+        /// Asset folder; cut-outs of photos that are not in the list stay, and so do classes, until
+        /// you delete the folder
         #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
         output: PathBuf,
-        /// Keep the cut-outs that are there already of the same photo, entry, options and version of
-        /// petcomp, as after an interruption
+        /// Keep existing cut-outs of the same photo, entry, options and petcomp version, for
+        /// example after an interruption
         #[arg(long)]
         resume: bool,
     },
     /// Cut out photos of one object
     Add(Box<AddPhotoArgs>),
-    /// Show what an asset folder holds: name, class, size, how sure outline and colour are (0 to
-    /// 1), file
+    /// List an asset folder: name, class, size, confidence of outline and colour (0 to 1), file
     List {
         /// Asset folder
         folder: PathBuf,
     },
-    /// Check that an asset folder is whole, and list the cut-outs that a person should look at
+    /// Check that an asset folder is intact, and list the cut-outs that need review
     Check {
         /// Asset folder
         folder: PathBuf,
-        /// Exit with status 1 where a person should look
+        /// Exit with status 1 if a cut-out needs review
         #[arg(long)]
         strict: bool,
     },
-    /// Show every cut-out over a checkerboard, black, white and green
+    /// Draw every cut-out over a checkerboard, black, white and green
     Sheet {
         /// Asset folder
         folder: PathBuf,
-        /// Picture to write: of many cut-outs the first page; further ones go beside it as
-        /// PICTURE_2, PICTURE_3 and so on
+        /// Image to write; with many cut-outs, further pages are written next to it as PICTURE_2,
+        /// PICTURE_3 and so on
         #[arg(short, long, value_name = "PICTURE")]
         output: PathBuf,
     },
@@ -69,22 +68,21 @@ pub(crate) struct AddPhotoArgs {
     /// Asset folder
     #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
-    /// Name of the asset; by default that of the first photo
+    /// Name of the asset; by default the name of the first photo
     #[arg(long)]
     name: Option<String>,
-    /// Name of its class; one that the folder does not have is added behind those that it has. A
-    /// distractor needs none
+    /// Name of its class; a new class is appended to those of the folder. Distractors need none
     #[arg(long, required_unless_present = "role", value_parser = trimmed)]
     class: Option<String>,
-    /// object (to be found), or distractor: falls, hides others and casts shadows, but has no label
+    /// object (to be detected) or distractor (falls, hides others and casts shadows, but has no
+    /// label)
     #[arg(long, default_value_t)]
     role: Role,
-    /// Names of all classes in order: a label's number is the place in this list, and no other
-    /// class is taken
+    /// Names of all classes in order: a label's class number is the position in this list, and
+    /// other classes are rejected
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = trimmed)]
     classes: Vec<String>,
-    /// What it was photographed on: auto, a colour R,G,B (scene-linear), or a photo of the empty
-    /// screen
+    /// Screen under the object: auto, a colour R,G,B (scene-linear), or a photo of the empty screen
     #[arg(
         long,
         value_name = "SCREEN",
@@ -92,26 +90,27 @@ pub(crate) struct AddPhotoArgs {
         conflicts_with = "captured"
     )]
     screen: ScreenSource,
-    /// How its matte is made: physical (light and transmittance of see-through plastic), key (as
-    /// Blender's Keying node), or outline (it lets no light through); by default physical
+    /// Matting method: physical (light and transmittance of see-through plastic), key (like
+    /// Blender's Keying node) or outline (opaque object); by default physical
     #[arg(long, value_name = "METHOD", conflicts_with = "captured")]
     matte: Option<MatteMethod>,
     #[command(flatten)]
     scale: ScaleArgs,
-    /// Corners of the screen for --screen-size, from the top left clockwise, pixels; by default
-    /// they are found
+    /// Corners of the screen for --screen-size, clockwise from the top left, pixels; by default
+    /// they are detected
     #[arg(long, value_name = "X,Y X,Y X,Y X,Y", value_parser = parse_corners)]
     screen_corners: Option<[[f64; 2]; 4]>,
     #[command(flatten)]
     capture: CaptureArgs,
     /// Thickness of the object as it lies, metres: with --screen-size, --marker-size or --captured
-    /// its size is that at half its height; by default what the folder has for this asset, or 0.005
+    /// its size is measured at half this height; by default the folder's value for this asset, or
+    /// 0.005
     #[arg(long, value_name = "METRES")]
     thickness: Option<f64>,
-    /// Mass of the object, kilograms; by default what the folder has for this asset, or 0.025
+    /// Mass of the object, kilograms; by default the folder's value for this asset, or 0.025
     #[arg(long, value_name = "KILOGRAMS")]
     mass: Option<f64>,
-    /// draft, normal or reference: how finely the object is searched and kept
+    /// draft, normal or reference: how finely the object is searched for and stored
     #[arg(long, default_value_t)]
     quality: Quality,
 }
@@ -119,15 +118,15 @@ pub(crate) struct AddPhotoArgs {
 /// What belongs to photos on a luminous display.
 #[derive(clap::Args)]
 struct CaptureArgs {
-    /// With --captured: photos of the same frames without the object, from the same place
+    /// With --captured: photos of the same frames without the object, from the same position
     #[arg(long, value_name = "PHOTO", num_args = 1..)]
     empty: Vec<PathBuf>,
-    /// With --captured: what `capture frames` wrote about the display; by default display.toml
-    /// beside the first photo
+    /// With --captured: display file written by `capture frames`; by default display.toml next to
+    /// the first photo
     #[arg(long, value_name = "FILE")]
     display: Option<PathBuf>,
-    /// With --captured: width of the whole picture on the display, metres, by a ruler; by default
-    /// what display.toml says
+    /// With --captured: width of the whole image on the display, metres, measured with a ruler; by
+    /// default that in display.toml
     #[arg(long, value_name = "METRES")]
     display_width: Option<f64>,
 }
@@ -136,7 +135,7 @@ struct CaptureArgs {
 #[derive(clap::Args)]
 #[group(required = true, multiple = false)]
 struct ScaleArgs {
-    /// Length of the object's longest side, metres, 0.005 to 5: what a tape measure says
+    /// Length of the object's longest side, metres, 0.005 to 5, measured with a tape
     #[arg(long, value_name = "METRES")]
     length: Option<f64>,
     /// Or: width and height of the object, metres
@@ -145,17 +144,17 @@ struct ScaleArgs {
     /// Or: scale of the photos at half the object's height, pixels per metre
     #[arg(long, value_name = "PX_PER_M")]
     scale: Option<f64>,
-    /// Or: width and height of the whole screen, metres: it lies on something of another colour,
-    /// and all four corners are seen
+    /// Or: width and height of the whole screen, metres; it must lie on another colour, with all
+    /// four corners visible
     #[arg(long, value_name = "WxH", value_parser = parse_metres)]
     screen_size: Option<[f64; 2]>,
-    /// Or: side of the black square of a printed marker on the screen, metres (AprilTag tag36h11
-    /// or ArUco DICT_4X4_50); cut its paper to a white margin of at most a third of that, and leave
-    /// half its side free between it and the object
+    /// Or: side of the black square of a printed marker on the screen, metres (AprilTag tag36h11 or
+    /// ArUco DICT_4X4_50); cut the paper to a white margin of at most a third of that side, and
+    /// leave half that side free between marker and object
     #[arg(long, value_name = "METRES")]
     marker_size: Option<f64>,
-    /// Or: the photos are one object on a luminous display that shows the frames of `capture
-    /// frames`, in any order; its markers give the scale
+    /// Or: the photos show one object on a luminous display with the frames of `capture frames`, in
+    /// any order; their markers give the scale
     #[arg(long)]
     captured: bool,
 }

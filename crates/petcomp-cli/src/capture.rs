@@ -9,8 +9,8 @@ use std::path::PathBuf;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum CaptureCommand {
-    /// Write the frames that a tablet or monitor shows below the object, and a page that shows them
-    /// one after the other; photos of them go to `petcomp asset add --captured`
+    /// Write frames to show on a tablet or monitor under the object, and a page that steps through
+    /// them; pass photos of them to `petcomp asset add --captured`
     Frames(FramesArgs),
 }
 
@@ -19,16 +19,18 @@ pub(crate) struct FramesArgs {
     /// Folder to write
     #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
-    /// Pixels of the display, 400 to 16384 a side: best its own number, so that nothing is scaled
+    /// Size of the frames, pixels, 400 to 16384 per side; preferably the display's native
+    /// resolution, so that nothing is scaled
     #[arg(long, value_name = "WxH", value_parser = parse_pixel_size)]
     size: [u32; 2],
-    /// Width of the picture on the display, metres, by a ruler; can be given later, to `asset add`
+    /// Width of the image on the display, metres, measured with a ruler; can be given later, to
+    /// `asset add`
     #[arg(long, value_name = "METRES", conflicts_with = "diagonal")]
     width: Option<f64>,
-    /// Or: diagonal of the picture on the display, inches
+    /// Or: diagonal of the image on the display, inches
     #[arg(long, value_name = "INCHES")]
     diagonal: Option<f64>,
-    /// Sixteen frames of stripes, too: they measure how the object bends light
+    /// Also write sixteen frames of stripes, which measure how the object refracts light
     #[arg(long)]
     stripes: bool,
 }

@@ -16,10 +16,10 @@ pub(crate) struct DemoArgs {
     /// Folder to write into
     #[arg(short, long, value_name = "FOLDER", default_value = "demo", value_parser = folder_parser())]
     output: PathBuf,
-    /// Number of pictures
+    /// Number of images
     #[arg(short = 'n', long, value_name = "N", default_value_t = 24)]
     count: u64,
-    /// Seed; the same one gives the same files
+    /// Seed; the same seed gives the same files
     #[arg(long, default_value_t = 0)]
     seed: u64,
     #[command(flatten)]

@@ -16,44 +16,45 @@ use std::path::{Path, PathBuf};
 /// Exit status: 0 match, 1 warning, 2 failure, 3 not comparable, 4 a picture cannot be read.
 #[derive(clap::Args)]
 pub(crate) struct DiffArgs {
-    /// First picture
+    /// First image
     a: PathBuf,
-    /// Second picture
+    /// Second image
     b: PathBuf,
-    /// A channel fails when it differs by more than this
+    /// Difference above which a channel fails
     #[arg(long, default_value_t = 1e-6, value_parser = parse_threshold)]
     fail: f32,
-    /// ... and by more than this part of the mean of both
+    /// ... if it also exceeds this fraction of the mean of both
     #[arg(long = "failrelative", default_value_t = 0.0, value_parser = parse_threshold)]
     fail_relative: f32,
     /// Percentage of pixels that may fail
     #[arg(long = "failpercent", default_value_t = 0.0, value_parser = parse_threshold)]
     fail_percent: f32,
-    /// No channel may differ by more than this
+    /// Difference that no channel may exceed
     #[arg(long = "hardfail", default_value_t = f32::INFINITY, value_parser = parse_threshold)]
     hard_fail: f32,
     /// Number of pixels that may fail by any amount
     #[arg(long = "allowfailures", default_value_t = 0)]
     allow_failures: usize,
-    /// As --fail, for a warning
+    /// Like --fail, for a warning
     #[arg(long, default_value_t = 1e-6, value_parser = parse_threshold)]
     warn: f32,
-    /// As --failrelative, for a warning
+    /// Like --failrelative, for a warning
     #[arg(long = "warnrelative", default_value_t = 0.0, value_parser = parse_threshold)]
     warn_relative: f32,
-    /// As --failpercent, for a warning
+    /// Like --failpercent, for a warning
     #[arg(long = "warnpercent", default_value_t = 0.0, value_parser = parse_threshold)]
     warn_percent: f32,
-    /// As --hardfail, for a warning
+    /// Like --hardfail, for a warning
     #[arg(long = "hardwarn", default_value_t = f32::INFINITY, value_parser = parse_threshold)]
     hard_warn: f32,
-    /// Write a picture of the absolute difference: of each colour or of alpha, whichever is larger
+    /// Difference image to write: absolute difference of each colour or of alpha, whichever is
+    /// larger
     #[arg(short, long, value_name = "PICTURE")]
     output: Option<PathBuf>,
     /// Factor on the written difference
     #[arg(long, default_value_t = 1.0, value_parser = parse_scale)]
     scale: f32,
-    /// Write the difference only when there is one
+    /// Write the difference only if there is one
     #[arg(long = "od")]
     only_different: bool,
 }

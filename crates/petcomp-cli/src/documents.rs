@@ -22,10 +22,10 @@ pub(crate) fn read_scene(path: &Path) -> Result<Scene> {
 /// A recipe file, and values in it that are to be different.
 #[derive(clap::Args)]
 pub(crate) struct RecipeArgs {
-    /// Recipe file (TOML): names the folders of assets and backgrounds, and what to draw
+    /// Recipe file (TOML), which names the folders of assets and backgrounds and what to draw
     #[arg(value_name = "RECIPE")]
     pub(crate) path: PathBuf,
-    /// Replace a value of the recipe: render.subsamples=8
+    /// Override a value of the recipe: render.subsamples=8
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<Override>,
 }
@@ -62,14 +62,14 @@ impl RecipeArgs {
 /// A scene file, and where the files that it names are.
 #[derive(clap::Args)]
 pub(crate) struct SceneArgs {
-    /// Scene, TOML or JSON; what is unknown in it is solved first
+    /// Scene file (TOML or JSON); its unknowns are solved first
     #[arg(value_name = "SCENE")]
     pub(crate) path: PathBuf,
     /// Recipe file (TOML) that names the folders of assets and backgrounds; by default the scene's
-    /// own `[files]` does
+    /// own `[files]`
     #[arg(value_name = "RECIPE")]
     recipe: Option<PathBuf>,
-    /// Replace a value of the recipe or of the scene's settings: render.subsamples=8
+    /// Override a value of the recipe or of the scene's settings: render.subsamples=8
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<Override>,
 }

@@ -12,38 +12,39 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct EvalArgs {
-    /// Predictions of one or more runs, then the truth: folders of YOLO labels (`class cx cy w h
-    /// confidence`, or with the id of a track behind it) or COCO JSON; the truth may be a list of
-    /// images (.txt), or a folder with a data.yaml and no labels: its images for validation
+    /// Predictions of one or more runs, then the ground truth: folders of YOLO labels (`class cx cy
+    /// w h confidence`, optionally followed by a track id) or COCO JSON. The ground truth may also
+    /// be a list of images (.txt), or a folder with a data.yaml and no labels: its validation
+    /// images
     #[arg(required = true, num_args = 2.., value_names = ["PREDICTIONS", "TRUTH"])]
     paths: Vec<PathBuf>,
-    /// CSV with a line `image,light,..` and what each image of the truth is: scores per factor
+    /// CSV with a header `image,light,..` that tags the ground-truth images, for scores per factor
     #[arg(long, value_name = "CSV")]
     tags: Option<PathBuf>,
-    /// Names of the classes in order; default: those of a data.yaml or a COCO file
+    /// Names of the classes in order; by default those of a data.yaml or a COCO file
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     classes: Vec<String>,
-    /// Width and height of all images in pixels, for YOLO labels without images beside them
+    /// Width and height of all images, pixels, for YOLO labels without images next to them
     #[arg(long, value_name = "WxH", value_parser = parse_pixel_size)]
     size: Option<[u32; 2]>,
-    /// Where the images are, if not beside the COCO document or where YOLO has them; for pictures of
-    /// mistakes, and for the sizes of YOLO's boxes
+    /// Folder of the images, if not next to the COCO document or where YOLO has them; used to show
+    /// errors and for the size of YOLO's boxes
     #[arg(long, value_name = "FOLDER")]
     images: Option<PathBuf>,
-    /// Detections surer than this, 0 to 1, count in the confusion and as mistakes
+    /// Confidence, 0 to 1, above which detections count in the confusion matrix and as errors
     #[arg(long, value_name = "CONFIDENCE", default_value_t = ConfusionOptions::default().confidence, value_parser = parse_confidence)]
     confidence: f64,
-    /// Most pictures of false alarms, and of misses, on the page
+    /// Maximum number of false positives, and of false negatives, shown on the page
     #[arg(short = 'n', long, value_name = "N", default_value_t = EvalReportOptions::default().shown)]
     most: usize,
-    /// Rounds of the bootstrap over images (sequences of a belt or video), at most 100000; there is
-    /// no interval of fewer than 40
+    /// Bootstrap rounds over images (sequences of a belt or video), at most 100000; with fewer than
+    /// 40 there is no confidence interval
     #[arg(long, value_name = "N", default_value_t = EvalReportOptions::default().rounds, value_parser = count(0..=100_000))]
     rounds: usize,
     /// Seed of the bootstrap
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Folder for metrics.json, tables (CSV), pictures (SVG) and the page eval.html
+    /// Folder for metrics.json, tables (CSV), plots (SVG) and the page eval.html
     #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: Option<PathBuf>,
 }

@@ -14,24 +14,24 @@ use std::path::Path;
 #[derive(clap::Args)]
 #[command(next_help_heading = GLOBAL_HEADING)]
 pub(crate) struct GlobalArgs {
-    /// Worker threads, at most 1024; 0 is one per core
+    /// Worker threads, at most 1024; 0 means one per core
     #[arg(short = 'j', long, value_name = "N", default_value_t = 0, global = true, value_parser = count(0..=1024))]
     threads: usize,
-    /// Say nothing but results and errors: no progress, no notes, no warnings
+    /// Print only results and errors: no progress, notes or warnings
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// How to show how far a long job is: `bar` (lines where there is no terminal) or `json`, an
-    /// object a line on the standard error
+    /// Progress display of long jobs: `bar` (lines if there is no terminal) or `json` (one object
+    /// per line on standard error)
     #[arg(long, value_name = "HOW", default_value = "bar", global = true)]
     progress: ProgressFormat,
-    /// Say more; twice for everything
+    /// Print more messages; repeat to print all
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
-    /// Let pictures and documents ask for more, or less: side=65536, pixels=512M,
+    /// Raise or lower a limit on input images and documents: side=65536, pixels=512M,
     /// decoded_bytes=4G, seconds=60, document_bytes=64M, ...
     #[arg(long = "limit", value_name = "NAME=N", global = true)]
     limits: Vec<LimitOverride>,
-    /// What reads pictures that petcomp's own decoders do not know
+    /// Where OpenImageIO reads images that petcomp's own decoders do not support
     #[arg(long, value_enum, default_value_t, global = true)]
     oiio: OpenImageIo,
 }
@@ -39,16 +39,15 @@ pub(crate) struct GlobalArgs {
 /// Where OpenImageIO runs.
 #[derive(Clone, Copy, Default, clap::ValueEnum)]
 enum OpenImageIo {
-    /// In a sandboxed process of its own
+    /// In a separate sandboxed process
     #[default]
     Worker,
-    /// The same, and no such picture is read where the system lacks Landlock or seccomp for its
-    /// sandbox
+    /// The same, but reject such images if the system lacks Landlock or seccomp for the sandbox
     WorkerStrict,
-    /// In this process: a damaged file may crash it (needs a build with the feature
+    /// In this process: a corrupt file may crash it (requires a build with the feature
     /// in-process-oiio)
     InProcess,
-    /// Not at all
+    /// Not at all: reject such images
     Off,
 }
 

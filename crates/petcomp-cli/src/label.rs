@@ -11,14 +11,13 @@ use std::path::{Path, PathBuf};
 pub(crate) struct LabelArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Labels to write, JSON
+    /// Labels to write (JSON)
     #[arg(short, long, value_name = "LABELS")]
     output: PathBuf,
-    /// Also write the picture with outlines and boxes drawn on it
+    /// Also write the image with outlines and boxes drawn on it
     #[arg(long, value_name = "PNG")]
     overlay: Option<PathBuf>,
-    /// Also write the borders of the masks as polygons, simplified as the recipe's
-    /// `labels.simplify` says
+    /// Also write the mask borders as polygons, simplified by the recipe's `labels.simplify`
     #[arg(long, value_name = "JSON")]
     polygons: Option<PathBuf>,
 }

@@ -34,10 +34,10 @@ use crate::global::GlobalArgs;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::ffi::OsString;
 
-/// From photographs to labelled training images.
+/// Turn photographs into labelled training images.
 ///
-/// Photos on a green or blue screen become cut-outs (matte, asset); a photo of a place with four
-/// marked corners becomes a camera (camera); a recipe becomes scenes (scene), which settle, are
+/// Photos taken on a green or blue screen become cut-outs (matte, asset). A photo of a place with
+/// four marked corners gives a camera (camera). A recipe gives scenes (scene), which are settled,
 /// rendered over the photo and labelled (dataset).
 #[derive(Parser)]
 #[command(
@@ -55,46 +55,46 @@ struct Program {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Make a sample dataset from the photographs in the repository
+    /// Generate a sample dataset from the photographs in the repository
     Demo(demo::DemoArgs),
     #[command(flatten)]
     Stage(StageVerb),
-    /// Detections against the truth: average precision, curves, confusion
+    /// Evaluate detections against ground truth: average precision, curves, confusion matrix
     Eval(eval::EvalArgs),
-    /// Compare two pictures, with the flags and exit codes of OpenImageIO's idiff
+    /// Compare two images, with the flags and exit codes of OpenImageIO's idiff
     Diff(diff::DiffArgs),
-    /// Pages in the browser: label corners, look at mattes, tune a recipe, browse a dataset
+    /// Serve pages for the browser: label corners, inspect mattes, tune a recipe, browse a dataset
     #[cfg(feature = "studio")]
     Studio(studio::StudioArgs),
-    /// What this machine has, and whether petcomp works on it: exit status 1 where it does not
+    /// Report what this machine has and whether petcomp works on it; exit with status 1 if not
     Doctor(doctor::DoctorArgs),
 }
 
 /// The stages, in the order of the data.
 #[derive(Subcommand)]
 enum StageVerb {
-    /// Photo -> matte and cut-out
+    /// Extract mattes and cut-outs from photos
     #[command(subcommand)]
     Matte(matte::MatteCommand),
-    /// Frames for a display to show: what an object lets through and how it bends light, measured
+    /// Write frames for a display, to measure what an object transmits and how it refracts light
     #[command(subcommand)]
     Capture(capture::CaptureCommand),
-    /// Cut-outs with real size and class, kept in a folder
+    /// Build and inspect a folder of cut-outs with real size and class
     #[command(subcommand)]
     Asset(asset::AssetCommand),
-    /// Four labelled corners -> camera
+    /// Solve a camera from four labelled corners
     #[command(subcommand)]
     Camera(camera::CameraCommand),
-    /// Recipe -> scene
+    /// Draw, check and export scenes
     #[command(subcommand)]
     Scene(scene::SceneCommand),
-    /// Let a scene's dropped objects come to rest
+    /// Let the dropped objects of a scene come to rest
     Settle(settle::SettleArgs),
-    /// Scene -> picture
+    /// Render a scene to an image
     Render(render::RenderArgs),
-    /// Scene -> outlines, boxes, visibility
+    /// Label a scene: outlines, bounding boxes, visibility
     Label(label::LabelArgs),
-    /// Recipe -> images with labels, ready to train on
+    /// Generate labelled images from a recipe, ready to train on
     #[command(subcommand)]
     Dataset(dataset::DatasetCommand),
 }

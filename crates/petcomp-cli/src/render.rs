@@ -14,23 +14,23 @@ use std::path::{Path, PathBuf};
 pub(crate) struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Picture to write: .png, .jpg as the recipe's `pictures` says, .tif for sRGB codes with
-    /// alpha, or .exr for scene-linear values with alpha; in a .png or .jpg a scene without a plate
-    /// lies over black, without alpha
+    /// Image to write: .png, .jpg (as set in the recipe's `pictures`), .tif (sRGB codes with alpha)
+    /// or .exr (scene-linear values with alpha); in a .png or .jpg a scene without a plate is over
+    /// black, without alpha
     #[arg(short, long, value_name = "PICTURE")]
     output: PathBuf,
-    /// draft, normal or reference: how finely everything is computed; by default as the recipe or
-    /// the scene's settings say
+    /// draft, normal or reference: how finely everything is computed; by default as set in the
+    /// recipe or the scene
     #[arg(long)]
     quality: Option<Quality>,
     /// Parts of a multi-part .exr: beauty,coverage,shadow,id,depth,position,uv,cryptomatte,layers;
     /// the Cryptomatte comes first, where Blender finds it
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     aov: Vec<Aov>,
-    /// Also write the picture as it is displayed
+    /// Also write the image as displayed
     #[arg(long, value_name = "PNG")]
     preview: Option<PathBuf>,
-    /// Also write the scene with everything solved, to be rendered without a recipe
+    /// Also write the scene with everything solved, which renders without a recipe
     #[arg(long, value_name = "SCENE")]
     resolved: Option<PathBuf>,
 }

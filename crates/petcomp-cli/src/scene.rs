@@ -11,35 +11,35 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub(crate) enum SceneCommand {
-    /// Draw scene K of a recipe
+    /// Draw scene K from a recipe
     Draw(DrawArgs),
-    /// Check that the values of a scene file are possible; the files that it names are not opened
+    /// Check that the values in a scene file are valid, without opening the files it names
     Check {
-        /// Scene, TOML or JSON
+        /// Scene file (TOML or JSON)
         scene: PathBuf,
     },
-    /// Write a scene for another renderer: JSON, plate and textures that Blender renders with one
+    /// Export a scene to another renderer: JSON, plate and textures, which Blender renders with one
     /// more command
     Export(ExportSceneArgs),
 }
 
 #[derive(clap::Args)]
 pub(crate) struct ExportSceneArgs {
-    /// Scene, TOML or JSON; what is unknown in it is solved first
+    /// Scene file (TOML or JSON); its unknowns are solved first
     scene: PathBuf,
     #[command(flatten)]
     recipe: RecipeArgs,
-    /// The other renderer
+    /// Target renderer
     #[arg(long, value_name = "RENDERER")]
     to: Renderer,
-    /// Folder to write
+    /// Folder to write into
     #[arg(value_name = "FOLDER", value_parser = folder_parser())]
     folder: PathBuf,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Renderer {
-    /// Blender's path tracer, by the script that makes our golden references
+    /// Blender's path tracer, with the script that renders our golden references
     Cycles,
 }
 
@@ -50,10 +50,10 @@ pub(crate) struct DrawArgs {
     /// Seed of the dataset
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Number of the scene
+    /// Index of the scene
     #[arg(short = 'k', long, default_value_t = 0, value_name = "K")]
     index: u64,
-    /// Scene to write, TOML or JSON by its extension
+    /// Scene file to write; its extension selects TOML or JSON
     #[arg(short, long, value_name = "SCENE")]
     output: PathBuf,
 }

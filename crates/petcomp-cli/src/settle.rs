@@ -9,22 +9,22 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct SettleArgs {
-    /// Scene, TOML or JSON
+    /// Scene file (TOML or JSON)
     scene: PathBuf,
-    /// Scene to write, TOML or JSON by its extension
+    /// Scene file to write; its extension selects TOML or JSON
     #[arg(short, long, value_name = "SCENE")]
     output: PathBuf,
-    /// Settle options to use instead of the scene's own settings or the defaults, as TOML
+    /// TOML file with settle options, used instead of the scene's own settings or the defaults
     #[arg(long, value_name = "FILE")]
     options: Option<PathBuf>,
-    /// draft, normal or reference: how finely the fall is computed; by default what the options
-    /// say
+    /// draft, normal or reference: how finely the fall is computed; by default as set in the
+    /// options
     #[arg(long)]
     quality: Option<Quality>,
-    /// Where every object was during the fall, as CSV: a line for about each 60th of a second and object
+    /// CSV file for the path of every object: about one line per object and 1/60 second
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Picture of what lies where, from above and from the side
+    /// Image of the objects at rest to write, from above and from the side
     #[arg(long, value_name = "FILE")]
     preview: Option<PathBuf>,
 }

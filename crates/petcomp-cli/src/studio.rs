@@ -8,11 +8,11 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct StudioArgs {
-    /// Folder with photos, labels, assets, recipes and datasets; nothing outside of it is read or
+    /// Folder with photos, labels, assets, recipes and datasets; nothing outside it is read or
     /// written
     #[arg(value_name = "FOLDER", default_value = ".")]
     folder: PathBuf,
-    /// Port of 127.0.0.1; 0 is any free one
+    /// Port on 127.0.0.1; 0 means any free port
     #[arg(long, value_name = "N", default_value_t = 0)]
     port: u16,
 }

@@ -19,17 +19,17 @@ use std::path::{Path, PathBuf};
 )]
 #[derive(clap::Args)]
 pub struct AllOptions {
-    /// Folder to write
+    /// Folder to write into
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     pub output: PathBuf,
-    /// Other programs' measurements, as `make peers` writes them; left out where there are none
+    /// Folder of other programs' measurements, as written by `make peers`; skipped if missing
     #[arg(long, value_name = "FOLDER", default_value = "target/peers")]
     peers: PathBuf,
-    /// Photos with their truth, as the sample world has them, for the mattes; by default photos
-    /// made in code
+    /// Folder of photos with ground truth for the mattes, laid out like the sample world; by
+    /// default synthetic photos
     #[arg(long, value_name = "FOLDER")]
     truth: Option<PathBuf>,
-    /// Golden scenes with Cycles' pictures; left out where there are none
+    /// Folder of golden scenes with Cycles' images; skipped if missing
     #[arg(long, value_name = "FOLDER", default_value = "golden/render")]
     golden: PathBuf,
     /// Fewer runs and inputs: a preview in half a minute, with noisier times

@@ -7,7 +7,7 @@ use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::process::ExitCode;
 
-/// Measure how good a stage is, on simulated data: tables and plots.
+/// Measure how well each stage works on simulated data; write tables and plots.
 #[derive(Parser)]
 #[command(version)]
 struct ReportCli {
@@ -20,7 +20,7 @@ struct ReportCli {
 /// Flags that mean the same for every report.
 #[derive(clap::Args)]
 pub(crate) struct ReportFlags {
-    /// Worker threads; 0 is one per core
+    /// Worker threads; 0 means one per core
     #[arg(
         short = 'j',
         long,
@@ -29,7 +29,7 @@ pub(crate) struct ReportFlags {
         global = true
     )]
     pub(crate) threads: usize,
-    /// Print nothing but results and errors
+    /// Print only results and errors
     #[arg(short, long, global = true)]
     quiet: bool,
 }

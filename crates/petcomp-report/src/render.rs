@@ -29,13 +29,13 @@ use std::path::PathBuf;
 )]
 #[derive(clap::Args)]
 pub struct RenderReportOptions {
-    /// Scene file of the reference renderer: a golden one, or one that `scene export` wrote
+    /// Scene file of the reference renderer: a golden one, or one written by `scene export`
     #[arg(default_value = "golden/render/pile_of_20/scene.json")]
     scene: PathBuf,
-    /// Folder to write
+    /// Folder to write into
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     pub output: PathBuf,
-    /// Width and height of the pictures, 1 to 4096
+    /// Width and height of the images, 1 to 4096
     #[arg(
         long,
         num_args = 2,
@@ -44,13 +44,14 @@ pub struct RenderReportOptions {
         value_parser = clap::value_parser!(u32).range(1..=4096)
     )]
     size: Vec<u32>,
-    /// Cycles' pictures of the same scene and size, made by tests/benches/peers/render.py
+    /// Folder of Cycles' images of the same scene and size, rendered by
+    /// tests/benches/peers/render.py
     #[arg(long, value_name = "FOLDER", default_value = "report/cycles")]
     cycles: PathBuf,
-    /// Golden scenes to compare as well
+    /// Folder of golden scenes, also compared
     #[arg(long, value_name = "FOLDER", default_value = "golden/render")]
     golden: PathBuf,
-    /// Renderings per preset, of which the median is reported, 1 to 1000
+    /// Renderings per preset, 1 to 1000; their median is reported
     #[arg(
         long,
         value_name = "N",
@@ -58,7 +59,7 @@ pub struct RenderReportOptions {
         value_parser = RangedU64ValueParser::<usize>::new().range(1..=1000)
     )]
     repeats: usize,
-    /// Errors against Cycles at which to search for the quickest settings
+    /// Errors against Cycles at which to search for the fastest settings
     #[arg(long, value_name = "RMSE", value_delimiter = ',')]
     quickest_at: Vec<f64>,
 }

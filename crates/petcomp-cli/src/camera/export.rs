@@ -11,10 +11,10 @@ pub(crate) struct ExportCameraArgs {
     /// Camera files: NAME.camera.json
     #[arg(required = true)]
     cameras: Vec<PathBuf>,
-    /// For which program
+    /// Target program
     #[arg(long)]
     to: ExportFormat,
-    /// File (blender, opencv: of one camera) or folder (colmap) to write; without it, blender and
+    /// File (blender, opencv: one camera only) or folder (colmap) to write; by default blender and
     /// opencv are printed
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -22,7 +22,7 @@ pub(crate) struct ExportCameraArgs {
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum ExportFormat {
-    /// A Python script
+    /// Python script
     Blender,
     /// K, R, t and dist (k1, k2, p1, p2) as JSON
     Opencv,

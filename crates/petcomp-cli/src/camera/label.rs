@@ -10,32 +10,33 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct InitLabelArgs {
-    /// The photo
+    /// Photo
     photo: PathBuf,
-    /// Width and height of the rectangle in metres: 0.56x0.37
+    /// Width and height of the rectangle, metres: 0.56x0.37
     #[arg(long, value_name = "WxH", value_parser = parse_metres, required_unless_present = "like")]
     size: Option<[f64; 2]>,
-    /// Its corners in pixels, "x,y x,y x,y x,y": top left, top right, bottom right, bottom left
+    /// Corners of the rectangle, pixels, "x,y x,y x,y x,y": top left, top right, bottom right,
+    /// bottom left
     #[arg(long, value_name = "CORNERS", value_parser = parse_corners)]
     corners: Option<[[f64; 2]; 4]>,
-    /// Label of another photo of the same rectangle: its size, its markers and its camera's name
-    /// are taken over, and the markers looked for
+    /// Label of another photo of the same rectangle: its size, markers and camera name are copied,
+    /// and the markers detected
     #[arg(long, value_name = "LABEL")]
     like: Option<PathBuf>,
-    /// Label to write instead of NAME.label.json beside the photo
+    /// Label to write; by default NAME.label.json next to the photo
     #[arg(short, long, value_name = "LABEL")]
     output: Option<PathBuf>,
-    /// Replace a label that is there
+    /// Overwrite an existing label
     #[arg(long)]
     force: bool,
 }
 
 #[derive(clap::Args)]
 pub(crate) struct MarkersArgs {
-    /// The photo
+    /// Photo
     photo: PathBuf,
-    /// Label with the markers' family, size and places: the photo's own, or that of another photo
-    /// of the same rectangle, which lends what `camera init --like` takes over
+    /// Label with the markers' family, size and positions: the photo's own, or that of another
+    /// photo of the same rectangle, from which the same is copied as by `camera init --like`
     #[arg(long, value_name = "LABEL")]
     map: PathBuf,
     /// Label to write

@@ -10,22 +10,21 @@ use crate::global::GlobalArgs;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum CameraCommand {
-    /// Write a label for a photo, with everything that is known already; its corners are filled in
-    /// by hand or by markers
+    /// Write a label for a photo with everything already known; fill in its corners by hand or with
+    /// markers
     Init(label::InitLabelArgs),
-    /// Solve the camera of each label; write NAME.camera.json and NAME.overlay.png beside it
+    /// Solve the camera of each label; write NAME.camera.json and NAME.overlay.png next to it
     Solve(solve::SolveArgs),
-    /// Solve photos of one camera together: labels that share camera.id, shape of the picture and
-    /// lens
+    /// Solve photos of one camera together: labels that share camera.id, aspect ratio and lens
     Joint(solve::JointArgs),
-    /// Say in plain words what is known how well, and what to measure
+    /// Explain in plain words how well each camera is known, and what to measure
     Doctor(solve::LabelFileArgs),
-    /// Write solved cameras as another program does
+    /// Export solved cameras to another program
     Export(export::ExportCameraArgs),
-    /// Find printed markers (ArUco DICT_4X4_50, AprilTag tag36h11) in a photo and add their corners
-    /// to a label as points
+    /// Detect printed markers (ArUco DICT_4X4_50, AprilTag tag36h11) in a photo and add their
+    /// corners to a label as points
     Markers(label::MarkersArgs),
-    /// Turn a photo into a metric top view of the surface, or lay a picture on it
+    /// Rectify a photo to a metric top view of the surface, or project an image onto it
     Rectify(rectify::RectifyArgs),
 }
 

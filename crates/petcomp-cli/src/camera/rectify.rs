@@ -9,23 +9,24 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct RectifyArgs {
-    /// The photo (its size is that of the result with --back)
+    /// Photo (with --back, the result has its size)
     photo: PathBuf,
-    /// Its label
+    /// Label of the photo
     label: PathBuf,
-    /// Picture to write
+    /// Image to write
     #[arg(short, long)]
     output: PathBuf,
-    /// Pixels per metre of the top view; by default those of the photo at the rectangle's centre
+    /// Pixels per metre of the top view; by default those of the photo at the centre of the
+    /// rectangle
     #[arg(long, value_name = "N")]
     px_per_metre: Option<f64>,
-    /// Lay this picture on the rectangle instead, as the photo would show it
+    /// Project this image onto the rectangle instead, as the photo would show it
     #[arg(long, value_name = "PICTURE")]
     back: Option<PathBuf>,
-    /// Width and height of the rectangle in metres, for labels that do not say them
+    /// Width and height of the rectangle, metres, for labels that do not state them
     #[arg(long, value_name = "WxH", value_parser = parse_metres)]
     size: Option<[f64; 2]>,
-    /// Take a camera that does not fit its label, too
+    /// Use the camera even if it does not fit its label
     #[arg(long)]
     force: bool,
 }

@@ -13,11 +13,11 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct LabelFileArgs {
-    /// Labels: NAME.label.json, or files of LabelMe, CVAT (for images) or Label Studio together
+    /// Labels: NAME.label.json; or files of LabelMe, CVAT (for images) or Label Studio, together
     /// with --size
     #[arg(required = true)]
     labels: Vec<PathBuf>,
-    /// Width and height of the rectangle in metres, for labels that do not say them
+    /// Width and height of the rectangle, metres, for labels that do not state them
     #[arg(long, value_name = "WxH", value_parser = parse_metres)]
     size: Option<[f64; 2]>,
 }
@@ -26,10 +26,10 @@ pub(crate) struct LabelFileArgs {
 pub(crate) struct SolveArgs {
     #[command(flatten)]
     labels: LabelFileArgs,
-    /// Camera file to write instead; for one label only
+    /// Camera file to write instead of NAME.camera.json; for one label only
     #[arg(short, long, value_name = "CAMERA")]
     output: Option<PathBuf>,
-    /// Write cameras that do not fit their labels, too
+    /// Also write cameras that do not fit their labels
     #[arg(long)]
     force: bool,
 }
@@ -38,7 +38,7 @@ pub(crate) struct SolveArgs {
 pub(crate) struct JointArgs {
     #[command(flatten)]
     labels: LabelFileArgs,
-    /// Write cameras that do not fit their labels, too
+    /// Also write cameras that do not fit their labels
     #[arg(long)]
     force: bool,
 }

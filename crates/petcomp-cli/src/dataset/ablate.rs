@@ -19,17 +19,18 @@ use std::path::{Path, PathBuf};
 pub(crate) struct AblateArgs {
     #[command(flatten)]
     recipe: RecipeArgs,
-    /// Value of the recipe that one of the datasets has, beside one with the recipe as it is; may
-    /// be repeated. By default the paper's datasets: one source of variation switched off in each
+    /// Recipe value that one of the datasets overrides, in addition to a dataset with the unchanged
+    /// recipe; may be repeated. By default the paper's datasets: one source of variation switched
+    /// off in each
     #[arg(long = "switch", value_name = "KEY=VALUE")]
     switches: Vec<Override>,
-    /// Number of pictures of each dataset; 0 writes the recipes only
+    /// Number of images in each dataset; 0 writes only the recipes
     #[arg(short = 'n', long, value_name = "N")]
     count: u64,
-    /// Seed of all of them: the same scenes but for what is switched off
+    /// Seed of all datasets: their scenes differ only in what is switched off
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Folder to write a folder for each into
+    /// Folder for a subfolder per dataset
     #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
     #[command(flatten)]

@@ -10,20 +10,20 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct FitArgs {
-    /// Labelled pictures of the place, 5 to 50: a YOLO dataset, or a folder of images with YOLO
-    /// labels. Without, what the recipe's photos of the place tell
+    /// Labelled images of the place, 5 to 50: a YOLO dataset, or a folder of images with YOLO
+    /// labels. If omitted, the recipe's photos of the place are used
     #[arg(value_name = "REAL")]
     real: Option<PathBuf>,
-    /// Recipe file (TOML) to fit; it stays as it is
+    /// Recipe file (TOML) to fit; it is not changed
     #[arg(long, value_name = "RECIPE")]
     recipe: PathBuf,
     /// Recipe file to write
     #[arg(short, long, value_name = "FITTED")]
     output: PathBuf,
-    /// Page with every distribution before and after; by default FITTED's name with .html
+    /// Page to write with every distribution before and after; by default FITTED's name with .html
     #[arg(long, value_name = "HTML")]
     page: Option<PathBuf>,
-    /// Seed; the same one gives the same files
+    /// Seed; the same seed gives the same files
     #[arg(long, default_value_t = 0)]
     seed: u64,
 }

@@ -18,41 +18,40 @@ use std::path::{Path, PathBuf};
 pub(crate) struct GenerateArgs {
     #[command(flatten)]
     recipe: RecipeArgs,
-    /// Number of pictures of the whole dataset, at most a thousand million; a folder that holds
-    /// more is refused
+    /// Number of images in the whole dataset, at most 1,000,000,000; a folder that already holds
+    /// more is rejected
     #[arg(short = 'n', long, value_name = "N", required_unless_present_any = ["only", "preview"])]
     count: Option<u64>,
-    /// Seed; the same one gives the same files
+    /// Seed; the same seed gives the same files
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Folder to write into, or an object store for a dataset of archives: s3://BUCKET/PREFIX, gs://..
     /// or az://.. (credentials from the environment)
     #[arg(short, long, value_name = "FOLDER|URL", value_parser = OsStringValueParser::new().try_map(Output::parse))]
     output: Output,
-    /// Where the output is an object store: folder for what is not finished [default: one of the
-    /// system's temporary folder]
+    /// Folder for unfinished files if the output is an object store [default: one in the system's
+    /// temporary folder]
     #[arg(long, value_name = "FOLDER")]
     scratch: Option<PathBuf>,
-    /// draft, normal or reference: how finely everything is computed; by default what the recipe
-    /// says. Falls differ between qualities, and so do the places where things come to lie
+    /// draft, normal or reference: how finely everything is computed; by default as set in the
+    /// recipe. Falls differ between qualities, so objects come to rest in different places
     #[arg(long)]
     quality: Option<Quality>,
-    /// Go on with a dataset that was begun before: refuse a new folder, and check every file
-    /// against its checksum (archives have none: whether they are whole, and the samples
-    /// that are not packed yet), inputs too
+    /// Resume an existing dataset: reject a new folder, and verify every file, inputs too, by its
+    /// checksum (archives have none: verify that they are complete, and the samples not yet packed)
     #[arg(long)]
     resume: bool,
-    /// Make only image K, whether it is there or not
+    /// Generate only image K, even if it exists
     #[arg(long, value_name = "K", conflicts_with_all = ["shard", "preview"])]
     only: Option<u64>,
-    /// Make every N-th image, from the I-th (1 to N), in a folder of its own below the output (of a
-    /// dataset of archives: every N-th archive, in the output itself);
-    /// `auto` or `auto/N` asks the Slurm array (with N: its tasks are 1 to N, and any of them may be repeated), the AWS Batch
+    /// Generate every N-th image, from the I-th (1 to N), in a subfolder of the output (for a
+    /// dataset of archives: every N-th archive, in the output itself); `auto` or `auto/N` queries
+    /// the Slurm array (with N: its tasks are 1 to N, and any of them may be rerun), the AWS Batch
     /// array job or the indexed Kubernetes job that this runs in
     #[arg(long, value_name = "I/N", conflicts_with = "preview")]
     shard: Option<ShardChoice>,
-    /// Make the first N images (of those that -n asks for) at half their width and height, and a
-    /// sheet of them: a look in seconds
+    /// Generate the first N images (at most -n) at half their width and height, and a contact
+    /// sheet: a preview in seconds
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "16")]
     preview: Option<u64>,
     #[command(flatten)]

@@ -11,21 +11,20 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub(crate) enum InspectCommand {
-    /// Look for what trainers refuse, and for what makes results too good: duplicates, leaks
+    /// Check for what trainers reject and for what makes results too good: duplicates, leakage
     /// between the parts
     Check(CheckArgs),
-    /// Write one HTML page: pictures with their labels, what was drawn, what can be seen, how long
-    /// it took
+    /// Write an HTML report: images with their labels, drawn values, visibility, run times
     Report(ReportArgs),
-    /// Draw a sheet of pictures from all over the dataset, with their boxes
+    /// Draw a contact sheet of images from across the dataset, with their boxes
     Sheet(SheetArgs),
 }
 
 #[derive(clap::Args)]
 pub(crate) struct CheckArgs {
-    /// Folder of the dataset
+    /// Dataset folder
     folder: PathBuf,
-    /// Exit with status 1 where there are notes alone: classes with few labels or none, very small
+    /// Exit with status 1 even if there are only notes: classes with few or no labels, very small
     /// boxes
     #[arg(long)]
     strict: bool,
@@ -33,27 +32,27 @@ pub(crate) struct CheckArgs {
 
 #[derive(clap::Args)]
 pub(crate) struct ReportArgs {
-    /// Folder of the dataset
+    /// Dataset folder
     folder: PathBuf,
     /// Page to write; by default report.html in the folder
     #[arg(short, long, value_name = "HTML")]
     output: Option<PathBuf>,
-    /// Number of sample pictures
+    /// Number of sample images
     #[arg(short = 'n', long, value_name = "N", default_value_t = 32)]
     most: usize,
-    /// Your own pictures, to compare with: a YOLO dataset, or a folder of images with YOLO labels
+    /// Your own images to compare with: a YOLO dataset, or a folder of images with YOLO labels
     #[arg(long, value_name = "FOLDER")]
     beside: Option<PathBuf>,
 }
 
 #[derive(clap::Args)]
 pub(crate) struct SheetArgs {
-    /// Folder of the dataset
+    /// Dataset folder
     folder: PathBuf,
-    /// Picture to write
+    /// Image to write
     #[arg(short, long, value_name = "PNG")]
     output: PathBuf,
-    /// Number of pictures
+    /// Number of images
     #[arg(short = 'n', long, value_name = "N", default_value_t = 24)]
     most: usize,
 }

@@ -12,7 +12,7 @@ pub(crate) struct MergeArgs {
     /// Folders of all shards, in any order
     #[arg(required = true, value_name = "SHARD")]
     shards: Vec<PathBuf>,
-    /// Folder to write the whole dataset into
+    /// Folder for the whole dataset
     #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
 }

@@ -22,14 +22,14 @@ use crate::global::GlobalArgs;
 pub(crate) enum DatasetCommand {
     #[command(flatten)]
     Recipe(recipe::RecipeCommand),
-    /// Fit a recipe to labelled pictures of the real place, or to its photos of the place alone
+    /// Fit a recipe to labelled images of the real place, or only to its photos of the place
     Fit(fit::FitArgs),
-    /// Make a dataset; the same command goes on where an interrupted one stopped
+    /// Generate a dataset; rerun the same command to resume an interrupted run
     Generate(generate::GenerateArgs),
-    /// Make the paper's datasets: all variation, one source of it switched off in each, all off;
-    /// scenes are in pairs
+    /// Generate the paper's ablation datasets: all variation, one source switched off in each, all
+    /// off; their scenes are paired
     Ablate(ablate::AblateArgs),
-    /// Join the shards that several machines made
+    /// Merge shards generated on several machines
     Merge(merge::MergeArgs),
     #[command(flatten)]
     Select(select::SelectCommand),

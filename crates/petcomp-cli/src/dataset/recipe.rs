@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub(crate) enum RecipeCommand {
-    /// Write a recipe file that explains every default
+    /// Write a recipe file that explains every setting and its default
     Init(InitRecipeArgs),
-    /// Print every draw that image K is made with
+    /// Print every random draw of image K
     Explain(ExplainArgs),
 }
 
@@ -28,7 +28,7 @@ pub(crate) struct InitRecipeArgs {
 pub(crate) struct ExplainArgs {
     #[command(flatten)]
     recipe: RecipeArgs,
-    /// Number of the image
+    /// Index of the image
     #[arg(short = 'k', long, value_name = "K")]
     index: u64,
     /// Seed of the dataset

@@ -10,32 +10,32 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub(crate) enum SelectCommand {
-    /// Share images out again for training and validation, and report what leaks
+    /// Split images anew into training and validation, and report leakage
     Split(SplitArgs),
-    /// The first part of the images for training and of those for validation
+    /// Keep the first part of the training images and of the validation images
     Subset(SubsetArgs),
 }
 
 #[derive(clap::Args)]
 pub(crate) struct SplitArgs {
-    /// Folder with a data.yaml; one that is not split yet names the same images for both parts
+    /// Folder with a data.yaml; if not yet split, it names the same images for both parts
     folder: PathBuf,
     /// Share of the images for training
     #[arg(long, value_name = "SHARE", default_value_t = 0.8)]
     ratio: f64,
-    /// How: `consecutive` (the last ones for validation), `grouped` or `random`
+    /// Method: `consecutive` (the last images for validation), `grouped` or `random`
     #[arg(long, value_name = "HOW", default_value = "consecutive")]
     by: SplitMethod,
-    /// What stays together in a grouped split: `background` or `selection` [default: background]
+    /// What a grouped split keeps together: `background` or `selection` [default: background]
     #[arg(long, value_name = "GROUP")]
     group: Option<Group>,
-    /// Images between the two parts of a consecutive split that belong to neither [default: 0]
+    /// Images left out between the two parts of a consecutive split [default: 0]
     #[arg(long, value_name = "N")]
     guard: Option<usize>,
     /// Seed of a grouped or random split
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Folder to write train.txt, val.txt and data.yaml into
+    /// Folder for train.txt, val.txt and data.yaml
     #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
 }
@@ -51,10 +51,10 @@ enum SplitMethod {
 pub(crate) struct SubsetArgs {
     /// Folder with a data.yaml: a dataset or a split of one
     folder: PathBuf,
-    /// Share of each part that is kept, from the beginning, rounded down
+    /// Share of each part to keep, from the beginning, rounded down
     #[arg(long, value_name = "SHARE")]
     head: f64,
-    /// Folder to write train.txt, val.txt and data.yaml into
+    /// Folder for train.txt, val.txt and data.yaml
     #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
 }

@@ -16,8 +16,8 @@ const ESTIMATE_INTERVAL: Duration = Duration::from_millis(500);
 /// Whether a job may take very long.
 #[derive(clap::Args)]
 pub(crate) struct LongRunConsent {
-    /// Go on with a job that would take more than an hour; without, it stops with an estimate
-    /// after its first pictures
+    /// Continue a job that would take more than an hour; without this, it stops with an estimate
+    /// after its first images
     #[arg(long)]
     yes: bool,
 }

@@ -14,11 +14,11 @@ use std::path::PathBuf;
 pub(crate) struct CutArgs {
     /// Photo of one object on a uniform screen or board
     photo: PathBuf,
-    /// Cut-out to write: .exr (scene-linear, premultiplied) or .png; an .exr of an .exr photo keeps
-    /// its place in the photo, unless it is reduced to the option `longest_side`
+    /// Cut-out to write: .exr (scene-linear, premultiplied) or .png; an .exr from an .exr photo
+    /// keeps its position in the photo, unless it is scaled down to the option `longest_side`
     #[arg(short, long, value_name = "PICTURE")]
     output: PathBuf,
-    /// Options to use instead of the defaults, as TOML
+    /// TOML file with options that override the defaults
     #[arg(long, value_name = "FILE")]
     options: Option<PathBuf>,
 }

@@ -15,24 +15,24 @@ use std::path::{Path, PathBuf};
 /// What both commands read and write.
 #[derive(clap::Args)]
 pub(crate) struct FilmOptionArgs {
-    /// Film to write, an EXR: R G B A as seen alone, TR TG TB as measured, VR VG VB along the line
-    /// of sight
+    /// Film to write, an EXR: R G B A (the object alone), transmittance TR TG TB (as measured) and
+    /// VR VG VB (along the line of sight)
     #[arg(short, long, value_name = "EXR")]
     output: PathBuf,
-    /// Photo of the empty screen, one for each photo; without, the screen is fitted around the
+    /// Photo of the empty screen, one for each photo; by default the screen is fitted around the
     /// object
     #[arg(long = "plate", value_name = "PHOTO")]
     plates: Vec<PathBuf>,
-    /// Coverage of the object in the (first) photo; without, it is searched for
+    /// Coverage of the object in the (first) photo; by default it is detected
     #[arg(long, value_name = "PICTURE")]
     mask: Option<PathBuf>,
-    /// Where the screen plate (of the first photo) goes
+    /// Screen plate (of the first photo) to write
     #[arg(long, value_name = "FILE")]
     plate_out: Option<PathBuf>,
-    /// Where the expected error of the transmittance goes
+    /// Image of the expected transmittance error to write
     #[arg(long, value_name = "FILE")]
     uncertainty: Option<PathBuf>,
-    /// An option, such as film.clipped=0.9
+    /// Option, such as film.clipped=0.9
     #[arg(long = "set", value_name = "film.NAME=VALUE")]
     settings: Vec<Override>,
 }
@@ -46,10 +46,10 @@ pub(crate) struct FilmArgs {
 }
 
 #[derive(clap::Args)]
-#[command(mut_arg("settings", |arg| arg.help("An option, such as film.max_sigma=0.1")))]
+#[command(mut_arg("settings", |arg| arg.help("Option, such as film.max_sigma=0.1")))]
 pub(crate) struct TriangulateArgs {
-    /// Photos of one object that stays where it is, each on another screen, with exposure and white
-    /// balance locked
+    /// Photos of one stationary object, each on a different screen, with exposure and white balance
+    /// locked
     #[arg(required = true, num_args = 2..)]
     photos: Vec<PathBuf>,
     #[command(flatten)]

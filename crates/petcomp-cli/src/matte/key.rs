@@ -24,42 +24,41 @@ const BYTES_PER_PIXEL: u64 = 100;
 #[derive(clap::Args, Debug)]
 #[command(group(ArgGroup::new("background").args(["screen", "plate"]).required(true)))]
 pub(crate) struct KeyArgs {
-    /// The picture to key, or the frames of a sequence; alpha is taken as premultiplied
+    /// Image to key, or the frames of a sequence; alpha is treated as premultiplied
     #[arg(required = true, value_name = "PICTURE")]
     frames: Vec<PathBuf>,
-    /// Where the cut-out goes: .exr for 32-bit floats, scene-linear, premultiplied; .png or .tif
-    /// for sRGB codes with straight alpha; or a folder that is there or ends in /, where it gets
-    /// the frame's name with the ending .exr, as for --matte and --edges: of several frames all
-    /// three are folders
+    /// Cut-out to write: .exr (32-bit floats, scene-linear, premultiplied); .png or .tif (sRGB
+    /// codes, straight alpha); or a folder (existing, or ending in /) for an .exr under the frame's
+    /// name. The same goes for folders of --matte and --edges; with several frames all three must
+    /// be folders
     #[arg(short, long, value_name = "FILE|FOLDER")]
     output: PathBuf,
-    /// Where the matte goes
+    /// Matte to write
     #[arg(long, value_name = "FILE")]
     matte: Option<PathBuf>,
-    /// Where the edges go that the levels leave alone
+    /// Edges to write, which the black and white levels leave unchanged
     #[arg(long, value_name = "FILE")]
     edges: Option<PathBuf>,
     /// Colour of the screen, scene-linear
     #[arg(long, value_name = "R,G,B", value_parser = parse_color)]
     screen: Option<LinearRgb>,
-    /// Or: a picture of the screen alone: every pixel is keyed against its own colour
+    /// Or: image of the empty screen; each pixel is keyed against its colour there
     #[arg(long, value_name = "FILE")]
     plate: Option<PathBuf>,
-    /// A matte of what is surely not foreground
+    /// Garbage matte: what is certainly not foreground
     #[arg(long, value_name = "FILE")]
     garbage: Option<PathBuf>,
-    /// A matte of what is surely foreground
+    /// Core matte: what is certainly foreground
     #[arg(long, value_name = "FILE")]
     core: Option<PathBuf>,
-    /// Find the object first: what lies around it is garbage, and what surely lets nothing through
-    /// is core
+    /// Find the object first: everything around it is garbage, and what is certainly opaque is core
     #[arg(long, conflicts_with_all = ["garbage", "core"])]
     auto_mattes: bool,
-    /// Which keyer to be: blender-3.4, blender-4.2, blender-4.5 or robust; by default that of --set
+    /// Keyer to use: blender-3.4, blender-4.2, blender-4.5 or robust; by default that of --set
     /// key.profile, or blender-3.4
     #[arg(long, value_name = "NAME")]
     profile: Option<Profile>,
-    /// A setting under Blender's name, such as key.clip_black=0.1
+    /// Setting by its Blender name, such as key.clip_black=0.1
     #[arg(long = "set", value_name = "key.NAME=VALUE")]
     settings: Vec<Override>,
 }

@@ -11,17 +11,17 @@ use crate::global::GlobalArgs;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum MatteCommand {
-    /// Find the object and write every intermediate picture, and the garbage and core matte that a
-    /// keyer takes
+    /// Find the object; write every intermediate image, and a garbage and a core matte for a keyer
     Segment(segment::SegmentArgs),
-    /// Find the object, key it, and write it without its background
+    /// Find and key the object, and write it without its background
     Cut(cut::CutArgs),
-    /// Key a picture, or the frames of a sequence, against a screen colour or plate, as Blender's
-    /// Keying node does
+    /// Key an image or the frames of a sequence against a screen colour or plate, like Blender's
+    /// Keying node
     Key(Box<key::KeyArgs>),
-    /// Solve one photo on a coloured screen for what it reflects and what it lets through
+    /// Solve for an object's reflected light and transmittance from one photo on a coloured screen
     Film(film::FilmArgs),
-    /// The same, exactly, from two or more photos of one object on different screens
+    /// Solve exactly for reflected light and transmittance, from two or more photos on different
+    /// screens
     Triangulate(film::TriangulateArgs),
     #[command(flatten)]
     Node(nodes::NodeCommand),

@@ -16,12 +16,12 @@ use std::path::{Path, PathBuf};
 /// A picture in, a picture out, settings in between.
 #[derive(clap::Args, Debug)]
 pub(crate) struct NodePicture {
-    /// The picture to key; alpha is taken as premultiplied
+    /// Image to key; alpha is treated as premultiplied
     input: PathBuf,
-    /// Where the premultiplied result goes; an EXR holds 32-bit floats
+    /// Premultiplied result to write; an EXR holds 32-bit floats
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// A setting under Blender's name, such as key.profile=blender-4.5
+    /// Setting by its Blender name, such as key.profile=blender-4.5
     #[arg(long = "set", value_name = "key.NAME=VALUE")]
     settings: Vec<Override>,
 }
@@ -31,7 +31,7 @@ pub(crate) struct NodePicture {
 pub(crate) struct KeyerPictures {
     #[command(flatten)]
     picture: NodePicture,
-    /// Where the matte goes
+    /// Matte to write
     #[arg(long, value_name = "FILE")]
     matte: Option<PathBuf>,
 }
@@ -48,32 +48,33 @@ pub(crate) enum NodeCommand {
     },
     /// Key by one channel against the others
     ChannelKey(KeyerPictures),
-    /// Key by the difference from a picture without the subject
+    /// Key by the difference from a clean plate
     DifferenceKey {
         #[command(flatten)]
         pictures: KeyerPictures,
-        /// The picture without the subject
+        /// Clean plate: the image without the subject
         #[arg(long, value_name = "FILE")]
         clean: PathBuf,
     },
-    /// Take the screen's light from the subject
+    /// Remove the screen's spill from the subject
     ColorSpill(NodePicture),
-    /// Make a plate from points where the screen is seen, as Blender 4.5 does
+    /// Build a plate from points where the screen is visible, like Blender 4.5
     KeyingScreen(KeyingScreenArgs),
 }
 
 /// A plate from a few points.
 #[derive(clap::Args, Debug)]
 pub(crate) struct KeyingScreenArgs {
-    /// The picture whose size the plate gets
+    /// Image to sample; the plate gets its size
     input: PathBuf,
-    /// Where the plate goes
+    /// Plate to write
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Where the screen is seen, pixels from the top left; its colour is that of the picture there
+    /// Point where the screen is visible, pixels from the top left; its colour is that of the image
+    /// there
     #[arg(long = "point", value_name = "X,Y", value_parser = parse_pixel, required = true)]
     points: Vec<[usize; 2]>,
-    /// How far the colour of a point reaches, 0 to 1
+    /// Reach of a point's colour, 0 to 1
     #[arg(long, default_value_t = 0.0)]
     smoothness: f64,
 }

@@ -12,10 +12,10 @@ use std::path::{Path, PathBuf};
 pub(crate) struct SegmentArgs {
     /// Photo of one object on a uniform screen or board
     photo: PathBuf,
-    /// Folder for the pictures
+    /// Folder for the images
     #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
-    /// Options to use instead of the defaults, as TOML
+    /// TOML file with options that override the defaults
     #[arg(long, value_name = "FILE")]
     options: Option<PathBuf>,
 }

@@ -7,16 +7,16 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder with photos and their truth, as the sample world has them
+    /// Folder of photos with ground truth, laid out like the sample world
     #[arg(long, value_name = "FOLDER", required_unless_present = "display")]
     truth: Option<PathBuf>,
-    /// Folder with bottles on a display and over new backgrounds, as golden/capture
+    /// Folder of bottles on a display and over new backgrounds, laid out like golden/capture
     #[arg(long, value_name = "FOLDER")]
     display: Option<PathBuf>,
-    /// With --display: write a strip for a bottle over a background, as "soft/b02 text"
+    /// With --display: write a strip of a bottle over a background, such as "soft/b02 text"
     #[arg(long, value_name = "BOTTLE BACKGROUND", requires = "display")]
     strip: Vec<String>,
-    /// Folder to write
+    /// Folder to write into
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     output: PathBuf,
 }

@@ -18,40 +18,41 @@ use std::path::PathBuf;
 /// What a report of photos with known mattes needs.
 #[derive(clap::Args)]
 pub(crate) struct TruthArgs {
-    /// Folder with photos and their truth, as the sample world has them
+    /// Folder of photos with ground truth, laid out like the sample world
     #[arg(long, value_name = "FOLDER")]
     truth: PathBuf,
-    /// Folder to write
+    /// Folder to write into
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     output: PathBuf,
 }
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
-    /// Everything that is measured on one page, in about three minutes: report.html, report.md and
-    /// the data as CSV
+    /// Measure everything on one page, in about three minutes: report.html, report.md and the data
+    /// as CSV
     All(AllOptions),
-    /// Error of the camera solver against run time and against tilt: camera.csv, camera.md and
+    /// Measure the error of the camera solver against run time and tilt: camera.csv, camera.md and
     /// plots (SVG)
     Camera(camera::Args),
-    /// Error of the settle stage against run time: settle.csv, settle.md and a plot (SVG)
+    /// Measure the error of the settle stage against run time: settle.csv, settle.md and a plot
+    /// (SVG)
     Settle(settle::Args),
-    /// Every stage on stiff and extreme input: stability.csv and stability.md
+    /// Test every stage on stiff and extreme input: stability.csv and stability.md
     Stability(stability::Args),
-    /// Error of the matting methods against run time, on photos with known mattes: matte.csv,
-    /// matte.md, matte.svg, matte.html; and of captures over new backgrounds: display.csv,
-    /// display.md
+    /// Measure the error of the matting methods against run time on photos with known mattes
+    /// (matte.csv, matte.md, matte.svg, matte.html), and of captures over new backgrounds
+    /// (display.csv, display.md)
     Matte(matte::Args),
-    /// Whether wrong cut-outs are flagged, on photos with known outlines made harder in many ways:
-    /// flags.csv, flags.md
+    /// Measure whether wrong cut-outs are flagged, on photos with known outlines degraded in many
+    /// ways: flags.csv, flags.md
     Flags(TruthArgs),
-    /// Error of the renderer against run time, beside Cycles: render.csv, render.md, a plot and the
-    /// golden scenes
+    /// Measure the error of the renderer against run time, compared with Cycles: render.csv,
+    /// render.md, a plot and the golden scenes
     Render(RenderReportOptions),
-    /// What scenes pay for, counted: work.csv and work.md
+    /// Count the work that each feature of a scene costs: work.csv and work.md
     Work(work::Args),
-    /// Memory and rate by threads, pixels and cards, and a million pictures: scale.csv, scale.md
-    /// and charts (SVG)
+    /// Measure memory and throughput by threads, pixels and cards, and for a million images:
+    /// scale.csv, scale.md and charts (SVG)
     Scale(scale::Args),
 }
 

@@ -7,10 +7,10 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder to write
+    /// Folder to write into
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     output: PathBuf,
-    /// Heaps for each setting of the solver, 1 to 10000
+    /// Heaps per solver setting, 1 to 10000
     #[arg(
         long,
         value_name = "N",
@@ -18,8 +18,8 @@ pub(crate) struct Args {
         value_parser = clap::value_parser!(u64).range(1..=10_000)
     )]
     heaps: u64,
-    /// Instead, settle heaps for a comparison with another program: writes their scenes, ends and
-    /// times as JSON
+    /// Settle heaps for a comparison with another program instead, and write their scenes, final
+    /// states and times as JSON
     #[arg(long, value_name = "FILE")]
     peers: Option<PathBuf>,
 }

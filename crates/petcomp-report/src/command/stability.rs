@@ -6,10 +6,10 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder to write
+    /// Folder to write into
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     output: PathBuf,
-    /// Only this stage; all of them otherwise
+    /// Stage to test; by default all
     #[arg(
         long,
         value_name = "NAME",

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder to write
+    /// Folder to write into
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     output: PathBuf,
 }
