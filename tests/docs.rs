@@ -27,10 +27,10 @@ fn diagnostics() -> String {
         .collect();
     format!(
         "# Diagnostics\n\n\
-         What a stage noticed that a person should know has a code, a severity and a message. Codes are stable, messages are not.\n\
-         Severities are `note` (good to know; `dataset check --strict` fails), `warning` (the result may be wrong: look at it;\n\
-         `asset check --strict` fails) and `error` (it cannot be used). They stand on the standard error, in `assets.toml`, in\n\
-         `NAME.camera.json` and in the output of the `check` commands.\n\n\
+         Every diagnostic has a code, a severity and a message. Codes are stable; messages may change. The severities are `note`\n\
+         (for information; `dataset check --strict` fails), `warning` (the result may be wrong, so review it;\n\
+         `asset check --strict` fails) and `error` (the result cannot be used). Diagnostics appear on standard error, in\n\
+         `assets.toml`, in `NAME.camera.json` and in the output of the `check` commands.\n\n\
          | code | meaning |\n| --- | --- |\n{rows}"
     )
 }
