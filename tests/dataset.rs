@@ -2169,7 +2169,7 @@ fn what_changes_after_a_dataset_was_planned_is_told() {
         pipeline.plan(1, 1, dir.path().join("out")).unwrap();
         write_other(&dir.path().join(name)).unwrap();
         let told = pipeline.sample(1, 0).unwrap_err().to_string();
-        let what = format!("{name}: has other bytes than when its folder was opened");
+        let what = format!("{name}: has changed since its folder was opened");
         assert!(told.ends_with(&what), "{told}");
     }
 }

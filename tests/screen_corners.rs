@@ -129,13 +129,13 @@ fn what_shows_no_whole_screen_is_told() {
         told(&boxed)
     );
     let grey = Image::filled(90, 60, LinearRgb::grey(0.5));
-    assert!(told(&grey).contains("no tenth of the photo has one colour"));
+    assert!(told(&grey).contains("no colour such as green or blue covers a tenth"));
     let disc = Image::from_fn(200, 200, |x, y| {
         let inside = (x as f64 - 100.0).hypot(y as f64 - 100.0) < 80.0;
         if inside { GREEN } else { LinearRgb::grey(0.2) }
     });
     assert!(
-        told(&disc).contains("a side of it shows no straight border"),
+        told(&disc).contains("one of its sides has no straight border"),
         "{}",
         told(&disc)
     );

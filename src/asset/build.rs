@@ -158,7 +158,7 @@ fn not_begun() -> Error {
 
 fn interrupted(outcomes: &[Result<PhotoRecord>]) -> Error {
     let (done, count) = (outcomes.iter().flatten().count(), outcomes.len());
-    let what = format!("{MANIFEST} has {done} of {count} photos; resume goes on with the others");
+    let what = format!("{MANIFEST} has {done} of {count} photos; resume processes the others");
     Error::Interrupted { what }
 }
 
@@ -605,7 +605,7 @@ mod tests {
             let both = ["a/one.exr", "a/two.exr"];
             assert_eq!(cut_outs(&Library::open(&out).unwrap()), both, "{name}");
         };
-        let stays = "; the earlier cut-out a/two.exr stays";
+        let stays = "; the earlier cut-out a/two.exr is kept";
         std::fs::write(&list, TWO.replace("= 100.0", "= 2.0")).unwrap();
         let refused = build(&list, &out, &|_, _| ()).unwrap().refused;
         assert!(refused[0].ends_with(stays), "{refused:?}");
@@ -680,7 +680,8 @@ mod tests {
                 .contains("photos[0].class: \"cap\", expected one of cup")
         );
         assert!(
-            printed(&declared("[\"cap\", \"cap\"]")).contains("classes[1]: \"cap\" is there twice")
+            printed(&declared("[\"cap\", \"cap\"]"))
+                .contains("classes[1]: \"cap\" is listed twice")
         );
         assert!(printed(&TWO.replace("length = 0.3", "")).contains(
             "photos[0].length: missing, expected length, px_per_metre, screen_size, marker_size or captured"
@@ -749,7 +750,7 @@ mod tests {
             classes("met")
                 .unwrap_err()
                 .to_string()
-                .contains("expected to begin with those that the folder has")
+                .contains("expected those of the folder first")
         );
     }
 
@@ -766,7 +767,7 @@ mod tests {
         assert_eq!(built(one).unwrap().unlisted, ["a/two.exr"]);
         let told = built(&one.replace("cap", "cup")).unwrap_err().to_string();
         let expected = "photos[0].class: \"cup\", but asset \"a\" is \"cap\" in assets.toml; \
-                        delete the folder to build it anew";
+                        delete the folder to rebuild it";
         assert!(told.ends_with(expected), "{told}");
     }
 
@@ -807,7 +808,7 @@ mod tests {
         let [told] = &built.refused[..] else {
             panic!("one photo is refused")
         };
-        let expected = "no cut-out: px_per_metre: 2, makes what is in two.png 30";
+        let expected = "no cut-out: px_per_metre: 2, makes the object in two.png 30";
         assert!(told.starts_with(expected), "{told}");
         assert!(told.ends_with("; is it pixels for a centimetre?"), "{told}");
     }
@@ -935,10 +936,10 @@ mod tests {
         let unknown = refused("length = 0.3\nmatte = \"opaque\"");
         assert!(unknown.contains("outline"), "{unknown}");
         let captured = refused("captured = { photos = [] }\nmatte = \"outline\"");
-        let expected = "photos[0].matte: \"outline\" beside captured, whose matte is measured";
+        let expected = "photos[0].matte: \"outline\" with captured, whose matte is measured";
         assert!(captured.contains(expected), "{captured}");
         let screen = refused("captured = { photos = [] }\nscreen = \"two.png\"");
-        let expected = "two.png\" beside captured, whose empty display goes to captured.empty";
+        let expected = "two.png\" with captured, whose empty display belongs in captured.empty";
         assert!(
             screen.contains("photos[0].screen: ") && screen.contains(expected),
             "{screen}"
@@ -1061,7 +1062,7 @@ mod tests {
         io::write(&file, &Image::filled(w, h, Film::default())).unwrap();
         let told = Library::open(&out).unwrap_err().to_string();
         let expected =
-            "one.exr: not the file that assets.toml tells of: build or add its photo again";
+            "one.exr: not the file recorded in assets.toml: build or add its photo again";
         assert!(told.ends_with(expected), "{told}");
         // An older manifest has no checksums.
         let text = io::read_text(out.join(MANIFEST)).unwrap();
@@ -1084,7 +1085,7 @@ mod tests {
             .unwrap()
             .install(|| super::build(&list, &out, &after_one, &stop));
         let told = stopped.unwrap_err().to_string();
-        let expected = "assets.toml has 1 of 2 photos; resume goes on with the others";
+        let expected = "assets.toml has 1 of 2 photos; resume processes the others";
         assert!(told.contains(expected), "{told}");
         let is_there = |file: &str| out.join(file).exists();
         assert!(is_there("a/one.exr") && !is_there("a/two.exr"));

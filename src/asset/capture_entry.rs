@@ -45,7 +45,7 @@ impl CaptureEntry {
     /// [`Error::Value`] for a capture without a second photo, or a width that no display has.
     pub(super) fn check(&self) -> Result<()> {
         if self.photos.is_empty() {
-            let what = "no second photo, expected one of a black and one of a white frame at least";
+            let what = "no second photo, expected at least one of a black and one of a white frame";
             return Err(Error::value("captured.photos", what));
         }
         self.width
@@ -86,7 +86,7 @@ impl CaptureEntry {
         display.check().map_err(|e| e.in_file(&path))?;
         let width = self.width.or(display.width).ok_or_else(|| {
             let what = format!(
-                "missing, expected the width of the whole picture on the display by a ruler, metres: here, as \
+                "missing, expected the measured width of the whole picture on the display, metres: here, as \
                  --display-width, or in {}",
                 path.display()
             );

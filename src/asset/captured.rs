@@ -347,7 +347,7 @@ fn confidence(sigma: f64) -> f64 {
 
 fn pose_warning(pose: &ScreenPose) -> Option<Diagnostic> {
     pose.is_poor_fit.then(|| {
-        let what = "the markers hardly look like those of the display; was the picture stretched?";
+        let what = "the markers fit those of the display poorly; was the picture stretched?";
         Diagnostic::warning(Code::ScreenSizeMismatch, what)
     })
 }
@@ -356,8 +356,8 @@ fn pose_warning(pose: &ScreenPose) -> Option<Diagnostic> {
 fn thickness_warning(entry: &PhotoEntry) -> Option<Diagnostic> {
     entry.thickness.is_none().then(|| {
         let what = format!(
-            "thickness: not given, {DEFAULT_THICKNESS} m is assumed, and size and refraction hold at half of it; \
-             give `thickness` (--thickness), how thick the object is as it lies, metres"
+            "thickness: missing, {DEFAULT_THICKNESS} m is assumed, and size and refraction apply at half of it; \
+             give `thickness` (--thickness) of the object as it lies, metres"
         );
         Diagnostic::warning(Code::ThicknessUnknown, what)
     })

@@ -11,8 +11,8 @@ const MIN_SOLIDITY: f64 = 0.75;
 pub(super) fn concave_warning(outline: &Outline) -> Option<Diagnostic> {
     let solidity = outline.solidity();
     let message = format!(
-        "fills {:.0} % of its convex hull, which labels take for its outline; what lies in its gaps counts as over or \
-         under it; `labels.outline = \"mask\"` in the recipe takes the border of its mask",
+        "fills {:.0} % of its convex hull, which labels use as its outline; what lies in its gaps counts as over or \
+         under it; `labels.outline = \"mask\"` in the recipe uses the border of its mask",
         100.0 * solidity
     );
     (solidity < MIN_SOLIDITY).then(|| Diagnostic::warning(Code::Concave, message))
@@ -46,7 +46,7 @@ mod tests {
             "{}",
             warning.message
         );
-        let advice = "`labels.outline = \"mask\"` in the recipe takes the border of its mask";
+        let advice = "`labels.outline = \"mask\"` in the recipe uses the border of its mask";
         assert!(warning.message.ends_with(advice), "{}", warning.message);
     }
 }

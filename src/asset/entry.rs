@@ -130,7 +130,7 @@ impl PhotoEntry {
             [] => Err(Error::value("length", format!("missing, expected {names}"))),
             _ => Err(Error::value(
                 "length",
-                format!("one of several scales, expected one of {names}"),
+                format!("one of several scales, expected only one of {names}"),
             )),
         }
     }
@@ -192,14 +192,14 @@ impl PhotoEntry {
         };
         if self.screen != ScreenSource::Auto {
             let what = format!(
-                "\"{}\" beside captured, whose empty display goes to captured.empty",
+                "\"{}\" with captured, whose empty display belongs in captured.empty",
                 self.screen
             );
             return Err(Error::value("screen", what));
         }
         match self.matte {
             Some(matte) => {
-                let what = format!("\"{matte}\" beside captured, whose matte is measured");
+                let what = format!("\"{matte}\" with captured, whose matte is measured");
                 Err(Error::value("matte", what))
             }
             None => captured.check(),
@@ -286,7 +286,7 @@ fn require_beside<T>(given: &str, name: &str, value: &Option<T>) -> Result<()> {
         Some(_) => Ok(()),
         None => Err(Error::value(
             name,
-            format!("missing, expected it beside {given}"),
+            format!("missing, required with {given}"),
         )),
     }
 }
@@ -338,9 +338,6 @@ mod tests {
                 .contains("expected one of length")
         );
         let alone = scale(&format!("length = 0.2\nscreen_corners = {corners:?}")).unwrap_err();
-        assert_eq!(
-            alone,
-            "screen_size: missing, expected it beside screen_corners"
-        );
+        assert_eq!(alone, "screen_size: missing, required with screen_corners");
     }
 }

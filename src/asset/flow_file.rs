@@ -107,7 +107,7 @@ fn plane(
     if channel.samples.iter().all(|v| v.is_finite()) {
         return Ok(Image::from_vec(w, h, channel.samples.clone()));
     }
-    Err(format!("a value of channel {name} is no finite number"))
+    Err(format!("a value of channel {name} is not a finite number"))
 }
 
 #[cfg(test)]
@@ -184,7 +184,7 @@ mod tests {
             ("known", &[1.0, 1.0]),
         ]);
         assert!(
-            infinite.ends_with("a value of channel Y is no finite number"),
+            infinite.ends_with("a value of channel Y is not a finite number"),
             "{infinite}"
         );
     }

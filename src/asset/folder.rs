@@ -111,7 +111,7 @@ pub(super) fn refusal(error: Error, entry: &PhotoEntry, manifest: &Manifest) -> 
     let file = entry.cut_out_file();
     match error {
         Error::Photo { what } if manifest.has(&file) => Error::Photo {
-            what: format!("{what}; the earlier cut-out {file} stays"),
+            what: format!("{what}; the earlier cut-out {file} is kept"),
         },
         other => other,
     }
@@ -236,7 +236,7 @@ fn check_unpainted(review: &Review, photo: &Path) -> Result<()> {
     if review.strokes.is_empty() {
         return Ok(());
     }
-    let what = "painted on a capture, whose film is measured; expected a verdict alone";
+    let what = "painted on a capture, whose film is measured, expected only a verdict";
     Err(Error::value("strokes", what).in_file(Review::path_of(photo)))
 }
 

@@ -85,7 +85,7 @@ impl Library {
         let kept = most_bytes() as f64;
         if needed > kept {
             log::warn!(
-                "cut-outs take up to {:.1} GB in memory, {:.1} GB of them are kept and others read again and again: \
+                "cut-outs take up to {:.1} GB of memory; {:.1} GB of them are kept, the others are read anew each time: \
                  a smaller longest_side in [cut_out] of their list makes this faster",
                 needed / 1e9,
                 kept / 1e9
@@ -175,7 +175,7 @@ fn check_crc32(found: u32, record: &PhotoRecord) -> std::result::Result<(), Stri
         return Ok(());
     }
     let advice = "build or add its photo again";
-    Err(format!("not the file that {MANIFEST} tells of: {advice}"))
+    Err(format!("not the file recorded in {MANIFEST}: {advice}"))
 }
 
 fn check_size((w, h): (usize, usize), record: &PhotoRecord) -> Result<()> {
@@ -329,7 +329,7 @@ mod tests {
         let after = kept.assets[0].photos[0].pixels().unwrap();
         assert_eq!(after.texture.checksum(), before.texture.checksum());
         let refused = changed.assets[0].photos[0].pixels().unwrap_err();
-        let expected = "a.exr: has other bytes than when its folder was opened";
+        let expected = "a.exr: has changed since its folder was opened";
         assert!(refused.to_string().ends_with(expected), "{refused}");
         assert!(changed.check_pixels().is_err() && kept.check_pixels().is_err());
     }

@@ -172,7 +172,7 @@ pub fn check_cut_out_files(photos: &[PhotoEntry]) -> Result<()> {
     for (i, photo) in photos.iter().enumerate() {
         if let Some(first) = seen.insert(photo.cut_out_file(), i) {
             let what = format!(
-                "\"{}\", would become the same cut-out as photos[{first}]",
+                "\"{}\", would give the same cut-out file as photos[{first}]",
                 photo.file.display()
             );
             return Err(Error::value(format!("photos[{i}].file"), what));
@@ -208,7 +208,7 @@ pub(super) fn check_reviews(photos: &[PhotoEntry]) -> Result<()> {
         let first = *seen.entry(review.clone()).or_insert(&photo.file);
         if *first != photo.file && review.exists() {
             let what = format!(
-                "\"{}\", has the same review {} as \"{}\"; rename one of these photos, and the review of that one",
+                "\"{}\", has the same review {} as \"{}\"; rename one of these photos and its review",
                 photo.file.display(),
                 review.display(),
                 first.display()
@@ -238,8 +238,8 @@ pub(super) fn find_list(path: &Path) -> Result<PathBuf> {
     let lists = LIST_NAMES.iter().map(|name| path.join(name));
     let what = match &lists.filter(|list| list.exists()).collect::<Vec<_>>()[..] {
         [list] => return Ok(list.clone()),
-        [] => "expected photos.toml or photos.csv in it, a list of the photos",
-        _ => "has photos.toml and photos.csv, expected one of them, or the list's own name",
+        [] => "no list of photos, expected photos.toml or photos.csv in it",
+        _ => "photos.toml and photos.csv, expected only one of them, or the path of the list",
     };
     Err(Error::file(path, what))
 }

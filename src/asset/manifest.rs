@@ -169,7 +169,7 @@ fn coded_or_plain<'de, D: Deserializer<'de>>(
 #[derive(Deserialize)]
 #[serde(
     untagged,
-    expecting = "a table of code, severity and message, or a text"
+    expecting = "a table of code, severity and message, or a string"
 )]
 enum CodedOrPlain {
     Coded(Diagnostic),
@@ -398,7 +398,7 @@ impl Asset<PhotoRecord> {
         let mut others = self.photos.iter();
         if let Some(old) = others.find(|old| old.is_of_another_photo(&photo)) {
             log::warn!(
-                "{}: replaces the cut-out of another photo, or of {} as it was; another object needs \
+                "{}: replaces the cut-out of another photo, or of an earlier version of {}; give another object \
                  another asset name",
                 old.file,
                 old.source
@@ -436,11 +436,11 @@ impl Asset<PhotoRecord> {
 }
 
 fn unexpected_order(declared: &str, known: &str) -> String {
-    format!("{declared}; expected to begin with those that the folder has: {known}; {ANEW}")
+    format!("{declared}; expected those of the folder first: {known}; {ANEW}")
 }
 
 /// What to do where a folder has what is no longer meant.
-const ANEW: &str = "delete the folder to build it anew";
+const ANEW: &str = "delete the folder to rebuild it";
 
 /// Checks every item of a list; errors name its place: `photos[2]`.
 pub(super) fn check_each<T>(
@@ -615,7 +615,8 @@ pub(super) fn check_class(name: &str) -> Result<()> {
         return Ok(());
     }
     let start = printable_start(name);
-    let what = format!("\"{start}\", expected a name on one line without spaces around it");
+    let what =
+        format!("\"{start}\", expected a name on one line without leading or trailing spaces");
     Err(Error::value("class", what))
 }
 
@@ -636,7 +637,7 @@ fn check_unique<'a>(at: &str, names: impl Iterator<Item = &'a str>) -> Result<()
     let mut seen = BTreeSet::new();
     for (i, name) in names.enumerate() {
         if !seen.insert(name) {
-            let what = format!("\"{name}\" is there twice");
+            let what = format!("\"{name}\" is listed twice");
             return Err(Error::value(format!("{at}[{i}]"), what));
         }
     }
@@ -783,18 +784,18 @@ pub(super) mod tests {
         let reported = learned(&["bag"], &["can", "bag"], &[]).unwrap_err();
         assert_eq!(
             reported,
-            "classes: can, bag; expected to begin with those that the folder has: bag; \
-             delete the folder to build it anew"
+            "classes: can, bag; expected those of the folder first: bag; \
+             delete the folder to rebuild it"
         );
         assert!(
-            learned(&[], &["can", " cup"], &[])
-                .unwrap_err()
-                .contains("\" cup\", expected a name on one line without spaces around it")
+            learned(&[], &["can", " cup"], &[]).unwrap_err().contains(
+                "\" cup\", expected a name on one line without leading or trailing spaces"
+            )
         );
         assert!(
             learned(&[], &["can", "can"], &[])
                 .unwrap_err()
-                .contains("is there twice")
+                .contains("is listed twice")
         );
     }
 
@@ -870,7 +871,7 @@ pub(super) mod tests {
         );
         assert_eq!(
             message(|m| m.assets[1].name = "b".into()),
-            "assets[1]: \"b\" is there twice"
+            "assets[1]: \"b\" is listed twice"
         );
         let printed = message(|m| m.assets[0].photos[0].px_per_metre = f64::NAN);
         assert_eq!(
@@ -960,6 +961,6 @@ pub(super) mod tests {
         assert!(read.needs_review() && read.diagnostics.iter().all(|d| d.code == Code::Uncoded));
         let wrong = earlier.replace("\"two objects\"", "7");
         let error = toml::from_str::<PhotoRecord>(&wrong).unwrap_err();
-        assert!(error.to_string().contains("or a text"), "{error}");
+        assert!(error.to_string().contains("or a string"), "{error}");
     }
 }

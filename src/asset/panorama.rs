@@ -117,7 +117,7 @@ pub(crate) fn warn_of_bits(path: &Path) -> Result<()> {
     if header.bits == 8 && header.format != Format::Hdr {
         let path = path.display();
         log::warn!(
-            "{path}: 8 bits, whose values end at 1: lamps and the sun are too weak; expected HDR or EXR"
+            "{path}: 8 bits, clipped at 1: lamps and the sun are too weak; expected HDR or EXR"
         );
     }
     Ok(())

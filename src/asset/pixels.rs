@@ -180,7 +180,7 @@ pub(crate) fn check_unchanged(found: u32, expected: u32) -> std::result::Result<
     if found == expected {
         return Ok(());
     }
-    Err("has other bytes than when its folder was opened".into())
+    Err("has changed since its folder was opened".into())
 }
 
 /// What is wrong with the first pixel that no picture has.

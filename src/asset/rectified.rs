@@ -145,9 +145,7 @@ fn clicked_corners(corners_px: [[f64; 2]; 4]) -> ScreenCorners {
 }
 
 fn poor_fit_warning([w, h]: [f64; 2]) -> Diagnostic {
-    let message = format!(
-        "the screen hardly looks like one of {w:.3} x {h:.3} m; are width and height right?"
-    );
+    let message = format!("the screen fits {w:.3} x {h:.3} m poorly; are width and height right?");
     Diagnostic::warning(Code::ScreenSizeMismatch, message)
 }
 
@@ -178,7 +176,7 @@ fn without_markers(mut photo: Image<LinearRgb>, papers: &[SeenSquare]) -> Result
         .map(|paper| Surround::new(paper, &photo, papers));
     let surrounds: Vec<_> = surrounds.collect();
     if !surrounds.iter().all(Surround::is_free) {
-        let what = "a marker lies too near the object or the edge of the screen; leave at least half its side free \
+        let what = "a marker is too close to the object or the edge of the screen; leave at least half its side free \
                     around it";
         return Err(Error::Photo { what: what.into() });
     }
@@ -496,8 +494,7 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(
-            reported
-                .contains("its corners are not those of 0.6 x 0.2 m; are width and height right?"),
+            reported.contains("its corners do not fit 0.6 x 0.2 m; are width and height right?"),
             "{reported}"
         );
     }
@@ -545,7 +542,7 @@ mod tests {
                 .unwrap_err()
                 .to_string();
             assert!(
-                reported.contains("a.png: a marker lies too near the object"),
+                reported.contains("a.png: a marker is too close to the object"),
                 "{reported}"
             );
         }

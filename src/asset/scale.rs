@@ -58,7 +58,7 @@ impl Scale {
         };
         let length = number((1e4 * length).round() / 1e4);
         let what = format!(
-            "{at}: {value}, makes what is in {source} {length} m long, expected {OBJECT}{question}"
+            "{at}: {value}, makes the object in {source} {length} m long, expected {OBJECT}{question}"
         );
         Err(Error::Photo { what })
     }

@@ -130,7 +130,7 @@ pub(super) fn scale_unknown(why: &str) -> Error {
 fn check_fit(solution: &Solution, [w, h]: [f64; 2]) -> Result<()> {
     match solution.fit.p_value {
         Some(p) if p < IMPOSSIBLE_P_VALUE => Err(scale_unknown(&format!(
-            "its corners are not those of {w} x {h} m; are width and height right?"
+            "its corners do not fit {w} x {h} m; are width and height right?"
         ))),
         _ => Ok(()),
     }

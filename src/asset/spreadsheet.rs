@@ -179,7 +179,7 @@ fn check_once(names: &[&str]) -> Result<()> {
         .filter(|(_, name)| !name.is_empty());
     match named.find(|(i, name)| names[..*i].contains(name)) {
         Some((_, name)) => {
-            let what = format!("column \"{name}\" is there twice");
+            let what = format!("column \"{name}\" appears twice");
             Err(Error::value("line 1", what))
         }
         None => Ok(()),
@@ -311,7 +311,7 @@ mod tests {
         );
         assert_eq!(
             reported("photo,length,file\n"),
-            "line 1: column \"file\" is there twice"
+            "line 1: column \"file\" appears twice"
         );
         assert_eq!(
             reported("file,\na,\nb,c\n"),

@@ -65,7 +65,7 @@ impl TopView {
     pub(super) fn rectify(&self, photo: Image<LinearRgb>) -> Result<Image<LinearRgb>> {
         let mut sides_px = self.size.iter().map(|side| side * self.px_per_metre);
         if sides_px.any(|side| side < MIN_SIDE_PX) {
-            return Err(scale_unknown("its corners leave nothing of the photo"));
+            return Err(scale_unknown("its corners leave too little of the photo"));
         }
         let camera = self.camera().resized(size_px(&photo));
         rectify(

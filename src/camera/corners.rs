@@ -79,7 +79,7 @@ fn clockwise(c: &[Point2<f64>; 4]) -> ([usize; 4], Option<Diagnostic>) {
     if areas.iter().all(|&a| a > 0.0) {
         ([0, 1, 2, 3], None)
     } else if areas.iter().all(|&a| a < 0.0) {
-        let what = "the corners run anticlockwise; the second and fourth were exchanged";
+        let what = "the corners run anticlockwise; the second and fourth were swapped";
         let reversed = Diagnostic::warning(Code::CornersReversed, what);
         ([0, 3, 2, 1], Some(reversed))
     } else {
@@ -148,7 +148,7 @@ fn far_outside(labelled: [Point2<f64>; 4], image: [u32; 2]) -> impl Iterator<Ite
     let far = (0..4).filter(move |&corner| is_far_outside(labelled[corner], image));
     far.map(|corner| {
         let name = corner_name(corner);
-        let what = format!("the {name} corner lies more than a diagonal outside the picture");
+        let what = format!("the {name} corner is more than a diagonal outside the picture");
         Diagnostic::warning(Code::CornerOutside, what)
     })
 }

@@ -69,9 +69,9 @@ fn focal_line(solution: &Solution) -> String {
 fn source_text(source: FocalSource) -> &'static str {
     match source {
         FocalSource::Measured => "measured in the picture",
-        FocalSource::Mixed => "partly from the picture, partly from what was known before",
+        FocalSource::Mixed => "partly from the picture, partly from prior knowledge",
         FocalSource::Prior => {
-            "only from what was known before: from so nearly straight above, the picture does not show it"
+            "only from prior knowledge: a picture from nearly straight above does not show it"
         }
         FocalSource::Fixed => "as given",
         FocalSource::Unbounded => "a bound, not a value: nothing constrains it",
@@ -83,17 +83,17 @@ fn framing_line(label: &Label, solution: &Solution, options: &SolveOptions) -> S
     let known = principal_text(solution);
     match solution.framing {
         Framing::Whole => {
-            format!("{known}: the picture is whole, or it is known of which part it is.")
+            format!("{known}: the picture is uncropped, or its crop is known.")
         }
         Framing::Cropped => {
-            format!("{known}, found with the rest: the picture is a part of a larger one.")
+            format!("{known}, solved with the rest: the picture was cropped.")
         }
         Framing::Unknown => {
             let gain = whole_picture_gain(label, solution, options);
             let place = place_for_more(label);
             format!(
-                "{known}: it is not known whether the picture is whole, since its EXIF size is missing or differs. If it \
-                 is, write \"cropped\": false under \"image\"{place}: the principal point is then its middle{gain}."
+                "{known}: it is not known whether the picture was cropped: its EXIF size is missing or differs. If it was \
+                 not, write \"cropped\": false under \"image\"{place}: the principal point is then its centre{gain}."
             )
         }
     }
@@ -127,8 +127,8 @@ fn surface_line(solution: &Solution) -> String {
     let [w, h] = solution.size;
     let scale = solution.fit.px_per_metre;
     format!(
-        "On the surface the rectangle of {w:.4} m x {h:.4} m fits its labelled {} to {:.2} px ({scale:.0} px per metre), \
-         whatever the focal length.",
+        "On the surface, the rectangle of {w:.4} m x {h:.4} m fits its labelled {} to {:.2} px ({scale:.0} px per metre), \
+         regardless of the focal length.",
         solution.fit.labelled(),
         solution.rms_px
     )
@@ -156,8 +156,8 @@ fn height_advice(label: &Label, solution: &Solution, options: &SolveOptions) -> 
     let place = place_for_more(label);
     (better < WORTHWHILE_FACTOR * solution.sigma.height_px).then(|| {
         format!(
-            "Measure the height of the lens above the surface (about {height:.2} m) to {:.0} mm and write it as \
-             camera.height_m{place}: that would bring {:.1} px down to {better:.1}. So would another photo or two of the \
+            "Measure the height of the lens above the surface (about {height:.2} m) to within {:.0} mm and write it as \
+             camera.height_m{place}: that would reduce the {:.1} px to {better:.1}. So would another photo or two of the \
              rectangle at 25 to 40 degrees with the same zoom and camera.id (camera joint).",
             1000.0 * TAPE_HEIGHT_SIGMA * height,
             solution.sigma.height_px
@@ -180,7 +180,7 @@ mod tests {
     fn from_above_the_advice_is_to_measure_the_height() {
         let text = say(0.5);
         assert!(
-            text.contains("the picture does not show it") && text.contains("Measure the height"),
+            text.contains("above does not show it") && text.contains("Measure the height"),
             "{text}"
         );
     }
@@ -199,8 +199,8 @@ mod tests {
                 && unknown.contains(" % instead of "),
             "{unknown}"
         );
-        assert!(say(Some(false)).contains("the picture is whole"));
-        assert!(say(Some(true)).contains("a part of a larger one"));
+        assert!(say(Some(false)).contains("the picture is uncropped"));
+        assert!(say(Some(true)).contains("the picture was cropped"));
     }
 
     #[test]
@@ -219,7 +219,7 @@ mod tests {
         let options = SolveOptions::default();
         let solution = solve(&label, &options).unwrap();
         let advice =
-            "under \"image\" in a label of petcomp's own (`petcomp camera init PHOTO --size";
+            "under \"image\" in petcomp's own label format (`petcomp camera init PHOTO --size";
         let text = doctor(&label, &solution, &options);
         assert!(text.contains(advice), "{text}");
         let mut warnings = solution.warnings.iter();
@@ -235,7 +235,7 @@ mod tests {
         let options = SolveOptions::default();
         let text = doctor(&label, &solve(&label, &options).unwrap(), &options);
         assert!(
-            text.starts_with("This camera cannot be used: ") && text.contains("exchange width_m"),
+            text.starts_with("This camera cannot be used: ") && text.contains("swap width_m"),
             "{text}"
         );
     }

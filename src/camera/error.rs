@@ -11,9 +11,7 @@ pub enum SolveError {
     #[error("{0}: not finite, expected a number")]
     NonFinite(&'static str),
     /// A number is too large, or too near to zero, to mean something.
-    #[error(
-        "{at}: {value:e}, expected no more than {most:e}, and no less than its inverse where it is positive"
-    )]
+    #[error("{at}: {value:e}, expected at most {most:e} and, if positive, at least 1/{most:e}")]
     OutOfRange {
         /// Which value.
         at: &'static str,
@@ -27,7 +25,7 @@ pub enum SolveError {
     BadImage([u32; 2]),
     /// A picture reaches beyond the one that it was cut out of.
     #[error(
-        "image.crop: {} x {} pixels at {}, {}, expected a part of the {} x {} of the whole picture",
+        "image.crop: {} x {} pixels at {}, {}, expected a part of the whole picture of {} x {}",
         .size[0], .size[1], .offset_px[0], .offset_px[1], .whole[0], .whole[1]
     )]
     CropOutside {
@@ -49,7 +47,7 @@ pub enum SolveError {
     Empty,
     /// There are no corners.
     #[error(
-        "surface: corners_px is missing or not filled in, and there are no four points on the surface instead"
+        "surface: corners_px is missing or not filled in, expected it or four points on the surface"
     )]
     NoCorners,
     /// A value that must be positive is not.
@@ -111,13 +109,13 @@ pub enum SolveError {
     },
     /// The corners are in another order than asked for
     /// ([`CornerOrder::Strict`](super::CornerOrder::Strict)).
-    #[error("surface.corners_px: {0}, and the order has to be right")]
+    #[error("surface.corners_px: {0}, but the order must be right")]
     Order(Diagnostic),
     /// Photos that should be of one camera differ in the shape of the picture, or in the principal
     /// point or k1 that their labels state, or one was cropped nobody knows where.
     #[error(
-        "photos[{photo}]: differs from another in shape, principal point or k1, or one of them was cropped and states no \
-         principal point: not one camera"
+        "photos[{photo}]: not the same camera: differs from another photo in shape, principal point or k1, or one of them \
+         was cropped and states no principal point"
     )]
     DifferentPictures {
         /// Which photo, from 0.
@@ -170,14 +168,14 @@ pub(crate) fn corner_name(corner: usize) -> &'static str {
 
 /// Why no camera may fit.
 pub(crate) const MISFIT_CAUSES: &str = "wrong dimensions, corners of different rectangles, strong distortion, a cropped \
-    picture, corner_sigma_px is too small, or an uncommon lens without EXIF data or camera.focal_px";
+    picture, too small a corner_sigma_px, or an uncommon lens without EXIF data or camera.focal_px";
 
 /// What to do about a label that no camera fits.
 fn remedy(exchanged: Option<[f64; 2]>, heights_m: Option<[f64; 2]>) -> String {
     match (exchanged, heights_m) {
         (Some([before, after]), _) => {
             format!(
-                "exchange width_m and height_m (chi squared {before:.1} as labelled, {after:.1} exchanged)"
+                "swap width_m and height_m (chi squared {before:.1} as labelled, {after:.1} swapped)"
             )
         }
         (None, Some([stated, found])) => {

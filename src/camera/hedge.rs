@@ -89,8 +89,8 @@ impl Solution {
             Code::FramingUnknown,
             format!(
                 "it is not known whether the picture was cropped, so a point {height:.3} m above the surface is known only \
-                 to {sigma_px:.1} px; write \"cropped\": false under \"image\"{place} if it is whole: to {whole_px:.1} px \
-                 then"
+                 to {sigma_px:.1} px; if it was not, write \"cropped\": false under \"image\"{place}, which brings that to \
+                 {whole_px:.1} px"
             ),
         )
     }
@@ -106,7 +106,7 @@ impl Solution {
         let [w, h] = self.camera.image.map(f64::from);
         let off_px = (self.camera.principal_px - Point2::new(w / 2.0, h / 2.0)).norm();
         let what = format!(
-            "the principal point lies {off_px:.0} px (+- {:.0}) off the middle of the picture: it was cropped, the lens \
+            "the principal point is {off_px:.0} px (+- {:.0}) off the centre of the picture: the picture was cropped, the lens \
              was shifted, or the EXIF focal length is wrong",
             self.sigma.principal_px
         );

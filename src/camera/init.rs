@@ -71,7 +71,10 @@ fn file_below(photo: &Path, path: &Path) -> Result<String> {
         .unwrap_or_default();
     let relative = io::relative(&io::absolute(photo)?, &folder);
     if io::below("", &relative).is_err() {
-        let what = format!("does not lie beside {} nor above it", photo.display());
+        let what = format!(
+            "is neither in the folder of {} nor in one above it",
+            photo.display()
+        );
         return Err(Error::file(path, what));
     }
     Ok(relative.to_string_lossy().replace('\\', "/"))
@@ -122,9 +125,9 @@ fn open_questions(label: &Label) -> Vec<&'static str> {
 }
 
 const CORNERS_QUESTION: &str = "surface.corners_px: x and y of the rectangle's corners in pixels from the top left of the \
-     picture, clockwise from its top left; the side from the first to the second is width_m";
+     picture, clockwise from the rectangle's top left; the side from the first to the second is width_m";
 const FRAMING_QUESTION: &str =
-    "image: add \"cropped\": false if nothing was cut off the picture, true if something was";
+    "image: add \"cropped\": true if the picture was cropped, false if it was not";
 
 /// Pretty JSON, its lists of numbers in one line each.
 pub fn with_folded_lists(text: &str) -> String {
@@ -199,7 +202,8 @@ mod tests {
         (label.surface.width_m, label.surface.height_m) = (Some(0.56), Some(0.37));
         let text = commented(&label).unwrap();
         assert!(
-            text.contains("[null, null],\n") && text.contains("\"cropped\\\": false if nothing"),
+            text.contains("[null, null],\n")
+                && text.contains("\"cropped\\\": true if the picture was cropped"),
             "{text}"
         );
         io::write_text(&path, &text).unwrap();
@@ -301,7 +305,7 @@ mod tests {
             at("/labels/b.label.json")
                 .unwrap_err()
                 .to_string()
-                .contains("does not lie beside")
+                .contains("is neither in the folder of")
         );
     }
 }

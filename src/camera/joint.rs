@@ -160,7 +160,7 @@ impl Joint {
 }
 
 fn contradiction_warning() -> Diagnostic {
-    let what = "the photos contradict each other, and each was solved alone: corner_sigma_px is too small, or another zoom, which needs another camera.id";
+    let what = "the photos contradict each other, so each was solved alone: corner_sigma_px is too small, or the zoom differs, which needs another camera.id";
     Diagnostic::warning(Code::OutlierPhoto, what)
 }
 

@@ -121,7 +121,7 @@ fn check_fixed(camera: &LabelCamera) -> Result<(), SolveError> {
     if camera.focal_fixed && camera.focal_px.is_none() && camera.focal_35mm.is_none() {
         return Err(SolveError::OutOfBounds {
             at: "camera.focal_fixed",
-            what: "true, expected camera.focal_px or focal_35mm beside it".into(),
+            what: "true, expected camera.focal_px or focal_35mm with it".into(),
         });
     }
     Ok(())
@@ -257,7 +257,7 @@ mod tests {
     fn a_focal_length_that_is_exact_is_stated() {
         assert_eq!(
             refusal(|label| label.camera.focal_fixed = true),
-            "camera.focal_fixed: true, expected camera.focal_px or focal_35mm beside it"
+            "camera.focal_fixed: true, expected camera.focal_px or focal_35mm with it"
         );
     }
 
@@ -275,8 +275,7 @@ mod tests {
         assert_eq!(checked([0.0, 0.0], 4000), Ok(()));
         assert_eq!(checked([20.5, 0.0], 4021), Ok(()));
         let beyond = checked([200.0, 0.0], 4000).unwrap_err();
-        let expected =
-            "image.crop: 4000 x 3000 pixels at 200, 0, expected a part of the 4000 x 3000";
+        let expected = "image.crop: 4000 x 3000 pixels at 200, 0, expected a part of the whole picture of 4000 x 3000";
         assert!(beyond.starts_with(expected), "{beyond}");
         assert!(checked([-1.0, 0.0], 5000).is_err());
     }

@@ -227,7 +227,7 @@ pub(crate) fn check_fold(at: &str, k1: f64, least: f64) -> Result<()> {
     }
     let shown = number((1e6 * k1).round() / 1e6);
     let what = format!(
-        "{shown}, expected at least {least:.3}: beyond, the corners of this camera's pictures fold over, or nearly"
+        "{shown}, expected at least {least:.3}: below it, the corners of this camera's pictures fold over, or nearly do"
     );
     Err(Error::value(at, what))
 }

@@ -148,7 +148,7 @@ fn color_meanings(solution: &Solution) -> [(LinearRgb, String); 4] {
     let [w, h] = solution.size;
     let step = grid_step(solution.size);
     let height = solution.sigma.reference_height;
-    let rectangle = format!("rectangle as fitted, {w:.3} x {h:.3} m");
+    let rectangle = format!("fitted rectangle, {w:.3} x {h:.3} m");
     let corner = format!(
         "labelled corner, and {ELLIPSE_SIGMAS:.0} standard deviations of where the camera sees it"
     );
@@ -468,7 +468,7 @@ mod tests {
             .map(|entry| entry.text)
             .collect();
         for word in [
-            "rectangle as fitted",
+            "fitted rectangle",
             "grid of 0.100 m",
             "box 0.0",
             "labelled corner",

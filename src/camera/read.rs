@@ -180,7 +180,7 @@ fn labels_for(
         let concerned = is_asked_for(alone, &labelled.name)
             || same.any(|other| is_asked_for(alone, &other.name));
         match push_new(&mut found, labelled) {
-            Err(error) if !concerned => log::info!("{error}; left out"),
+            Err(error) if !concerned => log::info!("{error}; skipped"),
             outcome => outcome?,
         }
     }
@@ -198,11 +198,11 @@ fn read_all(
     for path in label_paths(folder)? {
         match labels_if_any(&path, size) {
             Ok(Some(labels)) => all.extend(labels),
-            Ok(None) => log::info!("{}: no label", path.display()),
+            Ok(None) => log::info!("{}: not a label", path.display()),
             Err(error) if is_asked_for(alone, &label_name(&path)) => return Err(error),
             // The photo that is asked for may be among those that it labels.
-            Err(error) if may_hold_several(&path) => log::warn!("{error}; left out"),
-            Err(error) => log::info!("{error}; left out"),
+            Err(error) if may_hold_several(&path) => log::warn!("{error}; skipped"),
+            Err(error) => log::info!("{error}; skipped"),
         }
     }
     Ok(all)
@@ -224,12 +224,12 @@ fn push_new(found: &mut Vec<LabelledPhoto>, labelled: LabelledPhoto) -> Result<(
         None => found.push(labelled),
         Some(ours) if ours.is_ours && !labelled.is_ours => {
             let source = ours.source.display();
-            log::info!("{labelled}: left out, since {source} is there");
+            log::info!("{labelled}: skipped in favour of {source}");
         }
         Some(other) => {
             let photo = stem(Path::new(&labelled.label.image.file));
             let what = format!(
-                "labels {photo} once more, after {other}, expected one label and one camera file of it"
+                "labels {photo} again, after {other}, expected one label and one camera file per photo"
             );
             return Err(Error::file(&labelled.source, what));
         }
@@ -316,12 +316,12 @@ fn label_text(path: &Path) -> Result<String> {
 fn photo_instead(photo: &Path) -> Error {
     let label = photo.with_file_name(format!("{}{LABEL_SUFFIX}", stem(photo)));
     let next = if label.is_file() {
-        format!("{} lies beside it", label.display())
+        format!("its label is {}", label.display())
     } else {
         let photo = photo.display();
         format!("`petcomp camera init {photo} --size WIDTHxHEIGHT` writes one")
     };
-    Error::file(photo, format!("a picture, expected a label of it; {next}"))
+    Error::file(photo, format!("a picture, expected a label; {next}"))
 }
 
 /// A label of ours, or an array of them.
@@ -378,7 +378,7 @@ fn stem(path: &Path) -> String {
 fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto> {
     let file = annotated_file(annotation, path)?;
     if file.is_empty() {
-        return Err(Error::file(path, "no name of a picture"));
+        return Err(Error::file(path, "no picture name"));
     }
     let name = stem(Path::new(&file));
     let mut label = io::below("", &file)
@@ -438,7 +438,7 @@ fn several_pictures(annotation: &Annotation, there: usize) -> Error {
     let names = annotation.pictures.iter().filter_map(|names| names.last());
     let names: Vec<&str> = names.map(String::as_str).collect();
     let what = format!(
-        "an annotation that may be of {}, expected exactly one of them in this folder, of which {there} are there",
+        "an annotation that may be of {}, expected exactly one of them in this folder, found {there}",
         names.join(" or ")
     );
     Error::value(&annotation.at, what)
@@ -682,7 +682,7 @@ pub(super) mod tests {
             let told = annotated_file(&annotation, &path).unwrap_err().to_string();
             let expected = format!(
                 "export.json: [2]: an annotation that may be of a.jpg or b.jpg, \
-                 expected exactly one of them in this folder, of which {there} are there"
+                 expected exactly one of them in this folder, found {there}"
             );
             assert!(told.ends_with(&expected), "{told}");
         };
@@ -730,7 +730,7 @@ pub(super) mod tests {
         let path = folder.path().join("all.label.json");
         io::write_json(&path, &labels).unwrap();
         let refusal = read_labels(&path, None).unwrap_err().to_string();
-        assert!(refusal.contains("labels 001 once more"), "{refusal}");
+        assert!(refusal.contains("labels 001 again"), "{refusal}");
     }
 
     /// Labels of photos with these names.
@@ -809,10 +809,7 @@ pub(super) mod tests {
         let names: Vec<&str> = found.iter().map(|one| one.name.as_str()).collect();
         assert_eq!(names, ["a", "b"]);
         let refusal = labels_beside("b", folder.path(), None).unwrap_err();
-        assert!(
-            refusal.to_string().contains("labels b once more"),
-            "{refusal}"
-        );
+        assert!(refusal.to_string().contains("labels b again"), "{refusal}");
     }
 
     #[test]
@@ -870,10 +867,7 @@ pub(super) mod tests {
         label.camera.focal_35mm = Some(26.0);
         let solution = solve(&label, &SolveOptions::default()).unwrap();
         let refusal = check_distance(&solution).unwrap_err().to_string();
-        assert!(
-            refusal.contains("exchange width_m and height_m"),
-            "{refusal}"
-        );
+        assert!(refusal.contains("swap width_m and height_m"), "{refusal}");
     }
 
     #[test]

@@ -286,12 +286,12 @@ fn source_and_causes(prior: PriorSource) -> [&'static str; 2] {
     match prior {
         PriorSource::Label => [
             "the label",
-            "wrong camera.focal_px, a cropped or a zoomed picture",
+            "wrong camera.focal_px, a cropped or zoomed picture",
         ],
-        PriorSource::Exif => ["EXIF data", "wrong EXIF, a cropped or a zoomed picture"],
+        PriorSource::Exif => ["EXIF data", "wrong EXIF, a cropped or zoomed picture"],
         PriorSource::Nominal => [
             "a common lens",
-            "another lens, whose camera.focal_px the label should give, or wrong dimensions",
+            "another lens (give camera.focal_px in the label), or wrong dimensions",
         ],
     }
 }
@@ -316,7 +316,7 @@ fn compare_exchanged_sides(
 
 fn exchange_warning(labelled_chi2: f64, exchanged_chi2: f64) -> Diagnostic {
     let what = format!(
-        "width and height look exchanged (chi squared {labelled_chi2:.1} as labelled, {exchanged_chi2:.1} exchanged)"
+        "width and height look swapped (chi squared {labelled_chi2:.1} as labelled, {exchanged_chi2:.1} swapped)"
     );
     Diagnostic::warning(Code::SidesSwapped, what)
 }
@@ -380,10 +380,7 @@ mod tests {
         let equivalent = 3000.0 / 5000.0 * 36f64.hypot(24.0);
         label.camera.focal_35mm = Some(equivalent);
         let refusal = misfit(&exchanged(&label).unwrap()).unwrap().to_string();
-        assert!(
-            refusal.contains("exchange width_m and height_m"),
-            "{refusal}"
-        );
+        assert!(refusal.contains("swap width_m and height_m"), "{refusal}");
         for factor in [1.0, 1.5, 1.0 / 1.5] {
             label.camera.focal_35mm = Some(factor * equivalent);
             assert_eq!(misfit(&label), None, "{factor}");

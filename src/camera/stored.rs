@@ -176,7 +176,7 @@ fn located_error(error: SolveError, labelled: &LabelledPhoto) -> Error {
     Error::file(
         &labelled.source,
         "width and height of the rectangle are missing, expected surface.width_m and height_m in the label, surface_size \
-         in the recipe, or a camera file by `petcomp camera solve` with --size",
+         in the recipe, or a camera file from `petcomp camera solve` with --size",
     )
 }
 
@@ -527,7 +527,7 @@ mod tests {
         let labelled = desk.write(&label);
         let error = camera_of(&labelled, false).unwrap_err().to_string();
         assert!(
-            error.contains("a.label.json") && error.contains("exchange width_m and height_m"),
+            error.contains("a.label.json") && error.contains("swap width_m and height_m"),
             "{error}"
         );
         assert!(!camera_of(&labelled, true).unwrap().stored);

@@ -37,7 +37,7 @@ const OBJECT_CLIPPING: ClippingLimits = ClippingLimits {
     max: 0.03,
     refused: 0.5,
     what: "of the object is clipped in the white frame",
-    advice: ": its transmittance there can only be that of what lies around it; use a shorter exposure, or darken the room",
+    advice: ": its transmittance there is taken from its surroundings; use a shorter exposure, or darken the room",
 };
 
 /// The warnings about photos of the white frame, each with where it is clipped.
@@ -115,8 +115,8 @@ pub(super) fn bands(frames: &BlackAndWhite<'_>, free: &Mask) -> Result<Option<Di
     }
     let what = format!(
         "around the object the white frame is uneven by {} %, expected at most {:.1} %: bands of a flickering display, \
-         reflections, shadows, or moire (focus on the object, not on the display; another distance); \
-         expose for 1/30 s or longer at full brightness of the display, and darken the room",
+         reflections, shadows, or moire (focus on the object, not on the display, or change the distance); \
+         expose for 1/30 s or longer with the display at full brightness, and darken the room",
         above(100.0 * deviation, 100.0 * MAX_BANDS),
         100.0 * MAX_BANDS
     );
@@ -190,7 +190,7 @@ pub(super) fn exchange(frames: &BlackAndWhite<'_>, coverage: &Image<Coverage>) -
     }
     Err(refused(
         "through most of the object the display is brighter than without it; \
-         are its photos and those of the empty display (--empty) exchanged?",
+         are its photos and those of the empty display (--empty) swapped?",
     ))
 }
 
@@ -231,8 +231,8 @@ pub(super) fn black_without_object(
         return Ok(());
     }
     Err(refused(&format!(
-        "{}: black frame without the object, which other photos of it show; photos without the \
-         object belong to empty (--empty); or did the room's light change?",
+        "{}: black frame without the object, though other black photos show it; photos without the \
+         object belong in empty (--empty); or did the room's light change?",
         unseen.join(" and ")
     )))
 }
@@ -265,7 +265,7 @@ pub(super) fn camera_motion(motion_px: f64) -> Option<Diagnostic> {
     (motion_px > MAX_MOTION_PX).then(|| {
         let what = format!(
             "the camera moved by up to {} px between photos, expected at most {MAX_MOTION_PX}: \
-             the display is aligned, what rises above it is not; put the camera on a stand",
+             the display is aligned, but not what rises above it; put the camera on a stand",
             above(motion_px, MAX_MOTION_PX)
         );
         Diagnostic::warning(Code::CameraMoved, what)
@@ -286,7 +286,7 @@ pub(super) fn object_motion(
     let change = change_of_stripes(frames, stripes, coverage, free);
     (change > MAX_CHANGE).then(|| {
         let what = format!(
-            "inside the object the stripes are on average {} % of white off black and white, expected at most {:.1} %: \
+            "inside the object the stripes differ on average by {} % of white from the mean of black and white, expected at most {:.1} %: \
              did it move, or did the room's light change?",
             above(100.0 * change, 100.0 * MAX_CHANGE),
             100.0 * MAX_CHANGE

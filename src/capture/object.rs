@@ -111,8 +111,8 @@ impl Object {
         let [one, other] = [&object, &other].map(place);
         Err(refused(&format!(
             "two objects, {one} and {other} of the display; photograph them one by one, \
-             wipe the display, and darken the room; what stays there is no object where it is \
-             in photos of the empty display, too (--empty)"
+             wipe the display, and darken the room; what is also in photos of the empty \
+             display (--empty) is not treated as an object"
         )))
     }
 }
@@ -132,7 +132,7 @@ fn nothing_found(threshold: f32) -> Error {
     refused(&format!(
         "nothing lies on the display, or nothing that stands out: \
          the display is uneven or changes its colour, typically by {} % of white, or the photos are noisy \
-         (expected: at most {most:.1} %); photograph it empty, too, from the same place and in the same light (--empty)",
+         (expected at most {most:.1} %); also photograph it empty, from the same place and in the same light (--empty)",
         above(typical, most)
     ))
 }
@@ -197,8 +197,8 @@ fn check_within(mask: &Mask, free: &Mask) -> Result<()> {
         _ => "bottom",
     };
     Err(refused(&format!(
-        "the object reaches the markers or the border of the display ({side}), expected it to lie inside; \
-         use a larger display, or lay it diagonally"
+        "the object reaches the markers or the border of the display ({side}), expected it inside; \
+         use a larger display, or lay the object diagonally"
     )))
 }
 

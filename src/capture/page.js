@@ -37,7 +37,7 @@ function measure() {
   text.classList.toggle("warning", !fits);
   text.textContent = fits
     ? `The frames fit this display: ${width} x ${height} pixels.`
-    : `This window has ${shown.join(" x ")} pixels, the frames ${width} x ${height}: go full screen (F), or make frames with --size ${shown.join("x")}.`;
+    : `This window has ${shown.join(" x ")} pixels, the frames ${width} x ${height}: go full screen (F), or write frames with --size ${shown.join("x")}.`;
 }
 
 function fullscreen() {

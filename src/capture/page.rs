@@ -51,7 +51,7 @@ fn instructions(frames: usize) -> maud::Markup {
                 li { "Display: full brightness; automatic brightness, night light and true tone off. Wipe it clean." }
                 li { "Full screen: " kbd { "F" } ". Measure the width of the arrow at the top, in metres: it goes into display.toml." }
                 li { "Camera on a stand, straight above; exposure, focus and white balance locked, so that white is not clipped." }
-                li { "Put the object into the middle. It hides no marker; nothing moves until the last photo is taken." }
+                li { "Put the object in the middle. It must not hide a marker; nothing may move until the last photo is taken." }
                 li {
                     "One photo of each frame: next " kbd { "→" } " or a click, back " kbd { "←" } ", this page " kbd { "Esc" }
                     ", a frame every " input #seconds type="number" min="1" max="60" value="4"; " seconds " kbd { "T" } "."

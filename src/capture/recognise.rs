@@ -122,7 +122,7 @@ fn tags(photo: &Image<LinearRgb>) -> Result<Vec<Marker>> {
         return Ok(any_markers(photo));
     }
     Err(refused(
-        "its markers cannot be read: petcomp was built without the feature markers",
+        "its markers cannot be read: petcomp was built without the `markers` feature",
     ))
 }
 

@@ -212,7 +212,7 @@ impl<'a> Alignment<'a> {
         self.frame(photos, frame)?.ok_or_else(|| {
             let names = photos.sources.names.join(", ");
             refused(&format!(
-                "no photo of the {frame} frame among {names}; expected black and white at least"
+                "no photo of the {frame} frame among {names}; expected at least black and white"
             ))
         })
     }
@@ -303,14 +303,14 @@ fn white_light(photo: &FramePhoto) -> f32 {
 fn differing([a, b]: [&str; 2]) -> Error {
     refused(&format!(
         "{a} and {b} show the same frame but differ by more than {:.0} % of white; \
-         photos without the object belong to empty (--empty), and neither it nor the light may move",
+         photos without the object belong in empty (--empty), and neither the object nor the light may move",
         100.0 * MAX_DIFFERENCE
     ))
 }
 
 fn drift_warning(photo: &str, drift: f32) -> Diagnostic {
     let what = format!(
-        "{photo}: its exposure or colour is {} % off that of the white frame, expected at most {:.0} %; \
+        "{photo}: its exposure or colour differs by {} % from the white frame, expected at most {:.0} %; \
          lock exposure and white balance, and switch the display's automatic brightness off",
         above(100.0 * drift, 100.0 * MAX_DRIFT),
         100.0 * MAX_DRIFT
@@ -326,7 +326,8 @@ mod tests {
     fn a_drift_above_the_limit_is_told_as_one() {
         for (drift, off) in [(0.204, "20.4"), (0.2001, "20.1")] {
             let told = drift_warning("a.jpg", drift).message;
-            let expected = format!("is {off} % off that of the white frame, expected at most 20 %");
+            let expected =
+                format!("differs by {off} % from the white frame, expected at most 20 %");
             assert!(told.contains(&expected), "{told}");
         }
     }

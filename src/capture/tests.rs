@@ -383,8 +383,10 @@ fn what_is_wrong_with_a_capture_is_said() {
         ..STILL
     };
     let drift = told(&frames(false), drifting);
-    let off = drift.split("photo 0: its exposure or colour is ").nth(1);
-    let off = off.and_then(|off| off.split(" % off that of the white frame").next());
+    let off = drift
+        .split("photo 0: its exposure or colour differs by ")
+        .nth(1);
+    let off = off.and_then(|off| off.split(" % from the white frame").next());
     let off: Option<f64> = off.and_then(|off| off.parse().ok());
     assert!(off.is_some_and(|off| (off - 60.0).abs() < 0.5), "{drift}");
     let nothing = told(&frames(false), BARE);

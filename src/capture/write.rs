@@ -51,7 +51,7 @@ fn with_known_width(display: &Display, file: &Path) -> Result<Display> {
     }
     if let Some(width) = known.width {
         let file = file.display();
-        log::warn!("{file}: width = {width} is gone with the size that it was measured at");
+        log::warn!("{file}: width = {width} was removed: it was measured at another size");
     }
     Ok(*display)
 }

@@ -148,7 +148,7 @@ mod tests {
         let path = config.folder.join("../far.exr");
         surroundings.check_file(&path, 1).unwrap();
         let refused = surroundings.picture("../far.exr").unwrap_err().to_string();
-        let expected = "far.exr: has other bytes than when its folder was opened";
+        let expected = "far.exr: has changed since its folder was opened";
         assert!(refused.ends_with(expected), "{refused}");
     }
 

@@ -461,7 +461,7 @@ fn grey_screen(screen: LinearRgb) -> Diagnostic {
         Code::GreyScreen,
         format_args!(
             "the background ({r:.2}, {g:.2}, {b:.2}) is too grey to measure transmittance: that of plastic is assumed; \
-             an opaque object needs matte = \"outline\""
+             for an opaque object set matte = \"outline\""
         ),
     )
 }

@@ -230,17 +230,16 @@ impl ScreenPlate {
     pub(super) fn unevenness_warning(&self) -> Option<Diagnostic> {
         let seen = match (self.hot_spot > 0.0, self.overshoot > 0.0) {
             (true, _) => format!(
-                "some of the screen is {:.0} % brighter than the light that fits most of it",
+                "part of the screen is {:.0} % brighter than the light fitted to most of it",
                 100.0 * self.hot_spot
             ),
             (false, true) => format!(
-                "bands, folds or shadows make most of the screen {:.0} % darker than the light that fits the rest",
+                "bands, folds or shadows make most of the screen {:.0} % darker than the light fitted to the rest",
                 100.0 * self.overshoot
             ),
             (false, false) => return None,
         };
-        let remedy =
-            "light the screen evenly, or give a photo of it empty (--plate, or screen in a list)";
+        let remedy = "light the screen evenly, or give a photo of the empty screen (--plate, or screen in a list)";
         let message = format!("{seen}: transparency may be wrong; {remedy}");
         Some(Diagnostic::warning(Code::UnevenScreen, message))
     }
@@ -307,7 +306,7 @@ fn matched(
 
 fn check_same_size((w, h): (usize, usize), (width, height): (usize, usize)) -> Result<()> {
     check_photo((w, h) == (width, height), || {
-        format!("the empty screen is {w} x {h} pixels, expected {width} x {height} as the photo")
+        format!("the empty screen is {w} x {h} pixels, expected {width} x {height} like the photo")
     })
 }
 
@@ -336,7 +335,7 @@ fn gain_on_background(
 ) -> Result<LinearRgb> {
     let [photo, empty] = cell_means([photo, empty], background);
     cells::gain(&photo, &empty)
-        .ok_or_else(|| refused("the object leaves no background to check the empty screen on"))
+        .ok_or_else(|| refused("the object leaves no background to compare the empty screen with"))
 }
 
 /// The cells of two pictures where a photo shows the screen.

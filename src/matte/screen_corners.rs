@@ -96,7 +96,7 @@ pub fn screen_corners(photo: &Image<LinearRgb>) -> Result<ScreenCorners> {
 
 fn rough_corners(picture: &Image<LinearRgb>) -> Result<[Point2<f64>; 4]> {
     four_corners(&screen_region(picture)?.hull)
-        .ok_or_else(|| not_found("its outline has no four corners"))
+        .ok_or_else(|| not_found("its outline does not have four corners"))
 }
 
 pub(super) fn at_search_size(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
@@ -113,7 +113,7 @@ fn refined(
 ) -> Result<ScreenCorners> {
     let sides = fitted_sides(photo, corners, scale)?;
     let corners_px = corners_between(&sides.map(|side| side.line))
-        .ok_or_else(|| not_found("two of its sides are parallel that should meet"))?;
+        .ok_or_else(|| not_found("two sides that should meet are parallel"))?;
     let off_px = sides.map(|side| side.off_px);
     Ok(ScreenCorners {
         corners_px,
@@ -133,7 +133,7 @@ pub(crate) fn from_top_left(corners: [Point2<f64>; 4]) -> [Point2<f64>; 4] {
 fn not_found(what: impl std::fmt::Display) -> Error {
     refused(format!(
         "the corners of the screen cannot be found: {what}; \
-         photograph all of it on something of another colour, give its corners (`asset add --screen-corners`), \
+         photograph all of it on a background of another colour, give its corners (`asset add --screen-corners`), \
          or measure the object's length with a tape"
     ))
 }
@@ -163,7 +163,7 @@ fn screen_region(picture: &Image<LinearRgb>) -> Result<HueRegion> {
     regions
         .into_iter()
         .next()
-        .ok_or_else(|| not_found("no tenth of the photo has one colour such as green or blue"))
+        .ok_or_else(|| not_found("no colour such as green or blue covers a tenth of the photo"))
 }
 
 /// The regions that are large enough for a screen, largest first.
@@ -328,7 +328,7 @@ fn fitted_sides(
         .collect();
     let sides = found
         .try_into()
-        .map_err(|_| not_found("a side of it shows no straight border"))?;
+        .map_err(|_| not_found("one of its sides has no straight border"))?;
     check_straight(&sides, CROOKED_PX * scale)?;
     Ok(sides)
 }
@@ -336,7 +336,7 @@ fn fitted_sides(
 fn check_straight(sides: &[ScreenSide; 4], limit_px: f64) -> Result<()> {
     match sides.iter().find(|side| side.off_px > limit_px) {
         Some(ScreenSide { off_px, .. }) => Err(not_found(format!(
-            "a side of it is crooked by {off_px:.1} pixels"
+            "one of its sides is off a straight line by {off_px:.1} pixels"
         ))),
         None => Ok(()),
     }

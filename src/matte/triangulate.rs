@@ -362,7 +362,7 @@ impl Aligner<'_> {
         let is_unlike = agreement.max(0.0) < least;
         (found.sigma_px < MAX_JUDGED_SIGMA_PX && is_unlike).then(|| {
             format!(
-                "correlation with the first is {}, expected {least:.2}; did the object turn or the light change, or is it dyed? a dyed one is let through by --set film.least_agreement=0",
+                "correlation with the first is {}, expected at least {least:.2}; did the object turn, did the light change, or is it dyed? for a dyed one use --set film.least_agreement=0",
                 below(agreement, least)
             )
         })
@@ -371,7 +371,7 @@ impl Aligner<'_> {
     fn turned(&self, photo: &Image<LinearRgb>, weights: [f32; 3]) -> Option<String> {
         let apart = self.turned_px(photo, weights)?;
         Some(format!(
-            "the two ends of the object moved {} px apart from the first, expected at most \
+            "the offsets of the object's two ends from the first differ by {} px, expected at most \
              {MAX_END_SHIFT_PX}; did it turn?",
             above(apart, MAX_END_SHIFT_PX)
         ))
@@ -536,7 +536,7 @@ fn tint_uncertain(off: f32) -> Diagnostic {
     Diagnostic::warning(
         Code::TintUncertain,
         format_args!(
-            "plastic of another dye and thickness explains the photos as well: its tint is uncertain by +- {off:.2}; photograph it on a third screen colour"
+            "plastic of another dye and thickness explains the photos equally well: the tint is uncertain by +- {off:.2}; photograph it on a third screen colour"
         ),
     )
 }

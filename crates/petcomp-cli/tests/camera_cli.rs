@@ -129,7 +129,7 @@ fn a_label_with_its_sides_exchanged_is_refused_by_every_command() {
         desk.refused(args);
         let said = text(&desk.run(args).stderr);
         assert!(
-            said.contains("no camera fits") && said.contains("exchange width_m and height_m"),
+            said.contains("no camera fits") && said.contains("swap width_m and height_m"),
             "{args:?}: {said}"
         );
     }
@@ -553,7 +553,7 @@ fn a_label_comes_from_nothing() {
         ),
         (
             &["camera", "solve", "bg/a.png"],
-            "bg/a.label.json lies beside it",
+            "its label is bg/a.label.json",
         ),
     ] {
         let told = desk.refused(args);
@@ -834,7 +834,7 @@ fn the_samples_are_taken_with_their_cameras() {
     desk.label("bg0000", &exchanged(label.clone()));
     let error = desk.refused(&["camera", "solve", "bg/bg0000.label.json"]);
     assert!(
-        error.contains("exchange width_m and height_m (chi squared 11"),
+        error.contains("swap width_m and height_m (chi squared 11"),
         "{error}"
     );
     desk.label("bg0000", &label);

@@ -361,7 +361,7 @@ fn photos_that_would_become_one_cut_out_are_refused() {
         "asset add one/can.png two/can.png --class can --length 0.2 -o assets",
     ));
     assert!(
-        told.contains("\"two/can.png\", would become the same cut-out as photos[0]"),
+        told.contains("\"two/can.png\", would give the same cut-out file as photos[0]"),
         "{told}"
     );
 }
@@ -470,7 +470,7 @@ fn a_scale_that_is_wrong_for_one_photo_does_not_stop_the_others() {
     let told = text(&done.stderr);
     assert_eq!(done.status.code(), Some(2), "{told}");
     assert!(
-        told.contains("failed: no cut-out: px_per_metre: 3000, makes what is in small.png"),
+        told.contains("failed: no cut-out: px_per_metre: 3000, makes the object in small.png"),
         "{told}"
     );
     assert!(desk.path("assets/small/one.exr").exists());
@@ -2123,7 +2123,7 @@ fn a_capture_that_cannot_be_measured_says_why() {
     let add = "asset add photo_01_white.png --class cup -o assets --captured";
     let one = desk.refused(&words(add));
     assert!(
-        one.contains("captured.photos: no second photo, expected one of a black"),
+        one.contains("captured.photos: no second photo, expected at least one of a black"),
         "{one}"
     );
     let beside = format!("{add} photo_01_white.png");

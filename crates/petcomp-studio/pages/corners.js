@@ -361,9 +361,9 @@ function facts(camera) {
 
 /** The doctor's words for files, as this page says them. */
 const IN_THIS_PAGE = [
-  [/ If it is, write "cropped": false under "image": the principal point is then its middle and the focal length known/,
-    " If it is, say so below: the focal length is then known"],
-  [/write "cropped": false under "image": the principal point is then its middle/, "say so below"],
+  [/ If it was not, write "cropped": false under "image": the principal point is then its centre and the focal length known/,
+    " If it was not, say so below: the focal length is then known"],
+  [/write "cropped": false under "image": the principal point is then its centre/, "say so below"],
   [/ and write it as camera\.height_m/, " and type it below"],
   [/\(camera joint\)/, "(solve all together)"],
   [/\+-/g, "±"],

@@ -412,7 +412,7 @@ fn a_label_that_no_camera_fits_is_told_why_and_keeps_no_camera_of_before() {
     let asked = r#"{ "photos": ["bg0001.jpg"] }"#;
     let solved = body(&studio.post("api/corners/joint", asked));
     let why = solved[0]["why"].as_str().unwrap();
-    assert!(why.contains("exchange width_m and height_m"), "{why}");
+    assert!(why.contains("swap width_m and height_m"), "{why}");
     assert!(!camera.exists());
 }
 

@@ -69,7 +69,7 @@ fn annotation_at(at: String, task: &Value) -> Result<Annotation> {
             Some(_) => format!("{at}.data"),
             None => at,
         };
-        let what = "no name of a picture, expected an address that ends in .jpg, .png, ..";
+        let what = "no picture name, expected a URL or path that ends in .jpg, .png, ..";
         return Err(Error::value(place, what));
     }
     Ok(Annotation { at, ..annotation })
@@ -112,7 +112,7 @@ impl Annotation {
             return Ok(());
         }
         Err(format!(
-            "original_width and original_height: {width} x {height}, expected {w} x {h} as before it"
+            "original_width and original_height: {width} x {height}, expected {w} x {h} as in the result before"
         ))
     }
 
@@ -430,7 +430,7 @@ mod tests {
             &format!("{other}{{\"type\": \"choices\""),
         );
         let told = super::super::annotations(&both).unwrap_err().to_string();
-        let expected = "[0].result[1]: original_width and original_height: 400 x 100, expected 200 x 100 as before it";
+        let expected = "[0].result[1]: original_width and original_height: 400 x 100, expected 200 x 100 as in the result before";
         assert_eq!(told, expected);
     }
 
@@ -521,7 +521,7 @@ mod tests {
             let text = export.replace(".jpg", ".pdf");
             let told = super::super::annotations(&text).unwrap_err().to_string();
             let expected = format!(
-                "{place}: no name of a picture, expected an address that ends in .jpg, .png, .."
+                "{place}: no picture name, expected a URL or path that ends in .jpg, .png, .."
             );
             assert_eq!(told, expected);
         }

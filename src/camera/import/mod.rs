@@ -78,7 +78,7 @@ const PROGRAMS: [&str; 3] = [cvat::PROGRAM, label_studio::PROGRAM, labelme::PROG
 pub(crate) fn place_for_more(label: &Label) -> &'static str {
     match label.surface.source.as_deref() {
         Some(source) if PROGRAMS.contains(&source) => {
-            " in a label of petcomp's own (`petcomp camera init PHOTO --size WxH --corners \"..\"` writes one)"
+            " in petcomp's own label format (`petcomp camera init PHOTO --size WxH --corners \"..\"` writes such a label)"
         }
         _ => "",
     }
@@ -146,7 +146,7 @@ impl Annotation {
     fn unclear(&self, [quads, boxes, points]: [usize; 3]) -> Error {
         let others = self.shapes_of(ShapeKind::Polygon).count() - quads;
         let what = format!(
-            "{quads} polygons of four points, {others} of another number, {boxes} rectangles and {points} points, expected \
+            "{quads} polygons of four points, {others} other polygons, {boxes} rectangles and {points} points, expected \
              one polygon of four points, or one rectangle, or four points"
         );
         Error::value("shapes", what)
@@ -318,7 +318,7 @@ pub(crate) mod tests {
                 .contains("2 polygons of four points")
         );
         let three = vec![shape(ShapeKind::Polygon, "a", &QUAD[..3])];
-        assert!(corners(three).unwrap_err().contains("1 of another number"));
+        assert!(corners(three).unwrap_err().contains("1 other polygons"));
         assert!(corners(vec![]).unwrap_err().contains("0 points"));
         assert!(
             corners(vec![shape(ShapeKind::Polygon, "a", &[[f64::NAN, 0.0]; 4])])

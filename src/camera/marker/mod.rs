@@ -122,7 +122,7 @@ pub fn with_markers(mut label: Label, photo: &Image<LinearRgb>) -> Result<Label>
     if turns > 0 {
         let degrees = 90 * turns;
         log::warn!(
-            "markers: they fit the map only if turned by {degrees} degrees (markers.artwork, or the map's axes)"
+            "markers: they fit the map only when rotated by {degrees} degrees; check markers.artwork and the map's axes"
         );
     }
     Ok(layout.label_turned(turns))
@@ -147,7 +147,7 @@ fn find_family(map: &MarkerMap, photo: &Image<LinearRgb>) -> Result<(Vec<Marker>
         #[cfg(not(feature = "markers"))]
         "tag36h11" => Err(Error::value(
             "markers.family",
-            "\"tag36h11\", but petcomp was built without the feature markers",
+            "\"tag36h11\", but petcomp was built without the `markers` feature",
         )),
         other => Err(Error::value(
             "markers.family",

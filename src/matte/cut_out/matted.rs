@@ -127,10 +127,10 @@ const RIM_PX: f64 = 2.0;
 const MAX_BARE_SHARE: f64 = 0.05;
 /// What becomes of it where the object encloses it.
 const ENCLOSED: &str =
-    ", and is cut out as if it were the object; with the method \"physical\" it is see-through";
+    " but is cut out as part of the object; with the method \"physical\" it is see-through";
 /// What becomes of it where it reaches the rim.
 const LEFT_OUT: &str =
-    " up to its rim, and is left out; draw the outline there if it is the object";
+    " up to its rim and is left out; if it belongs to the object, draw the outline there";
 
 /// Where more of an outline would be left out, it is the object that has the screen's colour.
 const MAX_OPEN_SHARE: f64 = 0.5;

@@ -66,7 +66,7 @@ fn warning(share: f64, [x, y]: [f64; 2]) -> Diagnostic {
     Diagnostic::warning(
         Code::TwoObjects,
         format_args!(
-            "possibly two objects: bare screen separates {:.1} % of what was cut out from the rest, at {x:.0} % of the width and {y:.0} % of the height; take away what lies there",
+            "possibly two objects: bare screen separates {:.1} % of the cut-out from the rest, at {x:.0} % of the width and {y:.0} % of the height; remove what is there",
             100.0 * share
         ),
     )

@@ -85,7 +85,7 @@ impl ColorUncertainty {
             Code::KeyedAway,
             warning_above(Self::NEEDS_REVIEW.keyed_away, share),
             format_args!(
-                "{:.1} % of the object looks like the screen: keyed away, but it may be paint of the screen's hue; photograph it on another screen colour",
+                "{:.1} % of the object looks like the screen: keyed out, but it may be paint of the screen's hue; photograph it on another screen colour",
                 100.0 * share
             ),
         )
@@ -119,7 +119,7 @@ impl ColorUncertainty {
         Diagnostic::warning(
             Code::TintUncertain,
             format_args!(
-                "{:.0} % of the object is as bright as paint and yet taken for see-through; if it lets no light through, it needs matte = \"outline\"",
+                "{:.0} % of the object is as bright as paint but treated as see-through; if it is opaque, set matte = \"outline\"",
                 100.0 * share
             ),
         )
@@ -266,7 +266,7 @@ mod tests {
         };
         let keyed = told(|d| d.keyed_away = 0.1).message;
         assert!(
-            keyed.contains("keyed away") && !keyed.contains("opaque"),
+            keyed.contains("keyed out") && !keyed.contains("opaque"),
             "{keyed}"
         );
         let painted = told(|d| d.screen_hue = 0.1).message;

@@ -381,8 +381,8 @@ fn truncated_at(borders: &[&str]) -> Diagnostic {
     Diagnostic::warning(
         Code::Truncated,
         format_args!(
-            "the object reaches the {} border: the part beyond is missing, and a stated length or size makes the \
-             rest too large; photograph all of it",
+            "the object reaches the {} border: the part beyond it is missing, and a stated length or size makes the \
+             rest too large; photograph the whole object",
             listed(borders)
         ),
     )
@@ -404,7 +404,7 @@ fn noisy(asked: usize, searched: usize) -> Option<Diagnostic> {
         Diagnostic::warning(
             Code::Noisy,
             format_args!(
-                "the photo is noisy: the outline was found at 1/{reduction:.0} of the resolution and is accurate to one of its pixels"
+                "the photo is noisy: the outline was found at 1/{reduction:.0} of the resolution and is accurate to one pixel there"
             ),
         )
     })

@@ -120,7 +120,7 @@ impl Confidence {
         Diagnostic::warning(
             Code::ThresholdSensitive,
             format_args!(
-                "low confidence: bounding box moves {:.0} px at a lower edge threshold; is there a faint tip, a shadow or, in a small JPEG, its ringing (take a larger photo)?",
+                "low confidence: bounding box moves {:.0} px at a lower edge threshold; is there a faint tip, a shadow or, in a small JPEG, ringing (then take a larger photo)?",
                 self.faint_px
             ),
         )
@@ -202,7 +202,7 @@ mod tests {
             ..SURE
         };
         let told = swollen.diagnostics(1.0, 1.0);
-        let advice = "in a small JPEG, its ringing (take a larger photo)";
+        let advice = "in a small JPEG, ringing (then take a larger photo)";
         assert!(told.iter().any(|d| d.message.contains(advice)), "{told:?}");
     }
 

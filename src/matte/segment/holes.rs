@@ -68,7 +68,7 @@ impl ObjectArea {
         let parts = self.has_screen_like_parts.then(|| {
             Diagnostic::warning(
                 Code::ScreenLikeParts,
-                "parts of the object look like the screen: treated as holes, or on a grey board as clear plastic; are they?",
+                "parts of the object look like the screen: treated as holes or, on a grey board, as clear plastic; is that right?",
             )
         });
         parts

@@ -276,7 +276,7 @@ fn main_object(
 ) -> Result<(Mask, Vec<Diagnostic>)> {
     let clusters = EdgeClusters::new(edges, claims, join_px).ok_or_else(|| {
         refused(
-            "nothing stands out from what is along the borders; is there an object, in focus, with background all around it?",
+            "nothing stands out from the background along the borders; is there an object, in focus, with background all around it?",
         )
     })?;
     let mut diagnostics = clusters.judge_others()?;
@@ -295,7 +295,7 @@ fn two_objects([one, other]: &[String; 2]) -> Error {
 fn left_out([object, other]: &[String; 2]) -> Diagnostic {
     Diagnostic::warning(
         Code::LeftOut,
-        format_args!("left out what is {other}: too far from the object {object}"),
+        format_args!("left out something {other}: too far from the object {object}"),
     )
 }
 
@@ -303,7 +303,7 @@ fn specks_on_screen(count: usize) -> Diagnostic {
     Diagnostic::warning(
         Code::Specks,
         format_args!(
-            "{count} specks on the screen: one beside the object may have been treated as part of it; clean the screen, or check the outline"
+            "{count} specks on the screen: one next to the object may have been treated as part of it; clean the screen, or check the outline"
         ),
     )
 }

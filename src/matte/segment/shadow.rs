@@ -94,7 +94,7 @@ pub(super) fn shadow_left_out(shadow: &Mask, inside: &Mask) -> Option<Diagnostic
         Diagnostic::warning(
             Code::LeftOut,
             format_args!(
-                "left out what looks like a hard shadow on the screen, {percent:.0} % of what the edges enclose: is it one? soften the light, or draw the outline there if it is the object"
+                "left out what looks like a hard shadow on the screen, {percent:.0} % of what the edges enclose; soften the light or, if it belongs to the object, draw the outline there"
             ),
         )
     })

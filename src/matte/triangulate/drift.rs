@@ -63,7 +63,7 @@ fn spread(values: impl Iterator<Item = f32>) -> f32 {
 fn drifted([drift, most]: [f32; 2], is_dye_inferred: bool) -> Diagnostic {
     let cause = match is_dye_inferred {
         true => {
-            "exposure or white balance changed, or the dye is none of PET's; lock both, or add a third screen colour"
+            "exposure or white balance changed, or the dye is not a PET dye; lock both, or add a third screen colour"
         }
         false => "exposure or white balance changed; lock both",
     };

@@ -351,7 +351,7 @@ fn photos_that_are_unlike_may_be_of_a_dyed_object_which_is_let_through_on_reques
     };
     let refusal = told(0.2, 0.5).unwrap();
     assert!(
-        refusal.ends_with("is it dyed? a dyed one is let through by --set film.least_agreement=0"),
+        refusal.ends_with("is it dyed? for a dyed one use --set film.least_agreement=0"),
         "{refusal}"
     );
     assert_eq!([told(0.6, 0.5), told(-0.4, 0.0)], [None, None]);
