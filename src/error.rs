@@ -44,10 +44,10 @@ pub enum Error {
         /// What was found instead, and what to do.
         what: String,
     },
-    /// A rectangle that no camera can have seen; of a file it is a [`Error::Field`].
+    /// A rectangle that no camera can have seen; in a file it is an [`Error::Field`].
     #[error("{what}")]
     Camera {
-        /// Where it is wrong, `surface.corners_px` as a rule, how, and what was expected.
+        /// Where it is wrong (usually `surface.corners_px`), how, and what was expected.
         what: String,
     },
     /// Dropped objects that would not come to rest.
@@ -59,13 +59,13 @@ pub enum Error {
     /// The caller asked to stop.
     #[error("interrupted: {what}")]
     Interrupted {
-        /// What is done, and how to go on.
+        /// What is done, and how to continue.
         what: String,
     },
 }
 
 impl Error {
-    /// A [`Error::File`] from any message; the system's numbers of errors are left out.
+    /// A [`Error::File`] from any message; without the operating system's error number.
     pub fn file(path: impl AsRef<Path>, what: impl std::fmt::Display) -> Self {
         Self::File {
             path: path.as_ref().into(),
@@ -93,7 +93,7 @@ impl Error {
         }
     }
 
-    /// The same error, with the document that the value stands in.
+    /// The same error, with the document that contains the value.
     pub fn in_file(self, path: impl AsRef<Path>) -> Self {
         let path = path.as_ref().to_path_buf();
         match self {
@@ -140,9 +140,8 @@ fn named(path: &Path) -> String {
     printable(&path.to_string_lossy())
 }
 
-/// Text as it may be shown on a line of a terminal or stand in a document: what would move the
-/// cursor, change colours, begin a line or turn the order of letters around is written out, a line
-/// feed as `\\n` and an escape as `\\x1b`.
+/// Text that is safe to show on a line of a terminal or in a document: what would move the cursor,
+/// change colours, begin a line or reverse the order of letters is written out, a line feed as `\\n` and an escape as `\\x1b`.
 pub fn printable(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {

@@ -15,7 +15,7 @@ pub struct Image<P> {
     pixels: Vec<P>,
 }
 
-/// Pixels in somebody else's memory, row by row from the top: a picture that need not be copied to be read.
+/// Borrowed pixels, row by row from the top: a picture that can be read without a copy.
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct ImageView<'a, P> {
@@ -70,7 +70,7 @@ impl<'a, P> ImageView<'a, P> {
     }
 }
 
-/// Yes or no for every pixel; [`RleMask`](crate::label::RleMask) is what label files hold of one.
+/// Yes or no for every pixel; label files hold it as an [`RleMask`](crate::label::RleMask).
 pub type Mask = Image<bool>;
 
 /// A region of interest: a half-open rectangle of whole pixels.
@@ -193,7 +193,7 @@ impl<P: Copy> Image<P> {
         (self.width, self.height)
     }
 
-    /// There is no pixel.
+    /// Whether there are no pixels.
     pub fn is_empty(&self) -> bool {
         self.pixels.is_empty()
     }
@@ -343,7 +343,7 @@ impl<P: Copy> Image<P> {
         }
     }
 
-    /// A part, in the memory of the whole.
+    /// A part, reusing the memory of the whole.
     ///
     /// # Panics
     /// When `roi` reaches outside the picture.

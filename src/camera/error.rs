@@ -10,7 +10,7 @@ pub enum SolveError {
     /// A number is NaN or infinite.
     #[error("{0}: not finite, expected a number")]
     NonFinite(&'static str),
-    /// A number is too large, or too near to zero, to mean something.
+    /// A number is too large, or too near to zero, to be meaningful.
     #[error("{at}: {value:e}, expected at most {most:e} and, if positive, at least 1/{most:e}")]
     OutOfRange {
         /// Which value.
@@ -42,7 +42,7 @@ pub enum SolveError {
     /// Neither side of the rectangle is known.
     #[error("surface: width_m and height_m are both missing, expected at least one")]
     NoScale,
-    /// Neither the sides nor the corners of the rectangle are there.
+    /// Neither the sides nor the corners of the rectangle are given.
     #[error("surface: missing corners_px (or four points on the surface), and width_m or height_m")]
     Empty,
     /// There are no corners.
@@ -59,7 +59,7 @@ pub enum SolveError {
         value: f64,
     },
     /// The albedo or the walls of a surface, the camera's height over it or its focal length are
-    /// none that it can have.
+    /// outside the plausible range.
     #[error("{at}: {what}")]
     OutOfBounds {
         /// Which value.
@@ -67,7 +67,7 @@ pub enum SolveError {
         /// What it was, and what was expected.
         what: String,
     },
-    /// There are points instead of corners, and not both sides: in words, which are missing.
+    /// There are points instead of corners, but not both sides; the text says which are missing.
     #[error("surface: points alone need width_m and height_m: {0}")]
     PointsNeedSides(&'static str),
     /// There are markers instead of corners, and none was looked for.
@@ -107,12 +107,12 @@ pub enum SolveError {
         /// The least distance.
         limit_px: f64,
     },
-    /// The corners are in another order than asked for
+    /// The corners are in another order than required
     /// ([`CornerOrder::Strict`](super::CornerOrder::Strict)).
     #[error("surface.corners_px: {0}, but the order must be right")]
     Order(Diagnostic),
     /// Photos that should be of one camera differ in the shape of the picture, or in the principal
-    /// point or k1 that their labels state, or one was cropped nobody knows where.
+    /// point or k1 that their labels state, or one was cropped at an unknown place.
     #[error(
         "photos[{photo}]: not the same camera: differs from another photo in shape, principal point or k1, or one of them \
          was cropped and states no principal point"

@@ -179,7 +179,7 @@ impl Camera {
         }
     }
 
-    /// Lines of Python that make the camera in Blender.
+    /// Python code that creates the camera in Blender.
     pub fn to_blender_script(&self) -> String {
         let blender = self.to_blender();
         let rows: Vec<String> = blender

@@ -16,7 +16,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// A solved camera as a document; numbers read back to the same bits. What is infinite is `null`.
+/// A solved camera as a document; numbers read back to the same bits. Infinite values are `null`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraFile {
@@ -84,7 +84,7 @@ pub struct FoundCamera {
     pub sigma: SigmaRecord,
     /// How well the label fits.
     pub fit: FitRecord,
-    /// Which part of what the camera took the picture was assumed to be.
+    /// Which part of the camera's full picture this one was assumed to be.
     #[serde(default)]
     pub framing: Framing,
     /// Where the focal length comes from.
@@ -179,7 +179,7 @@ pub struct FitRecord {
 }
 
 impl CameraFile {
-    /// What to write beside a label.
+    /// The file to write next to a label.
     pub fn new(label: &Label, solution: &Solution) -> Self {
         Self {
             format: CameraFormat::PlaneCamera,

@@ -12,7 +12,7 @@ use std::path::Path;
 /// corners are missing.
 ///
 /// # Errors
-/// A file that is no picture, or has pixels that are not square; a photo that does not lie in or
+/// A file that is not a picture, or has pixels that are not square; a photo that is not in or
 /// below the label's folder.
 pub fn init_label(photo: &Path, path: &Path, like: Option<&Label>) -> Result<Label> {
     let header = io::read_header(photo)?;

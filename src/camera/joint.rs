@@ -29,7 +29,7 @@ pub struct Joint {
     /// One per label: with the shared lens, alone where the photo contradicts the others, or why
     /// it could not be used.
     pub photos: Vec<Result<Solution, SolveError>>,
-    /// The photos that were left out; where nobody can tell which ones contradict the others, each
+    /// The photos that were left out; where it is unclear which ones contradict the others, each
     /// is solved alone, with a warning.
     pub outliers: Vec<OutlierPhoto>,
 }
@@ -53,7 +53,7 @@ impl OutlierPhoto {
 }
 
 /// Solves photos of one camera together: they share focal length, principal point and distortion,
-/// and photos of one surface share its sides. Distortion is an unknown of four photos or more that
+/// and photos of one surface share its sides. Distortion is an unknown where four or more photos
 /// can be used ([`Priors::joint_kappa_sigma`](super::Priors::joint_kappa_sigma)).
 ///
 /// The labels have to agree in the shape of their pictures; one may be a reduced copy. See
@@ -62,7 +62,7 @@ impl OutlierPhoto {
 ///
 /// # Errors
 /// [`SolveError::DifferentPictures`] where the shapes differ, or what is stated of the lens, or
-/// where one of several was cropped nobody knows where; the first photo's error where no photo can
+/// where one of several was cropped at an unknown place; the first photo's error where no photo can
 /// be used.
 pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, SolveError> {
     refuse_different_cameras(labels)?;
@@ -373,7 +373,7 @@ impl JointEstimate {
 
 /// Groups of labels that name the same camera and agree in the shape of their pictures and in what
 /// they state of the lens, each in order; unnamed cameras stand alone, and so do pictures that were
-/// cropped nobody knows where ([`Framing::Cropped`] without a principal point).
+/// cropped at an unknown place ([`Framing::Cropped`] without a principal point).
 pub fn group_by_camera(labels: &[Label]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, label) in labels.iter().enumerate() {

@@ -6,8 +6,8 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
-/// The corners of a flat rectangle of known size in a photo, and what is known of the camera that
-/// took it.
+/// The corners of a flat rectangle of known size in a photo, and what is known about the camera
+/// that took it.
 ///
 /// In files an unknown key is an error, except where it starts with `_`: those are comments. Values
 /// are as a person wrote them; [`camera::solve`](crate::camera::solve) checks them.
@@ -26,7 +26,7 @@ pub struct Label {
     pub pixel_origin: PixelOrigin,
     /// The rectangle.
     pub surface: LabelSurface,
-    /// What is known of the camera.
+    /// What is known about the camera.
     #[serde(default)]
     pub camera: LabelCamera,
     /// Further points of the same photo.
@@ -66,7 +66,7 @@ pub struct LabelImage {
     pub crop: Option<Crop>,
 }
 
-/// Which part of the picture that its camera took a picture is.
+/// Which part of its camera's full picture a picture is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Framing {
@@ -129,7 +129,7 @@ pub struct LabelSurface {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
     /// Share of the light that the surface reflects: 0.04 for black plastic, 0.2 for mid grey, 0.8
-    /// for white paper; or its colour, which tells that of the light too.
+    /// for white paper; or its colour, which also gives that of the light.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub albedo: Option<Albedo>,
     /// The walls on all its sides, where it has any.
@@ -149,7 +149,7 @@ pub struct LabelWall {
     pub slope_deg: Option<f64>,
 }
 
-/// What is known of the camera of a label.
+/// What is known about the camera of a label.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LabelCamera {
@@ -159,7 +159,7 @@ pub struct LabelCamera {
     /// Focal length, pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focal_px: Option<f64>,
-    /// Focal length as a 35 mm camera's, millimetres, as in EXIF data.
+    /// 35 mm equivalent focal length, millimetres, as in EXIF data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focal_35mm: Option<f64>,
     /// Relative standard deviation of the focal length.
@@ -206,7 +206,7 @@ pub struct LabelPoint {
 pub struct MarkerMap {
     /// Dictionary of the markers: `tag36h11`, `DICT_4X4_50`.
     pub family: String,
-    /// Whose pictures were printed. Default: `apriltag`.
+    /// Whose marker pictures were printed. Default: `apriltag`.
     #[serde(default)]
     pub artwork: Artwork,
     /// Side of a marker's black square, metres.
@@ -271,7 +271,7 @@ impl Label {
         Point2::from(center) - Vector2::from(offset_px)
     }
 
-    /// Which part of the picture that the camera took this one is.
+    /// Which part of its camera's full picture this one is.
     pub fn framing(&self) -> Framing {
         let camera = &self.camera;
         let states_principal_point =
@@ -296,7 +296,7 @@ impl Label {
 }
 
 impl LabelPoint {
-    /// It was found as the corner of a printed marker, as its note says.
+    /// Whether it was found as the corner of a printed marker, according to its note.
     pub fn is_marker_corner(&self) -> bool {
         let note = self.note.as_deref().unwrap_or_default();
         let number = note.strip_prefix("marker ");

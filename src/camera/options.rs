@@ -14,11 +14,11 @@ pub struct SolveOptions {
     /// Height of the objects that will stand on the surface, metres. Default: a tenth of the
     /// shorter side.
     pub reference_height: Option<f64>,
-    /// Warn where a point at that height is known no better than to this, pixels. Default: 0.0015
+    /// Warn where the error of a point at that height exceeds this, pixels. Default: 0.0015
     /// picture diagonals.
     pub max_height_sigma_px: Option<f64>,
-    /// Largest number of iterations of the refinement, from the closed form alone; 0 is the closed
-    /// form itself. Default: none, from every start until nothing changes any more.
+    /// Maximum number of refinement iterations, from the closed form only; 0 is the closed form
+    /// itself. Default: no limit, from every start until nothing changes.
     ///
     /// With a limit, other poses are not searched for, EXIF data and the order of the sides are
     /// trusted, and the standard deviations are those at the last iteration.
@@ -33,7 +33,7 @@ pub enum CornerOrder {
     Repair,
     /// Refuse them.
     Strict,
-    /// Put them in order, and exchange width and height where that fits the picture clearly better.
+    /// Put them in order, and swap width and height where that fits the picture clearly better.
     Auto,
 }
 
@@ -42,7 +42,7 @@ pub enum CornerOrder {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Priors {
     /// Relative, of an unknown focal length; its median is the picture's longer side.
-    /// Default: 0.35 (two lenses of three are between 25 and 51 mm equivalent).
+    /// Default: 0.35 (two out of three lenses are between 25 and 51 mm equivalent).
     pub focal_sigma: f64,
     /// Of the principal point of a whole picture, in picture diagonals. Default: 0.005.
     pub principal_sigma: f64,
@@ -52,7 +52,7 @@ pub struct Priors {
     pub cropped_sigma: f64,
     /// Relative, of the ratio of the sides. Default: 0.005.
     pub ratio_sigma: f64,
-    /// Of the radial distortion. Default: 0, the picture is a pinhole's.
+    /// Of the radial distortion. Default: 0, a pinhole camera.
     pub kappa_sigma: f64,
     /// Of the radial distortion that four or more photos of one camera share, where that is
     /// smaller. Default: 0.01, as lenses have it at the corner of the picture.

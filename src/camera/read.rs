@@ -25,7 +25,7 @@ const CAMERA_FORMAT: &str = "plane-camera";
 /// from the resolution of a sensor: of a picture of half the size it is twice as long.
 const ROUGH_FOCAL_SIGMA: f64 = 0.25;
 
-/// A label, and where it and its camera lie.
+/// A label, and where it and its camera are stored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelledPhoto {
     /// The label, completed with its photo's EXIF data.
@@ -58,7 +58,7 @@ impl LabelledPhoto {
             .replace('\\', "/")
     }
 
-    /// Its photo, where that is there.
+    /// Its photo, if that exists.
     pub fn photo(&self) -> Option<PathBuf> {
         photo_of(&self.label, &self.source)
     }
@@ -110,9 +110,9 @@ pub fn read_label(path: impl AsRef<Path>) -> Result<Label> {
 /// metres, for labels without them.
 ///
 /// # Errors
-/// A file that cannot be read or understood, a photo instead of a label among them; a photo that
-/// has another size than its label says, or pixels that are not square, or a path that leads out of
-/// the label's folder; two photos of one name.
+/// A file that cannot be read or understood, or is a photo instead of a label; a photo whose size
+/// differs from its label's, whose pixels are not square, or whose path leads out of the label's
+/// folder; two photos of one name.
 pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec<LabelledPhoto>> {
     let path = path.as_ref();
     let text = label_text(path)?;
@@ -253,7 +253,7 @@ fn ends_with(path: &Path, suffix: &str) -> bool {
         .is_some_and(|name| name.to_string_lossy().ends_with(suffix))
 }
 
-/// A file that is called a camera, as patterns such as `*.json` take in beside the labels.
+/// Whether a file is named as a camera file; patterns such as `*.json` match these, too.
 pub fn is_called_camera(path: &Path) -> bool {
     ends_with(path, CAMERA_SUFFIX)
 }
@@ -543,7 +543,7 @@ fn check_side(at: &str, metres: Option<f64>) -> Result<()> {
 /// follows from the label's lengths.
 ///
 /// # Errors
-/// That width and height are exchanged ([`Solution::misfit`]), where that is why it is so far; else
+/// [`Solution::misfit`] where swapped width and height explain the distance; otherwise
 /// [`Error::Value`] with the distance.
 pub fn check_distance(solution: &Solution) -> Result<()> {
     check_camera_distance(&solution.camera).map_err(|too_far| match solution.misfit() {

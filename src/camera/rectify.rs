@@ -67,7 +67,7 @@ fn map_size(size: [f64; 2], px_per_metre: f64) -> Result<[f64; 2]> {
 }
 
 /// The photo that the camera takes of a picture lying on the rectangle of `size` metres, bent by
-/// OpenCV's `k1`; empty beside it.
+/// OpenCV's `k1`; empty outside the rectangle.
 pub fn project_picture<P: Mix>(
     picture: &Pyramid<P>,
     camera: &Camera,

@@ -45,11 +45,11 @@ pub struct Solution {
     pub size: [f64; 2],
     /// The corners as used: clockwise from the labelled first, pixels from the picture's corner.
     pub corners_px: [Point2<f64>; 4],
-    /// Which part of what the camera took the picture is assumed to be.
+    /// Which part of the camera's full picture this one is assumed to be.
     pub framing: Framing,
     /// Where the focal length comes from.
     pub focal_source: FocalSource,
-    /// What the prior and the picture say of the focal length.
+    /// What the prior and the picture say about the focal length.
     pub focal: FocalFinding,
     /// Root mean square distance of the rectangle's projected corners from the labelled ones, or
     /// of the labelled points where no corners are, pixels.
@@ -64,10 +64,10 @@ pub struct Solution {
     pub alternative: Option<Box<Solution>>,
 }
 
-/// What the prior and the picture say of the focal length.
+/// What the prior and the picture say about the focal length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FocalFinding {
-    /// Part of the information that comes from the picture, 0 to 1.
+    /// Share of the information that comes from the picture, 0 to 1.
     pub share: f64,
     /// The prior, pixels, and its relative standard deviation (infinite where it is flat).
     pub prior_px: f64,
@@ -87,12 +87,12 @@ pub struct Fit {
     pub dof: usize,
     /// Probability of a larger sum by chance; none without degrees of freedom.
     pub p_value: Option<f64>,
-    /// Chi squared with width and height exchanged, where that fits clearly better.
+    /// Chi squared with width and height swapped, where that fits clearly better.
     pub exchanged_chi2: Option<f64>,
     /// Height of the camera above the surface as labelled, and without that, metres, where the
     /// label fits only without it.
     pub heights_m: Option<[f64; 2]>,
-    /// Distance of each corner from where it was labelled, pixels; none where points alone were.
+    /// Distance of each corner from where it was labelled, pixels; none where only points were.
     pub per_corner_px: Option<[f64; 4]>,
     /// Iterations of the refinement.
     pub iterations: usize,
@@ -297,13 +297,13 @@ impl Solution {
     /// The solution, unless it does not fit its label.
     ///
     /// # Errors
-    /// [`SolveError::NoFit`], which says what would repair it.
+    /// [`SolveError::NoFit`], which says what would fix it.
     pub fn fitting(self) -> Result<Self, SolveError> {
         self.misfit().map_or(Ok(self), Err)
     }
 
     /// Why the solution does not fit its label, where it does not: so improbable by chance, or so
-    /// much better with the sides exchanged, that it cannot be used.
+    /// much better with the sides swapped, that it cannot be used.
     pub fn misfit(&self) -> Option<SolveError> {
         let exchanged = self
             .fit

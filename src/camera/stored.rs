@@ -1,4 +1,4 @@
-//! Cameras that were solved before and lie beside their labels, and whether they still match them.
+//! Cameras that were solved before and stored next to their labels, and whether they still match them.
 
 use super::error::SolveError;
 use super::file::{CameraFile, SolvedFrom, checksum, has_checksum};
@@ -26,7 +26,7 @@ pub struct PhotoCamera {
     pub size: [f64; 2],
     /// Warnings to review.
     pub warnings: Vec<Diagnostic>,
-    /// The camera was read from `NAME.camera.json`, not solved anew.
+    /// The camera was read from `NAME.camera.json`, not solved again.
     pub stored: bool,
     /// Why a stored camera was not used.
     pub stale: Option<String>,

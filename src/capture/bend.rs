@@ -1,12 +1,12 @@
-//! Where the light comes from that an object lets pass, and where that is known.
+//! Where the light that passes an object comes from, and where that is known.
 //!
 //! # Method
-//! Stripes of a period tell one value of the optical transfer function of each pixel: what is left
+//! Stripes of a period give one value of the optical transfer function of each pixel: what is left
 //! of their contrast, and by how much they are shifted. Light that goes through the object as
 //! through a clear sheet leaves the contrast of fine stripes; what folds and wrinkles scatter leaves
 //! none, but some of that of coarse ones. So what fine stripes keep is the share that stays sharp,
-//! their shift its displacement, and the rest of the coarse transfer tells middle and width of what
-//! is scattered, taken for a Gaussian.
+//! their shift its displacement, and the rest of the coarse transfer gives middle and width of what
+//! is scattered, modelled as a Gaussian.
 
 use super::display::Display;
 use super::stripes::{SeenStripes, Wave};

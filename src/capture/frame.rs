@@ -8,11 +8,11 @@ pub(super) const SHIFTS: usize = 4;
 /// One picture that the display shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Frame {
-    /// No light but the markers'.
+    /// No light except that of the markers.
     Black,
-    /// All the light there is.
+    /// Full light.
     White,
-    /// Light that swings along one axis.
+    /// Light that oscillates along one axis.
     Stripes(Stripes),
 }
 

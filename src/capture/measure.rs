@@ -1,4 +1,4 @@
-//! What an object on a display lets through, reflects and bends.
+//! The light that an object on a display lets through, reflects and bends.
 
 use super::bend::{BendInput, Refraction};
 use super::check;
@@ -44,14 +44,14 @@ const KEPT_RIM_PX: f64 = 1.5;
 /// Softness of the end of that, standard deviation in pixels.
 const RIM_SOFTNESS_PX: f32 = 0.6;
 
-/// Solves for the object that the photos of a capture show; `empty` are photos without it, where
-/// there are some.
+/// Solves for the object that the photos of a capture show; `empty` are photos without it, if
+/// any.
 ///
 /// # Errors
 /// Those of reading photos; [`Error::Photo`](crate::Error::Photo) where the black or the white
 /// frame is missing, photos of a frame show different things, white is clipped or uneven, no object
 /// or more than one lies within the display, one of several black photos lacks it, or photos with
-/// it and without are exchanged.
+/// and without it are swapped.
 pub fn measure(
     display: &Display,
     view: &View,

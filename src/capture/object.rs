@@ -1,4 +1,4 @@
-//! Where the object is: where the display looks otherwise than empty.
+//! Where the object is: where the display differs from the empty one.
 
 use super::recognise::refused;
 use super::view::{grey, where_set};

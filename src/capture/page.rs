@@ -9,7 +9,7 @@ use maud::{DOCTYPE, PreEscaped, html};
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
-/// A page that shows frames one after the other, by key, by click or by a timer; `frames` are their
+/// A page that shows frames one after the other, by key press, click or timer; `frames` are their
 /// PNG files in order.
 pub fn page(display: &Display, frames: &[(Frame, Vec<u8>)]) -> String {
     let [w, h] = display.size_px;

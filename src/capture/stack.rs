@@ -15,10 +15,10 @@ use crate::image::{Image, Mask};
 use crate::pixel::{LinearRgb, Mix};
 use rayon::prelude::*;
 
-/// Photos that are read when they are needed.
+/// Photos that are read on demand.
 #[derive(Clone, Copy)]
 pub struct Sources<'a> {
-    /// What messages call them.
+    /// Their names in messages.
     pub names: &'a [String],
     /// Reads one, scene-linear.
     pub read: &'a (dyn Fn(usize) -> Result<Image<LinearRgb>> + Sync),
@@ -45,7 +45,7 @@ impl Sources<'_> {
     }
 }
 
-/// The photos of a capture, and what is known of each.
+/// The photos of a capture, and what is known about each.
 pub struct Photos<'a> {
     /// Where their pixels are.
     pub sources: Sources<'a>,

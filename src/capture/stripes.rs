@@ -2,7 +2,7 @@
 //!
 //! # Method
 //! Phase `atan2(I_4 - I_2, I_1 - I_3)` and amplitude of a sinusoid at quarter shifts (Wyant 1975);
-//! the coarse stripes tell the period of the fine ones. Even harmonics, which a display's curve
+//! the coarse stripes give the period of the fine ones. Even harmonics, which a display's curve
 //! makes, cancel.
 
 use super::display::Display;

@@ -15,14 +15,14 @@ const PAGE: &str = "show.html";
 pub(super) const DISPLAY: &str = "display.toml";
 
 /// Writes the frames as PNG files, a page that shows them and `display.toml` into a folder, which
-/// is made if it is not there; returns the path of the page. Frames that lie there from before and
-/// are none of these are removed.
+/// is created if missing; returns the path of the page. Frames of an earlier set that are not in
+/// this one are removed.
 ///
 /// A display without a width keeps the one that was written into the folder's `display.toml`.
 ///
 /// # Errors
-/// [`Error::Value`](crate::Error::Value) for a display that cannot be right; those of reading the
-/// `display.toml` that is there, and of writing.
+/// [`Error::Value`](crate::Error::Value) for a display that cannot be right; those of reading an
+/// existing `display.toml`, and of writing.
 pub fn write_frames(folder: &Path, display: &Display, with_stripes: bool) -> Result<PathBuf> {
     display.check()?;
     let display = &with_known_width(display, &folder.join(DISPLAY))?;

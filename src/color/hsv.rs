@@ -23,7 +23,7 @@ const WHOLE_TURNS: f32 = 12_582_912.0;
 /// Hue, saturation and value of a colour; the largest channel may be above 1 and any channel below
 /// 0.
 ///
-/// The inverse is exact up to rounding, but for one case: where the largest channel is exactly 0
+/// The inverse is exact up to rounding, with one exception: where the largest channel is exactly 0
 /// saturation has no value, and the colour becomes black.
 ///
 /// # Method
@@ -55,7 +55,7 @@ fn hue_sixths(c: LinearRgb, largest: f32, spread: f32) -> f32 {
     }
 }
 
-/// The colour of a hue, saturation and value; whole turns of the hue fall away, up to 2^22 of them.
+/// The colour of a hue, saturation and value; whole turns of the hue are ignored, up to 2^22 of them.
 #[inline(always)]
 pub fn hsv_to_rgb(c: Hsv) -> LinearRgb {
     let sixths = 6.0 * turn(c.h);
@@ -67,10 +67,10 @@ pub fn hsv_to_rgb(c: Hsv) -> LinearRgb {
 
 /// The colour turned in hue, its saturation and value multiplied.
 ///
-/// `hue_deg` is added to the hue, in degrees; `saturation` and `value` are factors. Saturation ends
-/// at 1, negative results at 0, and nothing ends at the top. A colour times k gives the result
-/// times k, so premultiplied colour may be passed as it is. No change asked (0, 1, 1) returns the
-/// colour as it came.
+/// `hue_deg` is added to the hue, in degrees; `saturation` and `value` are factors. Saturation is
+/// clipped to 1, negative results to 0, and nothing at the top. A colour times k gives the result
+/// times k, so premultiplied colour may be passed as it is. The values (0, 1, 1) return the
+/// colour unchanged.
 ///
 /// # Method
 /// Cycles' Hue Saturation Value node on linear colour, factor 1 (Blender 3.4 and 4.5 agree within

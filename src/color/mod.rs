@@ -1,7 +1,7 @@
 //! Colour: transfer curves, primaries, hue and saturation, exactly.
 //!
 //! The library works in scene-linear light with Rec. 709 primaries and white D65
-//! ([`LinearRgb`](crate::LinearRgb)). Everything else is met at a border and converted there, once:
+//! ([`LinearRgb`](crate::LinearRgb)). Everything else is converted once, where it enters or leaves:
 //! display values by [`decode_srgb8`] and [`encode_srgb8`], other primaries by a [`ColorMatrix`].
 //!
 //! Curves are computed through the `libm` crate in `f64` and rounded once, never through the

@@ -1,8 +1,8 @@
 //! Filters on pictures whose pixels may be averaged (`Mix`), and on masks.
 //!
 //! One border rule for all: the window is cut off at the border and what is left of it is averaged
-//! (or, of a mask, looked at). No filter invents pixels outside the picture, so a constant picture
-//! stays constant. The exception is named for it: `sample_bilinear`, to which the outside is empty.
+//! (or, for a mask, inspected). No filter invents pixels outside the picture, so a constant picture
+//! stays constant. The exception is `sample_bilinear`, which treats the outside as empty.
 //!
 //! Every filter takes a picture of any size, the empty one included, and gives the same bits at any
 //! thread count.

@@ -7,8 +7,8 @@ use crate::pixel::Mix;
 use crate::work::{self, Kind};
 use std::sync::OnceLock;
 
-/// A picture at half the size, and half of that, down to one pixel; levels are made when they are
-/// first asked for.
+/// A picture at half the size, and half of that, down to one pixel; levels are computed on first
+/// use.
 ///
 /// Each level is the 2 x 2 average of the one before ([`halve`]).
 #[derive(Debug, Default)]
@@ -37,7 +37,7 @@ impl<P: Mix> Pyramid<P> {
         self.halves.len() + 1
     }
 
-    /// The picture halved `level` times; the smallest there is for a larger `level`.
+    /// The picture halved `level` times; the smallest level for a larger `level`.
     pub fn level(&self, level: usize) -> &Image<P> {
         let Some(n) = level.min(self.halves.len()).checked_sub(1) else {
             return &self.base;

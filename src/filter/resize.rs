@@ -6,7 +6,7 @@ use crate::pixel::Mix;
 use crate::work::{self, Kind};
 
 /// A picture of another size: smoothly averaged where it shrinks, bilinear where it grows,
-/// untouched where it stays.
+/// unchanged at the same size.
 ///
 /// # Method
 /// A triangle as wide as the scale, on pixel centres: its half width is one input pixel when the

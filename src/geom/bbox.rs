@@ -17,7 +17,7 @@ pub struct BBox {
 }
 
 impl BBox {
-    /// Nothing is inside.
+    /// Whether nothing is inside.
     pub fn is_empty(&self) -> bool {
         self.width() <= 0.0 || self.height() <= 0.0
     }
@@ -37,7 +37,7 @@ impl BBox {
         Point2::new(0.5 * (self.x0 + self.x1), 0.5 * (self.y0 + self.y1))
     }
 
-    /// `other` lies inside, edges included; an empty box lies inside every box.
+    /// Whether `other` lies inside, edges included; an empty box lies inside every box.
     pub fn contains(&self, other: &Self) -> bool {
         let inside = self.x0 <= other.x0
             && self.y0 <= other.y0
@@ -46,7 +46,7 @@ impl BBox {
         other.is_empty() || inside
     }
 
-    /// The two share more than an edge.
+    /// Whether the two share more than an edge.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.x0 < other.x1 && other.x0 < self.x1 && self.y0 < other.y1 && other.y0 < self.y1
     }

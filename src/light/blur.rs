@@ -38,8 +38,8 @@ const BLUR_RATIO: f64 = 1.05;
 /// Slopes before and after another blur (S. Zhuo and T. Sim, "Defocus map estimation from a single
 /// image", 2011), at the steepest edges of the picture that stand alone; the lower quartile, since
 /// things have soft edges of their own. Where too few stand alone they are too soft for their
-/// pixels, and are looked at in squares of 2, 3 or 4 pixels: of a plain surface the soft rim of a
-/// shadow is then taken for the photo's blur.
+/// pixels, and are looked at in squares of 2, 3 or 4 pixels: on a plain surface the soft rim of a
+/// shadow is then mistaken for the photo's blur.
 pub fn plate_blur(plate: &Image<LinearRgb>) -> Blur {
     let found = (1..=MAX_SIDE_PX).find_map(|side| blur_in_squares(plate, side));
     found.map_or(Blur::NONE, Blur::Known)

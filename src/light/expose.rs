@@ -16,10 +16,10 @@ use crate::scene::{EnvironmentMap, Exposure, Scene};
 /// paper.
 const WHITE_PERCENTILE: f64 = 0.99;
 
-/// Estimates what a scene leaves to its plate: where its light stands, the colour of the light,
+/// Estimates what a scene leaves to its plate: the position of its light, the colour of the light,
 /// how it is spread, the exposure, the blur, the noise.
 ///
-/// `environment` is the map that the scene names. A scene that leaves nothing comes back as it is.
+/// `environment` is the map that the scene names. A scene that leaves nothing is returned unchanged.
 pub fn match_plate<'a>(
     scene: Scene,
     plate: impl Into<MeasuredPlate<'a>>,
@@ -32,10 +32,10 @@ pub fn match_plate<'a>(
 }
 
 /// Turns [`Exposure::MatchPlate`] and [`Exposure::MatchSurface`] into [`Exposure::Ev`]; a scene
-/// whose exposure is known comes back as it is.
+/// whose exposure is known is returned unchanged.
 ///
 /// A matte white card (albedo 1) in the middle of the surface, under the scene's lights and its
-/// environment map with nothing in their way, gets the luminance of `plate_white`, times `2^gain_ev`.
+/// environment map with nothing in the way, gets the luminance of `plate_white`, times `2^gain_ev`.
 ///
 /// This is an assumption, not a measurement: one photograph does not show which of its pixels are
 /// white paper. It holds where the photo was exposed for the place and shows something bright; the

@@ -21,7 +21,7 @@ pub(crate) struct PlateMeasures {
     surface: OnceLock<(SurfaceView, Option<SurfaceLight>)>,
 }
 
-/// A plate, and where what was measured of it is kept; without such a place it is measured each time.
+/// A plate and a cache for what was measured of it; without a cache it is measured each time.
 #[derive(Clone, Copy, Debug)]
 pub struct MeasuredPlate<'a> {
     pub(super) image: &'a Image<LinearRgb>,

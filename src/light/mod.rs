@@ -1,6 +1,6 @@
 //! Light: area lights, ambient, and the exposure that makes rendered light match a plate.
 //!
-//! There are three questions to a light: how bright it is (`radiance`), where it is sampled
+//! A light answers three questions: how bright it is (`radiance`), where it is sampled
 //! (`nodes`) and, where nothing is in the way, what it does in closed form ([`polygon_irradiance`],
 //! `irradiance`). [`match_plate`] is the stage: it turns what a scene leaves to its plate
 //! (exposure, colour of the light, blur, noise) into numbers.

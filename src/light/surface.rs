@@ -95,12 +95,12 @@ fn median_of(
     median(seen.iter().map(|(_, color)| channel(color)), f32::total_cmp)
 }
 
-/// Turns [`LightTint::MatchSurface`] into the colour of the surface's light; any other scene comes
-/// back as it is.
+/// Turns [`LightTint::MatchSurface`] into the colour of the surface's light; any other scene is
+/// returned unchanged.
 ///
-/// What the surface has beside its own albedo is the colour of the light on it. Where that albedo
+/// The colour of the surface beyond its own albedo is the colour of the light on it. Where that albedo
 /// is not known the surface counts as grey, and a share below 1 takes only a part, since trays and
-/// tables may have a colour of their own. Luminance stays.
+/// tables may have a colour of their own. Luminance is unchanged.
 pub fn match_light_tint<'a>(scene: Scene, plate: impl Into<MeasuredPlate<'a>>) -> Scene {
     let LightTint::MatchSurface { share, albedo } = scene.cast else {
         return scene;

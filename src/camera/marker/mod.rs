@@ -1,5 +1,5 @@
 //! Printed square markers in a photo, with corners to a fraction of a pixel: ArUco `DICT_4X4_50` by
-//! our own means, AprilTags (`tag36h11`) by the AprilTag library where petcomp is built with the
+//! our own detector, AprilTags (`tag36h11`) by the AprilTag library where petcomp is built with the
 //! feature `markers`.
 //!
 //! # Method
@@ -109,8 +109,8 @@ pub fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
 /// that it had before are dropped.
 ///
 /// Where the corners fit the map only when every marker is turned by the same angle, they are
-/// turned, with a message in the log: another program's artwork was printed, or the map's axes are
-/// other ones.
+/// turned, with a message in the log: another program's artwork was printed, or the map has other
+/// axes.
 ///
 /// # Errors
 /// [`Error::Value`] for a label without a marker map, one of a family that is not known or without
