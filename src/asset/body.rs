@@ -1,4 +1,4 @@
-//! What is known of the body of an object that falls.
+//! What is known about the body of an object that falls.
 
 /// Thickness and mass, where they are known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

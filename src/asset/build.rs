@@ -1,4 +1,4 @@
-//! Many photos into an asset folder, from a list.
+//! Builds an asset folder from a list of photos.
 
 use super::contact_sheet::remove_contact_sheet;
 use super::entry::PhotoEntry;
@@ -24,11 +24,11 @@ const BYTES_PER_PIXEL: u64 = 140;
 /// What [`build`] did.
 #[derive(Clone, Debug)]
 pub struct Built {
-    /// All that the folder holds now, as [`Library::open`] would read it.
+    /// Everything that the folder holds now, as [`Library::open`] would read it.
     pub library: Library,
     /// Photos that are cut out.
     pub photos: usize,
-    /// How many of these cut-outs were there before.
+    /// How many of these cut-outs existed before.
     pub kept: usize,
     /// Lengths of the objects that were cut out and lie wholly in their photos, with their standard
     /// errors, metres, in the order of the list.
@@ -37,27 +37,27 @@ pub struct Built {
     pub refused: Vec<String>,
     /// How many of these a person rejected.
     pub rejected: usize,
-    /// Cut-outs that the folder has of photos that are not in the list.
+    /// Cut-outs in the folder whose photos are not in the list.
     pub unlisted: Vec<String>,
     /// Cut-outs that a person should review; their diagnostics say why.
     pub needs_review: Vec<PhotoRecord>,
 }
 
-/// Cuts all photos of a list out, several at a time, into an asset folder, which is made if it is
-/// not there.
+/// Cuts all photos of a list out, several at a time, into an asset folder, which is created if
+/// missing.
 ///
 /// `list` is a TOML or CSV file, or a folder with `photos.toml` or `photos.csv` in it. A photo
 /// without a usable object, or one that a person rejected, is left out and reported in
-/// [`Built::refused`]; an earlier cut-out of it stays, and goes only where a person rejected it.
+/// [`Built::refused`]; an earlier cut-out of it is kept, and removed only where a person rejected it.
 ///
 /// `progress` is called with the photos done and their number, at the start and after each photo,
-/// from several threads. What the folder has of other photos stays ([`Built::unlisted`]); a photo
-/// that it already has is replaced, and a contact sheet of other cut-outs goes. The manifest does
-/// not depend on threads; it takes in what is done every 10 s, so that [`resume`] need not begin
-/// anew. Once `stop` is true, photos in hand are finished and no more are begun.
+/// from several threads. Cut-outs of other photos are kept ([`Built::unlisted`]); a photo
+/// that the folder already has is replaced, and a contact sheet of other cut-outs is removed. The
+/// manifest does not depend on threads; it is updated every 10 s, so that [`resume`] need not start
+/// over. Once `stop` is true, photos in progress are finished and no more are begun.
 ///
 /// # Errors
-/// A list that cannot be read or be right, or a photo that is missing or lies where a file of the
+/// A list that cannot be read or is wrong, or a photo that is missing or is where a file of the
 /// folder would be written (before any work); the first photo that cannot be read (the cut-outs of
 /// the others are in the folder), or [`Error::File`] where no photo gives a cut-out and a person did
 /// not reject all of them; [`Error::Interrupted`] after a stop; those of [`Library::open`]
@@ -77,8 +77,8 @@ pub fn build(
     )
 }
 
-/// The same, but cut-outs that the folder has already stay as they are: those of the same photo,
-/// entry, options and version of the program.
+/// The same, but cut-outs that the folder already has are kept: those of the same photo, entry,
+/// options and version of the program.
 ///
 /// # Errors
 /// As [`build`].

@@ -7,7 +7,7 @@ use crate::io;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The photos of a capture beside that of the entry, and the display that showed the frames.
+/// The photos of a capture in addition to that of the entry, and the display that showed the frames.
 ///
 /// ```toml
 /// [[photos]]
@@ -25,7 +25,7 @@ pub struct CaptureEntry {
     /// The other photos of the object, in any order. In a list: relative to it.
     pub photos: Vec<PathBuf>,
     /// Photos of the same frames without the object, from the same place. Default: none; the empty
-    /// display is fitted to what is seen of it.
+    /// display is fitted to the part of it that is seen.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub empty: Vec<PathBuf>,
     /// What `petcomp capture frames` wrote about the display. Default: `display.toml` beside the

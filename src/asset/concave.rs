@@ -1,4 +1,4 @@
-//! Objects that their convex hull does not stand for.
+//! Objects that their convex hull does not represent.
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::matte::Outline;

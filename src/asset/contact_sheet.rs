@@ -1,5 +1,5 @@
 //! Sheets of all cut-outs of a folder over four backgrounds, so that a person sees faults at once;
-//! of captured ones what was measured, too.
+//! for captured ones also what was measured.
 
 use super::flow_sheet;
 use super::library::{Library, Photo};
@@ -49,7 +49,7 @@ const COLUMN_WIDTH_PX: usize = STRIP_WIDTH_PX + 2 * GAP_PX;
 
 /// Every cut-out over a checkerboard, black, white and green, with its size, the confidence in
 /// outline and colour, and why it needs a review: one page at least, of at most 16,384 pixels
-/// height. A page is drawn when it is asked for, so that memory does not grow with their number.
+/// height. A page is drawn on demand, so that memory does not grow with their number.
 ///
 /// # Errors
 /// Those of [`Photo::pixels`], for a page that shows it.
@@ -58,7 +58,7 @@ pub fn contact_sheets(library: &Library) -> impl ExactSizeIterator<Item = Result
     pages.map(|photos| page(&photos))
 }
 
-/// Where a page of a contact sheet lies, counted from 0; the first lies at the given path.
+/// Path of a page of a contact sheet, counted from 0; the first has the given path.
 pub fn contact_sheet_page(first: &Path, page: usize) -> PathBuf {
     if page == 0 {
         return first.into();

@@ -1,4 +1,4 @@
-//! A photo and what is known of its object.
+//! A photo and what is known about its object.
 
 use super::body::KnownBody;
 use super::capture_entry::CaptureEntry;
@@ -23,12 +23,11 @@ pub struct PhotoEntry {
     pub file: PathBuf,
     /// Name of the object: letters and digits of any language, `_`, `-` and `.`.
     pub asset: String,
-    /// What the object is in pictures for: `object`, or `distractor` for what only hides others.
+    /// Purpose of the object in pictures: `object`, or `distractor` for what only hides others.
     /// Default: `object`.
     #[serde(default, skip_serializing_if = "Role::is_object")]
     pub role: Role,
-    /// Name of its class. Of a distractor, which is labelled as none, a word for people; it may be
-    /// missing.
+    /// Name of its class. For a distractor, which is not labelled, an optional word for people.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub class: String,
     /// Pixels of the photo for a metre, at half the object's height.
@@ -48,7 +47,7 @@ pub struct PhotoEntry {
     /// Or: width and height of the whole screen, metres, all of which is seen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub screen_size: Option<[f64; 2]>,
-    /// Its corners, from the top left clockwise, pixels. Default: they are found.
+    /// Its corners, from the top left clockwise, pixels. Default: found automatically.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub screen_corners: Option<[[f64; 2]; 4]>,
     /// Or: side of the black square of a printed marker on the screen, metres.
@@ -61,12 +60,12 @@ pub struct PhotoEntry {
     /// Default: `auto`.
     #[serde(default)]
     pub screen: ScreenSource,
-    /// How its matte is made: `physical`, `key`, or `outline` for what lets no light through. Default:
+    /// How its matte is made: `physical`, `key`, or `outline` for opaque objects. Default:
     /// that of the list.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub matte: Option<MatteMethod>,
-    /// Thickness of the body that falls, metres. Default: what another photo of the asset in the
-    /// list says, or else the folder, or else 0.005.
+    /// Thickness of the body that falls, metres. Default: that of another photo of the asset in the
+    /// list, or else in the folder, or else 0.005.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thickness: Option<f64>,
     /// Mass, kilograms. Default: in the same way, or else 0.025.
@@ -75,7 +74,7 @@ pub struct PhotoEntry {
 }
 
 impl PhotoEntry {
-    /// A photo of an object whose thickness and mass it does not tell.
+    /// A photo of an object, without thickness and mass.
     pub fn new(
         file: impl Into<PathBuf>,
         asset: impl Into<String>,

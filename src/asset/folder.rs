@@ -30,17 +30,17 @@ use std::path::Path;
 /// would lock nothing.
 const LOCK: &str = ".lock";
 
-/// Cuts the object out of a photo and adds it to an asset folder, which is made if it is not there.
+/// Cuts the object out of a photo and adds it to an asset folder, which is created if missing.
 ///
-/// `classes` are the names of the folder's classes in order, where they are declared; where there
-/// are none, a class that the folder does not have comes behind those that it has.
+/// `classes` are the names of the folder's classes in order, where they are declared; without them,
+/// a class that the folder does not have is added behind those that it has.
 ///
-/// Adding the same photo to the same asset again replaces it; where it gives no cut-out any more,
-/// the earlier one stays, and goes only where a person rejected it. The manifest is written last,
+/// Adding the same photo to the same asset again replaces it; where it no longer gives a cut-out,
+/// the earlier one is kept, and removed only where a person rejected it. The manifest is written last,
 /// whole or not at all. Several processes may add to one folder at a time.
 ///
 /// # Errors
-/// [`Error::Value`] for a wrong name, class or size; [`Error::File`] for a photo that lies where its
+/// [`Error::Value`] for a wrong name, class or size; [`Error::File`] for a photo that is where its
 /// cut-out would be written; those of reading the photo and of
 /// [`cut_out`](crate::matte::cut_out), naming the photo; those of writing.
 pub fn add_photo(

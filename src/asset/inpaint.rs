@@ -1,4 +1,4 @@
-//! Painting over what is not to be seen in a photo.
+//! Painting over what must not be seen in a photo.
 
 use crate::camera::square_from_corners;
 use crate::filter::sample_bilinear_clamped;

@@ -1,4 +1,4 @@
-//! Whether a cut-out would be made as it was made before.
+//! Whether a cut-out would be made from the same inputs as before.
 
 use super::entry::PhotoEntry;
 use super::review::Review;

@@ -52,8 +52,8 @@ impl Library {
         Self::open_some(folder, |_| true)
     }
 
-    /// The same with only the assets whose names are wanted; the entries of the others are checked,
-    /// too.
+    /// The same with only the assets whose names are wanted; the entries of the others are also
+    /// checked.
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -105,15 +105,15 @@ impl Library {
         checked.into_iter().collect()
     }
 
-    /// The asset of a name.
+    /// The asset with a name.
     pub fn find(&self, name: &str) -> Option<&Asset<Photo>> {
         self.assets.iter().find(|asset| asset.name == name)
     }
 
-    /// Place of an asset's class in the list; none of a distractor.
+    /// Place of an asset's class in the list; none for a distractor.
     ///
     /// # Panics
-    /// When the asset is none of this library and has a class of its own.
+    /// When the asset is not in this library and has a class that the library does not have.
     pub fn class_number(&self, asset: &Asset<Photo>) -> Option<u32> {
         let class = asset.label_class()?;
         Some(class_number(&self.classes, class).expect("a class of the library"))

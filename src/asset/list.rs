@@ -17,8 +17,8 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 /// A list of photos: `photos.toml`, or `photos.csv` with the fields of [`PhotoEntry`] for columns,
-/// but for `captured` and `screen_corners`, which no cell can hold, as spreadsheets write it:
-/// between commas, semicolons or tabs, with decimal points or commas.
+/// except `captured` and `screen_corners`, which no cell can hold, as spreadsheets write it:
+/// separated by commas, semicolons or tabs, with decimal points or commas.
 ///
 /// ```toml
 /// [[photos]]
@@ -33,7 +33,7 @@ use std::path::{Path, PathBuf};
 /// file = "IMG_0002.jpg"
 /// asset = "ring_01"
 /// role = "distractor"         # falls and hides others, but has no class and no label
-/// matte = "outline"           # it lets no light through: all within its outline is opaque
+/// matte = "outline"           # opaque everywhere inside its outline
 /// length = 0.031
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -54,8 +54,8 @@ pub struct List {
 const LIST_NAMES: [&str; 2] = ["photos.toml", "photos.csv"];
 
 impl List {
-    /// Reads a list: CSV where the file is called so, else TOML. Thickness and mass that one photo of
-    /// an asset gives are those of all.
+    /// Reads a list: CSV if the file's name says so, else TOML. Thickness and mass that one photo of an
+    /// asset gives apply to all of its photos.
     ///
     /// # Errors
     /// [`Error::File`] for a file that cannot be read or understood, with its line.
@@ -253,8 +253,8 @@ fn entry_of_row(row: SpreadsheetRow) -> Result<PhotoEntry> {
     io::from_table(row.cells).map_err(|e| spreadsheet::in_line(e, row.line))
 }
 
-/// The file of that name, or where there is none the only one beside it that is called so but for
-/// capitals and the spelling of `.jpg`.
+/// The file of that name, or where there is none the only one in its folder whose name differs just
+/// in case and the spelling of `.jpg`.
 #[doc(hidden)]
 pub fn with_actual_spelling(path: PathBuf) -> PathBuf {
     if path.exists() {

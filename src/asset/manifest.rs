@@ -35,11 +35,11 @@ pub struct Manifest {
 pub struct Asset<P> {
     /// Its name: letters and digits of any language, `_`, `-` and `.`.
     pub name: String,
-    /// What it is in pictures for. Default: `object`.
+    /// Purpose in pictures. Default: `object`.
     #[serde(default, skip_serializing_if = "Role::is_object")]
     pub role: Role,
-    /// Name of its class; of a distractor a word for people, which is in no list of classes and
-    /// may be missing.
+    /// Name of its class; for a distractor an optional word for people, which is in no list of
+    /// classes.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub class: String,
     /// Thickness of the body that falls, metres.
@@ -56,7 +56,7 @@ pub struct Asset<P> {
 pub struct PhotoRecord {
     /// The cut-out, relative to the folder.
     pub file: String,
-    /// CRC-32 of that file; missing in older manifests, and then any file is taken.
+    /// CRC-32 of that file; missing in older manifests, and then any file is accepted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crc32: Option<u32>,
     /// Name of the photo that it was cut from.
@@ -64,11 +64,11 @@ pub struct PhotoRecord {
     /// CRC-32 of that photo; missing in older manifests.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source_crc32: Option<u32>,
-    /// CRC-32 of all that it was made from: version of the program, options, entry of the list, bytes
+    /// CRC-32 of everything that it was made from: version of the program, options, entry of the list, bytes
     /// of the files that it names; missing in older manifests.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inputs_crc32: Option<u32>,
-    /// Pixels of the cut-out for a metre.
+    /// Pixels of the cut-out per metre.
     pub px_per_metre: f64,
     /// Width and height of the whole cut-out, metres.
     pub size_m: [f64; 2],
@@ -249,7 +249,7 @@ impl Manifest {
         io::write_toml(path, self)
     }
 
-    /// Adds a photo to an asset, which is made if it is not there; a photo of the same file is
+    /// Adds a photo to an asset, which is created if missing; a photo of the same file is
     /// replaced, with a line in the log where that was another one.
     ///
     /// # Errors
@@ -477,7 +477,7 @@ impl PhotoRecord {
         std::iter::once(self.file.as_str()).chain(flow)
     }
 
-    /// A cut-out of full confidence of which nothing else is known: all of it is the object.
+    /// A cut-out of full confidence, with nothing else known: all of it is the object.
     pub fn new(
         file: impl Into<String>,
         px_per_metre: f64,
@@ -526,7 +526,7 @@ impl PhotoRecord {
         self.file == new.file && sources.is_some_and(|(old, new)| old != new)
     }
 
-    /// A person should review this cut-out.
+    /// Whether a person should review this cut-out.
     pub fn needs_review(&self) -> bool {
         self.diagnostics.iter().any(Diagnostic::needs_review)
     }

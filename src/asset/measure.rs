@@ -1,4 +1,4 @@
-//! How large an object is, with the error of that.
+//! How large an object is, with the error of its size.
 
 use super::rectified::{RectifiedPhoto, ScreenScale};
 use super::scale::Scale;

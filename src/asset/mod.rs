@@ -4,8 +4,8 @@
 //! (half-float EXR, scene-linear: `R G B A` premultiplied, `TR TG TB` transmittance as measured,
 //! `VR VG VB` that of the line of sight) with a thumbnail PNG beside each and, where stripes
 //! measured it, the refraction (`NAME.flow.exr`). The manifest is written last and whole, so that a
-//! folder never names a picture that is not there, and with a checksum of each cut-out, so that one
-//! which it does not tell of is noticed.
+//! folder never names a missing picture, and with a checksum of each cut-out, so that one that it
+//! does not list is noticed.
 //!
 //! ```text
 //! photos.toml -build-> folder and Library        folder -Library::open-> Library        photo -add_photo-> the same folder

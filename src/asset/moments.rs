@@ -48,8 +48,8 @@ impl Moments {
             .filter(|_| self.light > 0.0)
     }
 
-    /// Irradiance on a receiver that sees all of it; 0 in channels that come from behind on the
-    /// whole.
+    /// Irradiance on a receiver that sees all of it; 0 in channels that come from behind on
+    /// balance.
     pub fn irradiance(&self, normal: &Vector3<f64>) -> [f64; 3] {
         self.flux.map(|flux| flux.dot(normal).max(0.0))
     }

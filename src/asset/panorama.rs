@@ -34,7 +34,7 @@ impl Panorama {
         })
     }
 
-    /// Reads a panorama from a file, an HDR or EXR as a rule.
+    /// Reads a panorama from a file, usually HDR or EXR.
     ///
     /// # Errors
     /// Those of [`io::read`]; those of [`new`](Self::new), and [`Error::Field`] for a picture that
@@ -61,7 +61,7 @@ impl Panorama {
     /// Radiance from a direction of any length.
     ///
     /// # Method
-    /// Bilinear between texel centres, around in `u`, the outermost row going on in `v`.
+    /// Bilinear between texel centres, around in `u`, the outermost row continuing in `v`.
     pub fn radiance(&self, direction: &Vector3<f64>) -> LinearRgb {
         sample(&self.image, direction_to_uv(direction))
     }
@@ -70,8 +70,8 @@ impl Panorama {
     /// and uneven.
     ///
     /// # Method
-    /// Whichever rectangle would make the largest error in shadows, were all its light to come from
-    /// one direction, is cut in two where that leaves the least; so a sun ends up alone. More
+    /// The rectangle that would cause the largest error in shadows if all its light came from one
+    /// direction is cut in two where that leaves the least; so a sun ends up alone. More
     /// pieces cut fewer pieces further. As median cut [Debevec 2005], with the error of shadow
     /// edges for the energy.
     ///

@@ -1,4 +1,4 @@
-//! A review: what a person said of a photo's cut-out, kept beside the photo.
+//! A review: what a person said about a photo's cut-out, stored next to the photo.
 
 use crate::error::{Error, Result};
 use crate::io;
@@ -6,10 +6,10 @@ use crate::matte::{Stroke, check_strokes};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What a person said of the cut-out of a photo: strokes that correct it, and whether it is any
+/// What a person said about the cut-out of a photo: strokes that correct it, and whether it is
 /// good.
 ///
-/// `cup.review.json` lies beside `cup.jpg`. Whoever cuts that photo out again corrects it again.
+/// `cup.review.json` is next to `cup.jpg`. It corrects that photo whenever it is cut out again.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Review {
@@ -20,7 +20,7 @@ pub struct Review {
     /// Width and height of what was painted on, pixels: of the upright photo, or, where a screen or
     /// a marker gives the scale, of the view from straight above.
     pub size_px: [usize; 2],
-    /// Whether the cut-out, so corrected, is good. Default: nobody said.
+    /// Whether the corrected cut-out is good. Default: not decided.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<Verdict>,
     /// What corrects it, in the order in which it was painted.
@@ -114,7 +114,7 @@ impl Review {
         Err(Error::value("size_px", what))
     }
 
-    /// As it is kept: JSON, a stroke on each line.
+    /// As it is stored: JSON, one stroke per line.
     pub fn to_json(&self) -> String {
         let json = |value: &dyn Fn() -> serde_json::Result<String>| {
             value().expect("numbers and words are JSON")

@@ -1,4 +1,4 @@
-//! What an asset is in pictures for.
+//! The purpose of an asset in pictures.
 
 use crate::error::Error;
 use crate::names::{by_name, name_of};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// What an asset is in pictures for.
+/// The purpose of an asset in pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
@@ -22,7 +22,7 @@ impl Role {
     const ALL: [(&'static str, Self); 2] =
         [("object", Self::Object), ("distractor", Self::Distractor)];
 
-    /// Whether it is one to be found: a role that files need not tell.
+    /// Whether it is to be found: the role that files need not state.
     pub fn is_object(&self) -> bool {
         *self == Self::Object
     }

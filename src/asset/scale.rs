@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 /// How large the things in a photo are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scale {
-    /// Pixels of the photo for a metre.
+    /// Pixels of the photo per metre.
     PxPerMetre(f64),
     /// Length of the object along its longest side, metres.
     Length(f64),

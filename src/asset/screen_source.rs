@@ -12,7 +12,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// What is known of the screen: `auto`, a colour `R,G,B` (scene-linear) or a photo of the empty
+/// What is known about the screen: `auto`, a colour `R,G,B` (scene-linear) or a photo of the empty
 /// screen.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]

@@ -92,8 +92,8 @@ fn framing_line(label: &Label, solution: &Solution, options: &SolveOptions) -> S
             let gain = whole_picture_gain(label, solution, options);
             let place = place_for_more(label);
             format!(
-                "{known}: it is not known whether the picture was cropped: its EXIF size is missing or differs. If it was \
-                 not, write \"cropped\": false under \"image\"{place}: the principal point is then its centre{gain}."
+                "{known}: it is not known whether the picture was cropped, since its EXIF size is missing or differs. If it \
+                 was not, write \"cropped\": false under \"image\"{place}: the principal point is then its centre{gain}."
             )
         }
     }

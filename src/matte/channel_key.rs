@@ -40,7 +40,7 @@ pub enum ChannelLimit {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ChannelKeyOptions {
-    /// Which Blender to be; `robust` and 4.2 are 3.4 here. A value exactly at two equal limits gives
+    /// Which Blender release to follow; `robust` and 4.2 are 3.4 here. A value exactly at two equal limits gives
     /// the pixel's alpha in all profiles; Blender 4.2 and 4.5 give NaN. Default: `blender-3.4`.
     pub profile: Profile,
     /// The colour space. Default: `RGB`.
@@ -71,7 +71,7 @@ impl Default for ChannelKeyOptions {
     }
 }
 
-/// What a channel key makes of a photo.
+/// Result of a channel key.
 #[derive(Clone, Debug, Default)]
 pub struct ChannelKeyed {
     /// How much of each pixel is foreground.

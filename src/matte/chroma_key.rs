@@ -14,7 +14,7 @@ const MIN_GAIN: f32 = 1e-6;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ChromaKeyOptions {
-    /// Which Blender to be; `robust` and 4.2 are 3.4 here. Default: `blender-3.4`.
+    /// Which Blender release to follow; `robust` and 4.2 are 3.4 here. Default: `blender-3.4`.
     pub profile: Profile,
     /// Opening angle of the wedge that is keyed, radians, 1 to 80 degrees (3.4 "acceptance", 4.5
     /// "maximum"). Default: 30 degrees.

@@ -1,4 +1,4 @@
-//! Color Spill: the screen's light on the subject, taken away.
+//! Color Spill: removes the screen's light from the subject.
 
 use super::check::{check_length, check_value};
 use super::key::{Photo, Profile};
@@ -19,7 +19,7 @@ pub enum SpillChannel {
     B,
 }
 
-/// What the spill channel may be as large as.
+/// What limits the spill channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "SCREAMING_SNAKE_CASE")]
 pub enum SpillLimit {
@@ -33,7 +33,7 @@ pub enum SpillLimit {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ColorSpillOptions {
-    /// Which Blender to be; `robust` and 4.2 are 3.4 here. Default: `blender-3.4`.
+    /// Which Blender release to follow; `robust` and 4.2 are 3.4 here. Default: `blender-3.4`.
     pub profile: Profile,
     /// The screen's channel. Default: `G`.
     pub channel: SpillChannel,
@@ -43,10 +43,10 @@ pub struct ColorSpillOptions {
     pub limit_channel: SpillChannel,
     /// Multiple of the limit that is allowed, 0.5 to 1.5. Default: 1.
     pub ratio: f32,
-    /// Share of the excess that is taken, at least 0; 4.5 scales the spill channel alone by it.
+    /// Share of the excess that is removed, at least 0; 4.5 scales only the spill channel by it.
     /// Default: 1.
     pub fac: f32,
-    /// The excess is handed out by the three strengths below. Default: false.
+    /// The excess is distributed by the three strengths below. Default: false.
     pub use_unspill: bool,
     /// Share of the excess for (or, in the spill channel, from) red, at least 0. Default: 0.
     pub unspill_red: f32,
@@ -73,14 +73,14 @@ impl Default for ColorSpillOptions {
     }
 }
 
-/// Takes the excess of the screen's channel from a photo.
+/// Removes the excess of the screen's channel from a photo.
 ///
 /// Takes a scene-linear photo, opaque or premultiplied; returns it premultiplied, same size, alpha
 /// as it was.
 ///
 /// # Method
 /// The excess of the spill channel over `ratio` times its limit is subtracted from it where
-/// positive, and handed to the other channels as the strengths say.
+/// positive, and added to the other channels by the strengths.
 pub fn color_spill<P: Photo>(photo: &Image<P>, options: &ColorSpillOptions) -> Image<PremulRgba> {
     let strengths = strengths(options);
     photo.map(|p| without_spill(p.premul(), strengths, options))

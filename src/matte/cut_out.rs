@@ -54,7 +54,7 @@ pub struct CutOut {
     pub method: MatteMethod,
     /// Mean matte on the screen outside the object, where it should be 0.
     pub residual_matte: f32,
-    /// What makes its colours and its transmittance wrong; of the physical matte only.
+    /// What makes its colours and its transmittance wrong; for the physical matte only.
     pub color_uncertainty: Option<ColorUncertainty>,
     /// Notes and warnings about the segmentation, the screen and the matte.
     pub diagnostics: Vec<Diagnostic>,

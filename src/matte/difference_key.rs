@@ -1,4 +1,4 @@
-//! Difference Key: what differs from a picture of the place without the subject.
+//! Difference Key: what differs from a picture without the subject.
 
 use super::check::{check_share, check_size};
 use super::key::{Photo, Profile};
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DifferenceKeyOptions {
-    /// Which Blender to be; `robust` and 4.2 are 3.4 here. Default: `blender-3.4`.
+    /// Which Blender release to follow; `robust` and 4.2 are 3.4 here. Default: `blender-3.4`.
     pub profile: Profile,
     /// Mean difference of the channels up to which a pixel is background, 0 to 1. Default: 0.1.
     pub tolerance: f32,
@@ -32,7 +32,7 @@ impl Default for DifferenceKeyOptions {
 /// Keys a photo by its difference from a clean plate.
 ///
 /// Takes two scene-linear pictures of one size; returns a matte of that size, at most the photo's
-/// alpha. Background whose alpha is below 0 is 0 all the same, except in Blender 4.5.
+/// alpha. Background whose alpha is below 0 is also 0, except in Blender 4.5.
 ///
 /// # Method
 /// With `D` the mean of the absolute differences of R, G and B: 0 up to `tolerance`, then `(D -

@@ -44,7 +44,7 @@ pub struct FilmOptions {
     /// it; none = from the photo. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flat: Option<LinearRgb>,
-    /// Scene-linear value from which on a channel is clipped. A value up to 1.05 holds only for photos
+    /// Scene-linear value at and above which a channel is clipped. A value up to 1.05 holds only for photos
     /// that end at 1; one that is brighter than 1.05 somewhere, such as an EXR, counts as clipped
     /// nowhere. Default: 0.98.
     pub clipped: f32,
@@ -91,7 +91,7 @@ pub struct FilmMatte {
 ///
 /// `photo` is scene-linear; `inside` is the object's coverage, soft at its outline, and cuts off
 /// everything else (the garbage matte). A screen with little colour shows little of T: then what
-/// may be plastic by its light is guessed to be that, and a [`Diagnostic`] says so.
+/// may be plastic by its light is assumed to be plastic, with a [`Diagnostic`].
 ///
 /// # Method
 /// Three values a pixel for six unknowns, so two models tie them together. *Transmittance*: the
@@ -102,7 +102,7 @@ pub struct FilmMatte {
 /// one equation; where dark or strongly tinted plastic makes it ill-conditioned it is drawn to that
 /// of flat plastic, or to opaque where more is reflected than plastic can, by their variances, and
 /// the uncertainty says how much was measured. `F = photo - T * plate` leaves nothing of the
-/// screen's light: there is no spill to take away.
+/// screen's light: there is no spill to remove.
 ///
 /// What is brighter in the screen's hue than the screen itself through plastic, or has a colour
 /// that neither glints nor the plastic have, is opaque (a label, a cap). Glints hide what is seen

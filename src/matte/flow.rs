@@ -5,8 +5,8 @@ use crate::geom::Point2;
 use crate::image::{Image, Mask};
 use crate::pixel::{LinearRgb, Mix};
 
-/// Refraction of an object that lay on a display: for each place of its cut-out, how far from where
-/// it would end without the object a line of sight through it ends, and what is scattered.
+/// Refraction of an object that lay on a display: for each place of its cut-out, how far the object
+/// moves the end of the line of sight through it, and what is scattered.
 ///
 /// Both rasters have one size and cover the whole cut-out; they may be coarser than it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -22,7 +22,7 @@ pub struct Flow {
     pub height: f64,
 }
 
-/// Where the light comes from that an object lets pass at a place: a part from one place, which
+/// Where the light that an object lets pass at a place comes from: a part from one place, which
 /// stays sharp, and the rest from all around another one.
 ///
 /// Displacements are how far from where the line of sight would end without the object, on the
@@ -40,7 +40,7 @@ pub struct LightPath {
 }
 
 impl LightPath {
-    /// With all lengths so many times as long.
+    /// With all lengths multiplied by a factor.
     pub fn scaled(self, factor: f32) -> Self {
         Self {
             displacement: self.displacement.map(|d| factor * d),
@@ -103,7 +103,7 @@ impl Mix for LightPath {
 }
 
 impl Flow {
-    /// No pixel.
+    /// Whether there are no pixels.
     pub fn is_empty(&self) -> bool {
         self.paths.is_empty()
     }

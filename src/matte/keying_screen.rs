@@ -20,7 +20,7 @@ const SHARPEST_SIGMA: f64 = 0.15;
 /// What smoothness 1 adds to it; Blender's.
 const SMOOTHNESS_SIGMA: f64 = 0.85;
 
-/// Makes a plate out of points, as Blender 4.5 does: a mean of all points, weighted by a Gaussian
+/// Creates a plate from points, as Blender 4.5 does: a mean of all points, weighted by a Gaussian
 /// of their distance.
 ///
 /// `smoothness` is 0 to 1. The plate does not pass through the colours of the points; distances are

@@ -16,13 +16,13 @@ use crate::pixel::{Coverage, LinearRgb};
 use polynomial::Polynomial;
 use serde::{Deserialize, Serialize};
 
-/// How a screen plate is made.
+/// How a screen plate is obtained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlateOptions {
     /// Highest degree of the polynomial, 0 to 6. Default: 4.
     pub max_degree: usize,
-    /// A higher degree must lower the residual by this share to be taken, 0 to 1, but on a screen
+    /// A higher degree must lower the residual by this share to be used, 0 to 1, except on a screen
     /// with a hot spot. Default: 0.6: around the object only, a higher degree fits shadows and
     /// swings beneath it.
     pub least_gain: f64,
@@ -72,7 +72,7 @@ impl ScreenPlate {
     /// Fits a smooth screen to the pixels of a photo that show it.
     ///
     /// `photo` is scene-linear; `background` marks the pixels that surely show the screen. They may
-    /// lie around the object only: the polynomial goes on under it.
+    /// lie around the object only: the polynomial continues under it.
     ///
     /// # Method
     /// The logarithm of each channel is a polynomial of the position, fitted to the means of small
@@ -108,7 +108,7 @@ impl ScreenPlate {
         })
     }
 
-    /// Takes a photo of the empty screen for the plate.
+    /// Uses a photo of the empty screen as the plate.
     ///
     /// It is moved onto the photo (by the screen's texture and dirt, if it has any), its exposure
     /// and white balance are matched channel by channel, and its noise is blurred.

@@ -1,4 +1,4 @@
-//! The colour of the screen, from what the object leaves free of it.
+//! The colour of the screen, from the part that the object leaves free.
 
 use super::arrays::{dot, index_of_largest, largest};
 use super::check::refused;
@@ -15,7 +15,7 @@ const SCREEN_MARGIN: f64 = 0.02;
 /// Mean scene-linear colour of a photo outside a mask and a margin around it (2 % of the longer
 /// side).
 ///
-/// Where the margin leaves nothing, the mask alone is left out.
+/// Where the margin leaves nothing, only the mask is excluded.
 ///
 /// # Errors
 /// [`Error::Photo`](crate::Error::Photo) when the mask leaves no background.

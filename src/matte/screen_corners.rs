@@ -65,19 +65,19 @@ pub struct ScreenCorners {
 
 /// Corners of the coloured screen in a photo, to a fraction of a pixel.
 ///
-/// `photo` is scene-linear; the screen is a rectangle on something of another colour, and all of it
-/// is seen.
+/// `photo` is scene-linear; the screen is a rectangle on a background of another colour, and all of
+/// it is visible.
 ///
 /// # Method
 /// The largest connected region of each of the photo's hues; of those that do not reach the border
 /// the largest on which something lies. The four corners of its hull that enclose the most are
 /// rough ones; each side is then fitted as a line to where, along profiles across it, the colour
-/// changes from the screen's to what is beside it (the centre of gravity of the change in linear
+/// changes from the screen's to its surroundings' (the centre of gravity of the change in linear
 /// light, which blur does not move), and neighbours meet in the corners.
 ///
 /// # Errors
 /// [`Error::Photo`] where there is no coloured screen, it reaches the border of the photo, or its
-/// outline is no rectangle's.
+/// outline is not a rectangle.
 pub fn screen_corners(photo: &Image<LinearRgb>) -> Result<ScreenCorners> {
     if photo.width().min(photo.height()) == 0 {
         return Err(not_found("the photo is empty"));

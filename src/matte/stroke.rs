@@ -8,13 +8,13 @@ use crate::pixel::{Coverage, LinearRgb};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// A line that a person painted on a photo, and what is true of what lies under it.
+/// A line that a person painted on a photo, and what it says about the pixels under it.
 ///
-/// Of strokes that say the opposite of each other the later one is right.
+/// Of strokes that contradict each other, the later one counts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stroke {
-    /// What is true under it.
+    /// What it says about the pixels under it.
     pub says: Claim,
     /// Half its width, pixels of the photo.
     pub radius_px: f64,
@@ -22,8 +22,8 @@ pub struct Stroke {
     pub points_px: Vec<[f64; 2]>,
 }
 
-/// What a person says of some pixels: two claims are of the outline, two of what is seen through
-/// the object where there is one.
+/// What a person says about some pixels: two claims are about the outline, two about what is seen
+/// through the object where there is one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Claim {

@@ -28,10 +28,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TriangulateOptions {
-    /// Largest offset of the object from the first photo that is moved back, pixels. Default: 8.
+    /// Largest offset of the object from the first photo that is corrected, pixels. Default: 8.
     pub max_shift_px: f64,
-    /// Moved back, what the screens do not change must agree between the photos: least
-    /// correlation, 0 to 1; 0 for a dyed object, of which the screens change everything. Default:
+    /// After alignment, what the screens do not change must agree between the photos: least
+    /// correlation, 0 to 1; 0 for a dyed object, whose every channel the screens change. Default:
     /// 0.5.
     pub least_agreement: f64,
     /// A channel is determined where its transmittance has at most this standard deviation.
@@ -68,14 +68,13 @@ pub struct Triangulated {
     pub transmittance: Image<LinearRgb>,
     /// Expected error of T in each pixel, 0 to 1, of its least certain channel.
     pub uncertainty: Image<f32>,
-    /// Which channels of T the screens determine; another one is inferred from these.
+    /// Which channels of T the screens determine; the others are inferred from these.
     pub determined: [bool; 3],
     /// T of the plastic where it lies flat: what relates V to T.
     pub flat: LinearRgb,
-    /// How far the object lay off the first photo in each, pixels right and down; it was moved
-    /// back.
+    /// Offset of the object in each photo from the first, pixels right and down; it was corrected.
     pub shift_px: Vec<[f64; 2]>,
-    /// Root mean square of what the film does not explain of the photos inside the object,
+    /// Root mean square of what the film leaves unexplained in the photos inside the object,
     /// scene-linear.
     pub residual: f32,
     /// Notes and warnings.

@@ -25,11 +25,10 @@ pub struct CutOutOptions {
     pub film: FilmOptions,
     /// How the object is keyed, where the method is `key`.
     pub key: KeyOptions,
-    /// Colour of an evenly lit screen, scene-linear; nothing = fitted to the photo. Default:
-    /// nothing.
+    /// Colour of an evenly lit screen, scene-linear; none = fitted to the photo. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub screen: Option<LinearRgb>,
-    /// Where the matte comes from; nothing = physical. Default: nothing.
+    /// Where the matte comes from; none = physical. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<MatteMethod>,
     /// What a matte is cut to. Default: `tight`.
@@ -71,8 +70,8 @@ pub enum MatteMethod {
     /// From the screen's colour, as Blender's Keying node does: see-through plastic is see-through.
     Key,
     /// From the object's outline alone: nothing is see-through, and what shines through is part of
-    /// the object. Screen that the outline takes along at its rim is left out where its colour
-    /// tells it, and with it film so clear that it dims the screen by less than a tenth.
+    /// the object. Screen inside the outline at its rim is left out where its colour identifies
+    /// it, and with it film so clear that it dims the screen by less than a tenth.
     Outline,
 }
 
@@ -109,7 +108,7 @@ pub enum Boundary {
     /// The outline that follows hollows.
     #[default]
     Tight,
-    /// The convex hull, as the paper has it: the screen's shadows stay in the hollows.
+    /// The convex hull, as in the paper: the screen's shadows stay in the hollows.
     Hull,
 }
 

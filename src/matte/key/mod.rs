@@ -42,9 +42,9 @@
 //! Blender's releases have behaved in three ways, which [`Profile`] names. They differ in roundings, in what lies beyond
 //! the border (cut off up to 4.3, repeated from 4.4 on), in the sizes of the blur and edge windows, and in the disc (up
 //! to 4.3 its left and bottom tip are missing). The fourth, `robust`, is 3.4 with a full disc and a final matte within 0
-//! to 1; it takes pixels that are no numbers for transparent ones of matte 0, refuses keys too grey to work, levels in the
-//! wrong order, fills holes in plates, and keys all of a plate by the primary channel of its mean. What it changed it
-//! counts: [`Deviations`].
+//! to 1; it treats pixels that are not numbers as transparent ones of matte 0, refuses keys too grey to work, levels in the
+//! wrong order, fills holes in plates, and keys all of a plate by the primary channel of its mean. It counts what it
+//! changed: [`Deviations`].
 //!
 //! # What to watch
 //!
@@ -62,7 +62,7 @@
 //! `blur = "running_sum"` ([`Blur`]) gives up Blender's bits, and its rounding, for box blurs that cost the same at any
 //! size; `cargo bench --bench matte` prints speed and difference. The feather has no such form: the sum of its Gaussian
 //! is 9 to 23 in 100 of its inner loop, measured with AVX-512 and AVX2, and the search for the best candidate beside it
-//! cannot run. Half-precision storage has nothing to save, for no stage keeps a plane: beyond its output, keying a 4K
+//! cannot run. Half-precision storage would save nothing, since no stage keeps a plane: beyond its output, keying a 4K
 //! frame takes less than a hundredth of a channel (`tests/matte_memory.rs`).
 //!
 //! ```
@@ -114,7 +114,7 @@ pub enum Screen<'a> {
     Plate(&'a Image<LinearRgb>),
 }
 
-/// What a keyer makes of a photo; both pictures have the photo's size.
+/// Result of a keyer; both pictures have the photo's size.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct Keyed {
@@ -155,7 +155,7 @@ pub fn key(photo: &Image<LinearRgb>, screen: LinearRgb, options: &KeyOptions) ->
     keyed
 }
 
-/// A photo to key, its screen, and the mattes that are known of it.
+/// A photo to key, its screen, and the mattes that are known for it.
 #[derive(Clone, Copy, Debug)]
 pub struct Keying<'a, P> {
     photo: ImageView<'a, P>,
@@ -170,7 +170,7 @@ impl<'a, P: Photo> Keying<'a, P> {
         Self::of_view(photo.view(), screen)
     }
 
-    /// A photo in somebody else's memory before a screen.
+    /// A borrowed photo before a screen.
     #[doc(hidden)]
     pub fn of_view(photo: ImageView<'a, P>, screen: Screen<'a>) -> Self {
         Self {
@@ -208,7 +208,7 @@ impl<'a, P: Photo> Keying<'a, P> {
         Ok(keyed)
     }
 
-    /// As [`run`](Self::run), into pictures that are already there: in a loop over frames no picture is allocated. At 4K
+    /// As [`run`](Self::run), into existing pictures: in a loop over frames no picture is allocated. At 4K
     /// the system's work on the pages of new ones takes three times as long as the keying, unless the allocator asks for
     /// huge pages, as the program's does, and glibc's under `GLIBC_TUNABLES=glibc.malloc.hugetlb=1`.
     ///
@@ -232,7 +232,7 @@ impl<'a, P: Photo> Keying<'a, P> {
         Ok(matte)
     }
 
-    /// As [`matte`](Self::matte), into a picture that is already there.
+    /// As [`matte`](Self::matte), into an existing picture.
     ///
     /// # Errors
     /// As [`run`](Self::run).
@@ -298,7 +298,7 @@ impl<'a, P: Photo> Keying<'a, P> {
 /// Four stops over white: no screen is brighter.
 const MAX_CHANNEL: f32 = 16.0;
 
-/// What was expected of a colour that is none of a screen; nothing where it is one.
+/// What was expected of a colour that cannot be a screen's; none where it can.
 #[doc(hidden)]
 pub fn expected_of_screen(screen: LinearRgb) -> Option<&'static str> {
     if !screen.is_finite() {

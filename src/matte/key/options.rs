@@ -6,7 +6,7 @@ use crate::names::{by_name, name_of};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Which keyer to be: one of the three that Blender has shipped, or the careful one.
+/// Which keyer to use: one of the three that Blender has shipped, or the careful one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Profile {
     /// Blender 3.4.1, bit for bit.
@@ -94,7 +94,7 @@ pub enum Blur {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct KeyOptions {
-    /// Which keyer to be. Default: `blender-3.4`.
+    /// Which keyer to use. Default: `blender-3.4`.
     pub profile: Profile,
     /// Size of the blur of the chroma before keying, 0 to 2048 pixels; against noise and chroma
     /// subsampling. Default: 0.
@@ -108,7 +108,7 @@ pub struct KeyOptions {
     pub clip_black: f32,
     /// Raw matte at or above this becomes 1, in 0..1. Default: 1.
     pub clip_white: f32,
-    /// Half-size of the window in which edges are found, which are not clipped, 0 to 100 pixels.
+    /// Half-size of the window of the edge search (edges are not clipped), 0 to 100 pixels.
     /// Default: 3.
     pub edge_kernel_radius: u32,
     /// Matte values closer than this are alike for the edge search, in 0..1. Default: 0.1.
@@ -122,7 +122,7 @@ pub struct KeyOptions {
     pub feather_distance: i32,
     /// Shape of the feathered edge. Default: `SMOOTH`.
     pub feather_falloff: Falloff,
-    /// How much of the screen's colour that exceeds the other channels is taken away, in 0..1.
+    /// How much of the screen's colour that exceeds the other channels is removed, in 0..1.
     /// Default: 1.
     pub despill_factor: f32,
     /// Which of the two other channels the despill compares with, as `screen_balance`. Default:
@@ -131,7 +131,7 @@ pub struct KeyOptions {
     /// Leaves out the factor `|1 - v|` that ties the matte to brightness. Not Blender's matte.
     /// Default: false.
     pub ignore_brightness: bool,
-    /// The picture loses what is left of the screen, `max(0, I - (1 - M) K)`, instead of being
+    /// The remaining screen is subtracted from the picture, `max(0, I - (1 - M) K)`, instead of it being
     /// multiplied by its matte and despilled. Not Blender's picture. Default: false.
     pub subtract_screen: bool,
     /// Lets the `robust` profile key against a screen too grey to be distinguished from the
