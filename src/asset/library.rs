@@ -85,7 +85,7 @@ impl Library {
         let kept = most_bytes() as f64;
         if needed > kept {
             log::warn!(
-                "cut-outs take up to {:.1} GB of memory; {:.1} GB of them are kept, the others are read anew each time: \
+                "cut-outs take up to {:.1} GB of memory; {:.1} GB of them are kept, the rest are reread each time: \
                  a smaller longest_side in [cut_out] of their list makes this faster",
                 needed / 1e9,
                 kept / 1e9

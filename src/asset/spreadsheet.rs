@@ -1,4 +1,4 @@
-//! CSV as spreadsheets write it in this country or that: what separates cells, how numbers are
+//! CSV as spreadsheets write it in different countries: what separates cells, how numbers are
 //! written, which bytes stand for letters.
 
 use crate::error::{Error, Result};

@@ -1,5 +1,5 @@
-//! What the texels of a cut-out are of: body, or what lies beside it; and how much of their light
-//! are glints.
+//! What the texels of a cut-out show: body, or what is next to it; and how much of their light is
+//! glints.
 
 use crate::asset::Texture;
 use crate::filter::{Pyramid, depth};
@@ -38,7 +38,7 @@ impl Mix for SurfaceTexel {
     }
 }
 
-/// The surface map of a texture, made when it is first asked for and shared by all that show it.
+/// The surface map of a texture, computed on first use and shared by all that show it.
 #[derive(Clone, Debug, Default)]
 pub struct SurfaceCache(Arc<OnceLock<Pyramid<SurfaceTexel>>>);
 

@@ -50,7 +50,7 @@ impl Texture {
         }
     }
 
-    /// There is no texel.
+    /// Whether there are no texels.
     pub fn is_empty(&self) -> bool {
         let (width, height) = self.size();
         width * height == 0
@@ -64,7 +64,7 @@ impl Texture {
         }
     }
 
-    /// It may tint what is behind.
+    /// Whether it may tint what is behind.
     pub fn is_film(&self) -> bool {
         matches!(self, Self::Film(_))
     }

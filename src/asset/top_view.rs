@@ -1,4 +1,4 @@
-//! A rectangle over a screen as it is seen from straight above.
+//! A rectangle over a screen, seen from straight above.
 
 use super::screen_pose::{ScreenPose, scale_unknown};
 use crate::camera::{Camera, rectify};

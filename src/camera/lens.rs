@@ -41,7 +41,7 @@ impl RadialDistortion {
         }
     }
 
-    /// It moves nothing.
+    /// Whether it moves nothing.
     pub fn is_none(&self) -> bool {
         self.k1 == 0.0
     }
@@ -175,7 +175,7 @@ impl RadialDistortion {
         radius
     }
 
-    /// The radius at which a barrel shows what is farther out no farther out, focal lengths.
+    /// The radius beyond which a barrel shows points no farther out, focal lengths.
     pub fn fold(&self) -> f64 {
         if self.k1 < 0.0 {
             (-1.0 / (3.0 * self.k1)).sqrt()

@@ -14,12 +14,12 @@ const HORIZON_WIDTHS: f64 = 1.0;
 /// Positions in a picture along a line, pixels.
 type Polyline = Vec<[f64; 2]>;
 
-/// Lines over a photo by which a person judges its camera, bent as its lens bends them.
+/// Lines over a photo for judging its camera, bent as its lens bends them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sketch {
     /// The sides of the rectangle.
     pub rectangle: Vec<Polyline>,
-    /// Lines on the surface, so many metres apart.
+    /// Lines on the surface, [`grid_step`](Self::grid_step) apart.
     pub grid: Vec<Polyline>,
     /// Metres between them: 1, 2 or 5 times a power of ten.
     pub grid_step: f64,

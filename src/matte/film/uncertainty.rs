@@ -12,7 +12,7 @@ use crate::pixel::{Coverage, LinearRgb};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ColorUncertainty {
     /// Share of the object that looks like the screen in its middle, bare where plastic is, or in
-    /// some shade where most of it is opaque: it was keyed away, and may be paint of the screen's
+    /// some shade where most of it is opaque: it was keyed out, and may be paint of the screen's
     /// hue.
     pub keyed_away: f32,
     /// Share of the object that is brighter in the screen's hue than the screen through plastic,
@@ -20,19 +20,19 @@ pub struct ColorUncertainty {
     pub screen_hue: f32,
     /// Share of the object that is clipped.
     pub clipped: f32,
-    /// Transmittance that is not measured in the photo but is the prior of plastic, mean over the
-    /// object.
+    /// Transmittance that is not measured in the photo but comes from the prior of plastic, mean over
+    /// the object.
     pub guessed: f32,
-    /// How far other tints, or opaque paint, that explain the photo as well differ in what they let
-    /// through.
+    /// How far other tints, or opaque paint, that explain the photo equally well differ in their
+    /// transmittance.
     pub tint: f32,
-    /// Share of the object that reflects as much as paint and was yet left see-through, where it is
-    /// more than glints have; all of it where its darkest does.
+    /// Share of the object that reflects as much as paint but was left see-through, where it is more
+    /// than glints have; all of it where its darkest part does.
     pub paint: f32,
 }
 
 impl ColorUncertainty {
-    /// From which on a person should look at a cut-out. Of 48 rendered photos with ground truth the
+    /// Limits from which a person should look at a cut-out. Of 48 rendered photos with ground truth the
     /// 7 that have more keyed away had lost a cap, a label or their tint to the screen; the
     /// most of the others is 0.0022, one of which had lost some, too. The tint of 9 of 10
     /// bottles of the screen's own hue is less certain, that of no other by more than 0.024.

@@ -15,7 +15,7 @@ pub struct SegmentOptions {
     /// What the pyramid is made of. Default: each channel by itself.
     pub tone: LumaMode,
     /// Which band of the pyramid is the coarse one, 2 to 8; the fine one is the finest. Default:
-    /// nothing = the depth that the others agree with best.
+    /// none = the depth that the others agree with best.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub levels: Option<usize>,
     /// Threshold of the finest band (`first_threshold` in files). Default: Otsu.
