@@ -707,7 +707,10 @@ mod tests {
         assert_eq!(toml, csv);
         let both = build(folder.path(), folder.path().join("out"), &|_, _| ()).unwrap_err();
         let both = both.to_string();
-        assert!(both.contains("has photos.toml and photos.csv"), "{both}");
+        assert!(
+            both.contains("photos.toml and photos.csv, expected only one"),
+            "{both}"
+        );
         std::fs::remove_file(folder.path().join("photos.toml")).unwrap();
         assert_eq!(
             build(folder.path(), folder.path().join("out"), &|_, _| ())

@@ -334,7 +334,7 @@ mod tests {
         assert!(
             scale("length = 0.2\nmarker_size = 0.05")
                 .unwrap_err()
-                .contains("expected one of length")
+                .contains("expected only one of length")
         );
         let alone = scale(&format!("length = 0.2\nscreen_corners = {corners:?}")).unwrap_err();
         assert_eq!(alone, "screen_size: missing, required with screen_corners");

@@ -445,7 +445,7 @@ fn a_display_whose_colour_changes_from_side_to_side_is_fitted() {
 fn photos_that_are_exchanged_with_those_of_the_empty_display_are_refused() {
     let [with, without] = [STILL, BARE].map(|conditions| shots(&frames(false), conditions));
     let error = measured_of(&without, &with).err().unwrap().to_string();
-    assert!(error.contains("exchanged?"), "{error}");
+    assert!(error.contains("swapped?"), "{error}");
 }
 
 #[test]

@@ -2047,7 +2047,7 @@ fn an_object_on_a_display_is_measured() {
     let add = format!("{add} --display frames/display.toml");
     let width = desk.refused(&words(&add));
     assert!(
-        width.contains("captured.width: missing, expected the width of the whole picture"),
+        width.contains("captured.width: missing, expected the measured width of the whole picture"),
         "{width}"
     );
     let said = desk.ok(&words(&format!("{add} --display-width 0.4")));
@@ -2064,7 +2064,7 @@ fn an_object_on_a_display_is_measured() {
     // 240 of 640 pixels, 2.5 mm over the display as it lies.
     assert!((length - 150.0).abs() < 2.0, "{said}");
     let checked = || desk.ok(&["asset", "check", "assets"]);
-    let unknown = "thickness: not given, 0.005 m is assumed";
+    let unknown = "thickness: missing, 0.005 m is assumed";
     let said = checked();
     assert!(
         said.contains("captured: 2 photos") && said.contains(unknown),
