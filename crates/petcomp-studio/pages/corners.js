@@ -372,7 +372,7 @@ const IN_THIS_PAGE = [
 /** Lines of the doctor that the numbers do not say already. */
 function advice(camera) {
   return camera.advice
-    .filter((line) => /^(Warning|This camera|Measure)|not known|do not show/.test(line))
+    .filter((line) => /^(Warning|This camera|Measure)|not known|does not show/.test(line))
     .map((line) => element("li", { class: /^This camera/.test(line) ? "bad" : /^Warning/.test(line) ? "warn" : "" },
       IN_THIS_PAGE.reduce((text, [words, here]) => text.replace(words, here), line),
       ...remedies(line)));
