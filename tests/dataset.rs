@@ -357,17 +357,18 @@ fn another_plan_in_the_same_folder_is_refused_by_name() {
     };
     let seed = refused(&|p| p.seed = 8);
     assert!(
-        seed.ends_with("dataset.json: seed: the dataset was begun with 7, this run has 8"),
+        seed.ends_with("dataset.json: seed: the dataset was started with 7, this run has 8"),
         "{seed}"
     );
     let recipe = refused(&|p| p.recipe["objects"]["count"][1] = 20.into());
     assert!(
-        recipe.contains("recipe.objects.count[1]: the dataset was begun with 30, this run has 20"),
+        recipe
+            .contains("recipe.objects.count[1]: the dataset was started with 30, this run has 20"),
         "{recipe}"
     );
     assert!(
         refused(&|p| p.recipe["light"] = true.into())
-            .contains("recipe.light: the dataset was begun with null")
+            .contains("recipe.light: the dataset was started with null")
     );
     assert!(refused(&|p| p.obstructed = Obstructed::Keep).contains("obstructed"));
     assert!(refused(&|p| p.writers = vec![Arc::new(Yolo::default())]).contains("writers"));
@@ -636,16 +637,16 @@ fn a_check_finds_every_fault_and_its_place() {
     let found = faults(dir.path()).join("\n");
     for expected in [
         "labels/train/000001.txt:2: 4 columns, expected 5",
-        "labels/train/000001.txt:3: class 3, but data.yaml has 3 classes, from 0",
-        "labels/train/000001.txt:4: the same row stands above [dataset.duplicate_label_row]",
-        "labels/train/000002.txt:1: 1.1, expected a share of the image, 0 to 1",
+        "labels/train/000001.txt:3: class 3, but data.yaml has 3 classes, numbered from 0",
+        "labels/train/000001.txt:4: duplicates an earlier row [dataset.duplicate_label_row]",
+        "labels/train/000002.txt:1: 1.1, expected a fraction of the image, 0 to 1",
         "labels/train/000002.txt:2: a box of 0 x 0.1, expected sides above 0",
         "labels/train/000002.txt:3: class 0.5, expected an integer from 0 [dataset.bad_label_row]",
         "labels/train/000002.txt:4: \"a\", expected a number",
         "labels/train/000002.txt:5: class -1, expected an integer from 0",
         "labels/train/000003.txt:1: 5 columns, expected a class and at least 3 pairs",
         "labels/train/000004.txt: missing",
-        "labels/train/000099.txt: no image of this name",
+        "labels/train/000099.txt: no image with this name",
         "images/val/000005.png: ",
         "images/val/000010.png: leak: the same bytes as images/train/000006.png",
         "images/train/000007.png: 9 x 30 pixels, expected at least 10 a side",
@@ -670,7 +671,7 @@ fn images_in_folders_of_a_part_have_labels_in_folders() {
     std::fs::write(path("labels/train/cam0/000099.txt"), "").unwrap();
     assert_eq!(
         faults(dir.path()),
-        ["labels/train/cam0/000099.txt: no image of this name [dataset.orphan_label]"]
+        ["labels/train/cam0/000099.txt: no image with this name [dataset.orphan_label]"]
     );
 }
 
@@ -682,7 +683,7 @@ fn an_image_of_both_parts_is_a_leak() {
     let found = faults(dir.path());
     assert_eq!(
         found[0],
-        "images/train/000001.png: leak: validation image is also trained on [dataset.leak]"
+        "images/train/000001.png: leak: validation image is also used for training [dataset.leak]"
     );
     assert!(!found.join("\n").contains("the same bytes"), "{found:?}");
 }
@@ -775,10 +776,10 @@ fn an_object_that_nothing_holds_up_is_a_fault_of_its_picture() {
         make_of(&plan, |k| Ok(with_a_card_up_at(k, height(k)))).unwrap();
         let found = faults(dir.path())
             .into_iter()
-            .filter(|fault| fault.contains("nothing holds"));
+            .filter(|fault| fault.contains("nothing supports"));
         found.collect::<Vec<_>>()
     };
-    let expected = "scenes/train/000001.json: nothing holds object 3 (\"bottle\"), 0.27 m up: make this picture again \
+    let expected = "scenes/train/000001.json: nothing supports object 3 (\"bottle\"), 0.27 m up: generate this picture again \
                     [dataset.unsupported_object]";
     assert_eq!(found("{}"), [expected]);
     // Nothing falls in a recipe that lays its objects.
@@ -1046,7 +1047,7 @@ fn archives_alone_leave_no_other_file_and_are_those_packed_from_files() {
     for refused in [sheet.map(drop), summary.map(drop)] {
         let refused = refused.unwrap_err().to_string();
         assert!(
-            refused.contains("archives alone, expected files"),
+            refused.contains("only archives, expected files"),
             "{refused}"
         );
     }
@@ -1063,7 +1064,7 @@ fn archives_that_are_there_are_not_made_again() {
     assert_eq!(before, bytes(dir.path()));
     let e = make(&archive_plan(dir.path(), 31)).unwrap_err().to_string();
     assert!(
-        e.ends_with("count: the dataset was begun with 30, this run has 31"),
+        e.ends_with("count: the dataset was started with 30, this run has 31"),
         "{e}"
     );
 }
@@ -1072,7 +1073,7 @@ fn archives_that_are_there_are_not_made_again() {
 fn torn_archives_are_found_and_made_again() {
     let dir = tempfile::tempdir().unwrap();
     let refused = repair_archives(dir.path(), SampleRange::All).unwrap_err();
-    assert!(refused.to_string().contains("begun before"), "{refused}");
+    assert!(refused.to_string().contains("started before"), "{refused}");
     make(&archive_plan(dir.path(), 30)).unwrap();
     let before = bytes(dir.path());
     let all = before.len() - 1;
@@ -1357,7 +1358,7 @@ fn a_store_of_something_else_is_refused() {
     let refused = |plan: Plan| make(&plan).unwrap_err().to_string();
     assert_eq!(
         refused(store_plan(other.path(), 31, &store)),
-        "s3://bucket/prefix/dataset.json: count: the dataset was begun with 30, this run has 31"
+        "s3://bucket/prefix/dataset.json: count: the dataset was started with 30, this run has 31"
     );
     // An archive that no receipt vouches for, and that has other bytes.
     store.objects.lock().unwrap().remove("receipts/000001.json");
@@ -1365,7 +1366,7 @@ fn a_store_of_something_else_is_refused() {
     store.objects.lock().unwrap().insert(name, vec![7; 3]);
     let e = refused(store_plan(other.path(), 30, &store));
     assert!(
-        e.starts_with("s3://bucket/prefix/webdataset/train-000001.tar: holds 3 bytes that this run does not make"),
+        e.starts_with("s3://bucket/prefix/webdataset/train-000001.tar: holds 3 bytes that differ from the"),
         "{e}"
     );
     let loose = Plan {
@@ -1457,7 +1458,7 @@ fn shards_that_do_not_make_a_whole_are_refused() {
     .unwrap();
     let mixed = refused(&[folders[0].clone(), folders[1].clone(), other]);
     assert!(
-        mixed.ends_with("dataset.json: seed: the dataset was begun with 7, this run has 8"),
+        mixed.ends_with("dataset.json: seed: the dataset was started with 7, this run has 8"),
         "{mixed}"
     );
 
@@ -1470,7 +1471,7 @@ fn shards_that_do_not_make_a_whole_are_refused() {
     let damaged = folders[0].join("labels/train/000003.txt");
     let size = std::fs::metadata(&damaged).unwrap().len();
     std::fs::write(&damaged, vec![b'7'; size as usize]).unwrap();
-    assert!(refused(&folders).contains("000003.txt: has other bytes than when it was written"));
+    assert!(refused(&folders).contains("000003.txt: has changed since it was written"));
 }
 
 /// Changes the first line of a folder's journal, and gives it the checksum of its new bytes if it
@@ -1524,8 +1525,8 @@ fn a_merge_reads_regular_files_of_the_shard_alone() {
     };
     let secret = dir.path().join("secret");
     for (target, why) in [
-        (Some(secret.as_path()), "000003.txt: is a link out of"),
-        (Some(Path::new("/dev/zero")), "000003.txt: is a link out of"),
+        (Some(secret.as_path()), "000003.txt: is a link that leads out of"),
+        (Some(Path::new("/dev/zero")), "000003.txt: is a link that leads out of"),
         (None, "000003.txt: not a regular file"),
     ] {
         std::fs::remove_file(&file).unwrap();
@@ -1600,7 +1601,7 @@ fn numbers_that_no_dataset_has_are_refused() {
             .contains("count: 18446744073709551615 samples")
     );
     edit_journal(&folders[0], "\"k\":0", "\"k\":1", true);
-    assert!(refusal(&folders, &out).contains("line 1: sample 1 is none of shard 1/3 of 20"));
+    assert!(refusal(&folders, &out).contains("line 1: sample 1 is not in shard 1/3 of 20"));
     let e = make(&plan(&out, 1_000_000_000_000))
         .unwrap_err()
         .to_string();
@@ -1636,7 +1637,7 @@ fn fewer_than_there_are_is_refused_and_nothing_is_lost() {
     let before = bytes(dir.path());
     let refused = make(&full_plan(dir.path(), 5)).unwrap_err().to_string();
     assert!(
-        refused.contains("has image 11, but only 5 are asked for: ask for at least 12"),
+        refused.contains("has image 11, but only 5 are requested: request at least 12"),
         "{refused}"
     );
     assert_eq!(before, bytes(dir.path()));
@@ -1673,8 +1674,8 @@ fn a_dataset_of_an_older_program_is_read_and_not_continued() {
     ] {
         let said = refused.unwrap_err().to_string();
         assert!(
-            said.contains("dataset.json: was begun by an older petcomp")
-                && said.ends_with("begin a new folder"),
+            said.contains("dataset.json: was started by an older petcomp")
+                && said.ends_with("use a new folder"),
             "{said}"
         );
     }
@@ -1696,7 +1697,7 @@ fn links_in_place_of_its_own_files_are_refused_by_name() {
         std::fs::copy(other.join("dataset.json"), out.join("dataset.json")).unwrap();
         let refused = make(&plan(&out, 2)).unwrap_err().to_string();
         assert!(
-            refused.contains(&format!("{name}: is a link or no regular file")),
+            refused.contains(&format!("{name}: is a link or not a regular file")),
             "{refused}"
         );
         assert_eq!(std::fs::read_to_string(&victim).unwrap(), "mine");
@@ -1747,7 +1748,7 @@ fn what_was_damaged_at_its_size_is_found_and_made_again() {
         repair(&dir.path().join("images"))
             .unwrap_err()
             .to_string()
-            .contains("begun before")
+            .contains("started before")
     );
 }
 
@@ -2037,11 +2038,11 @@ fn whatever_decides_a_picture_or_a_label_is_compared_before_a_dataset_goes_on() 
     let changes: [(&dyn Fn(), &str); 11] = [
         (
             &in_manifest("class = \"cap\"", "class = \"label\""),
-            r#"assets[a].class: the dataset was begun with "cap", this run has "label""#,
+            r#"assets[a].class: the dataset was started with "cap", this run has "label""#,
         ),
         (
             &in_manifest("mass = 0.02", "mass = 0.03"),
-            "assets[a].mass: the dataset was begun with 0.02, this run has 0.03",
+            "assets[a].mass: the dataset was started with 0.02, this run has 0.03",
         ),
         (
             &in_manifest("thickness = 0.01", "thickness = 0.02"),
@@ -2057,7 +2058,7 @@ fn whatever_decides_a_picture_or_a_label_is_compared_before_a_dataset_goes_on() 
         ),
         (
             &in_manifest("name = \"b\"", "name = \"c\""),
-            r#"assets[1]: the dataset was begun with "b", this run has "c""#,
+            r#"assets[1]: the dataset was started with "b", this run has "c""#,
         ),
         (
             &in_manifest("classes = [\"cap\"", "classes = [\"top\", \"cap\""),
@@ -2065,11 +2066,11 @@ fn whatever_decides_a_picture_or_a_label_is_compared_before_a_dataset_goes_on() 
         ),
         (
             &|| repaint("b.exr", 0.5),
-            "assets[b].photos[b.exr].pixels: the dataset was begun with \"crc32 ",
+            "assets[b].photos[b.exr].pixels: the dataset was started with \"crc32 ",
         ),
         (
             &repaint_tray,
-            "backgrounds[tray].photo: the dataset was begun with \"crc32 ",
+            "backgrounds[tray].photo: the dataset was started with \"crc32 ",
         ),
         (
             &change("photos/tray.label.json", "[9, 39]", "[9, 38]"),
@@ -2193,7 +2194,7 @@ fn a_photo_that_a_label_or_a_manifest_names_is_one_of_its_folder() {
     for file in ["photos/tray.tif", "assets/b.exr"] {
         let said = refused(file);
         assert!(
-            said.contains(file) && said.contains("is a link out of"),
+            said.contains(file) && said.contains("is a link that leads out of"),
             "{said}"
         );
     }

@@ -246,7 +246,7 @@ fn plates_alone_tell_noise_and_say_what_they_do_not() {
     assert!(found.finish.exposure_ev.min < 0.0 && found.finish.exposure_ev.max > 0.0);
     assert_eq!(found.objects, Recipe::default().objects);
     let page = fitted.page.document();
-    assert!(page.contains("nothing tells how many objects there are"));
+    assert!(page.contains("the number, positions and apparent size of the objects are unknown"));
 }
 
 #[test]

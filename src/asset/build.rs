@@ -831,7 +831,10 @@ mod tests {
             added.unwrap_err(),
         ] {
             let told = told.to_string();
-            assert!(told.contains("is read and would be written over"), "{told}");
+            assert!(
+                told.contains("is an input and would be overwritten"),
+                "{told}"
+            );
         }
         assert_eq!(std::fs::read(&photo).unwrap(), before);
         assert!(!folder.path().join("a/two.exr").exists());

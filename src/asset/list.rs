@@ -389,7 +389,10 @@ mod tests {
             ("1.jpg", "cup/1.png"),
         ] {
             let told = told(photo, screen).unwrap_err().to_string();
-            assert!(told.contains("is read and would be written over"), "{told}");
+            assert!(
+                told.contains("is an input and would be overwritten"),
+                "{told}"
+            );
         }
         told("cup/2.jpg", "cup/1.png").unwrap();
     }

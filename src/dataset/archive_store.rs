@@ -112,7 +112,7 @@ fn put_or_compare(store: &dyn ArchiveStore, name: &str, content: Vec<u8>) -> Res
         return Ok(());
     }
     let what = format!(
-        "holds {} bytes that this run does not make, expected its own {bytes}: another petcomp wrote it, or another machine",
+        "holds {} bytes that differ from the {bytes} of this run: another petcomp wrote it, or another machine",
         there.len()
     );
     Err(Error::file(url_of(store, name), what))

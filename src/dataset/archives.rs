@@ -156,7 +156,7 @@ impl<'a> ArchiveLayout<'a> {
         let (_, bad) = journal::repair(&folder)?;
         if bad > 0 {
             let folder = folder.display();
-            log::warn!("{folder}: {bad} images of an archive in the making are made again");
+            log::warn!("{folder}: {bad} images of an unfinished archive are generated again");
         }
         Ok(())
     }

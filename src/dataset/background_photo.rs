@@ -352,7 +352,7 @@ fn warn_of_cameras(labels: &[LabelledPhoto], sightings: &[PhotoCamera]) {
         let count = unreported.len();
         let more = if count > 1 { ", ..." } else { "" };
         log::warn!(
-            "{count} of {solved} cameras solved now have warnings ({first}{more}): `petcomp camera doctor` explains them"
+            "{count} of {solved} newly solved cameras have warnings ({first}{more}): `petcomp camera doctor` explains them"
         );
     }
 }
@@ -377,7 +377,7 @@ fn warn_of_shapes(places: &[BackgroundPhoto]) {
         let (count, of, name) = (odd.len(), places.len(), &least.background.name);
         let [w, h] = least.image;
         log::warn!(
-            "{count} of {of} backgrounds have another shape than the pictures ({w} x {h}): {name}: {note}; change \
+            "{count} of {of} backgrounds differ in aspect ratio from the pictures ({w} x {h}): {name}: {note}; change \
              scene.image or crop them"
         );
     }

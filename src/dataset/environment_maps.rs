@@ -96,8 +96,7 @@ impl InMemory for Panorama {
 }
 
 fn not_listed(name: &str) -> Error {
-    let what =
-        "expected one that the recipe lists (scene.environment.files) or that lies in its folder";
+    let what = "expected one that the recipe lists (scene.environment.files) or one in its folder";
     Error::value("environment.file", format!("\"{name}\", {what}"))
 }
 

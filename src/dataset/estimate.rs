@@ -91,7 +91,10 @@ impl fmt::Display for LongRun {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let about = if self.at_least { "at least" } else { "about" };
         let (time, left, each) = (in_words(self.seconds), self.left, self.each);
-        write!(f, "{about} {time} for {left} pictures, one in {each:.2} s")
+        write!(
+            f,
+            "{about} {time} for {left} pictures, one every {each:.2} s"
+        )
     }
 }
 
@@ -165,11 +168,11 @@ mod tests {
         assert_eq!(cold(30_102).told(25.0), None);
         assert_eq!(
             cold(100_102).told(25.0).as_deref(),
-            Some("about 1.4 hours for 100000 pictures, one in 0.05 s")
+            Some("about 1.4 hours for 100000 pictures, one every 0.05 s")
         );
         assert_eq!(
             cold(30_000_102).told(25.0).as_deref(),
-            Some("about 17 days for 30000000 pictures, one in 0.05 s")
+            Some("about 17 days for 30000000 pictures, one every 0.05 s")
         );
     }
 
@@ -184,7 +187,7 @@ mod tests {
         assert_eq!(TestRun::new(0, 24).told(250.0), None);
         assert_eq!(
             TestRun::new(0, 24).told(400.0).as_deref(),
-            Some("at least 1.3 hours for 24 pictures, one in 200.00 s")
+            Some("at least 1.3 hours for 24 pictures, one every 200.00 s")
         );
         assert_eq!(TestRun::new(0, 30_000).note(1, 10.0).told(50.0), None);
     }

@@ -75,13 +75,13 @@ impl EvalTruth {
     fn of_images(path: &Path, place: PathBuf, images: Vec<PathBuf>) -> Result<Self> {
         let keypoints = YoloSet::keypoint_numbers_of(&place)?;
         if images.is_empty() {
-            let what = "no images to validate with, expected at least one";
+            let what = "no validation images, expected at least one";
             return Err(Error::file(path, what));
         }
         let images = by_name(images);
         let mut labels = images.iter().map(|image| YoloSet::label_of(image));
         if !labels.any(|label| label.is_file()) {
-            let what = "no label files of its images, expected NAME.txt in labels";
+            let what = "no label files for its images, expected NAME.txt in labels";
             return Err(Error::file(path, what));
         }
         let truth = read_pose_truth_of(&images, keypoints)?;
@@ -128,7 +128,7 @@ impl EvalTruth {
         match &self.boxes {
             Boxes::Coco(truth) => truth.classes.clone(),
             Boxes::Yolo { place, .. } => YoloSet::class_names_of(place).unwrap_or_else(|error| {
-                log::warn!("{error}; classes are called by their numbers");
+                log::warn!("{error}; classes are shown by number");
                 Vec::new()
             }),
         }
@@ -250,7 +250,7 @@ mod tests {
         std::fs::write(root.path().join("choice/val.txt"), double).unwrap();
         let truth = EvalTruth::read(&root.path().join("choice"), None, None).unwrap();
         let told = truth.with_detections(&root.path().join("found"));
-        assert!(told.unwrap_err().to_string().contains("a.png: named as "));
+        assert!(told.unwrap_err().to_string().contains("a.png: the same name as "));
         let told = refused("set", None, None);
         assert!(told.contains("a dataset (it has data.yaml)"), "{told}");
         std::fs::remove_file(root.path().join("set/labels/val/a.txt")).unwrap();
@@ -259,7 +259,7 @@ mod tests {
         std::fs::write(root.path().join("choice/val.txt"), "").unwrap();
         let told = refused("choice", None, None);
         assert!(
-            told.contains("choice: no images to validate with"),
+            told.contains("choice: no validation images"),
             "{told}"
         );
     }

@@ -129,7 +129,7 @@ pub(crate) fn reclaim(folder: &Path) -> Result<FolderClaim> {
 
 /// What a dataset that was begun before is made from.
 pub(crate) fn begun(folder: &Path) -> Result<Value> {
-    let before = known_identity(folder, "a dataset that was begun before")?;
+    let before = known_identity(folder, "a dataset that was started before")?;
     io::refuse_links(folder)?;
     of_this_format(&before, folder)?;
     Ok(before)
@@ -150,12 +150,12 @@ pub(crate) fn of_this_format(identity: &Value, folder: &Path) -> Result<()> {
     let (what, others) = match format_of(identity) {
         FORMAT_VERSION => return Ok(()),
         ..FORMAT_VERSION => (
-            "was begun by an older petcomp, which did not record every input",
+            "was started by an older petcomp, which did not record every input",
             "older",
         ),
-        _ => ("was begun by a newer petcomp", "newer"),
+        _ => ("was started by a newer petcomp", "newer"),
     };
-    let what = format!("{what}: finish it with the {others} one, or begin a new folder");
+    let what = format!("{what}: finish it with the {others} one, or use a new folder");
     Err(Error::file(identity_file(folder), what))
 }
 
@@ -193,7 +193,7 @@ pub(crate) fn identity_of_files(folder: &Path) -> Result<Value> {
     if has_files || !has_archives(&identity) {
         return Ok(identity);
     }
-    let what = "archives alone, expected files of single pictures; `dataset generate --preview` makes some, in another folder";
+    let what = "only archives, expected files of single pictures; `dataset generate --preview` writes some to another folder";
     Err(Error::file(folder, what))
 }
 
@@ -296,7 +296,7 @@ pub(crate) fn same(before: &Value, now: &Value, at: &str) -> FieldComparison {
 
 fn differ(before: &Value, now: &Value, at: &str) -> FieldComparison {
     let (before, now) = (brief(before), brief(now));
-    let what = format!("the dataset was begun with {before}, this run has {now}");
+    let what = format!("the dataset was started with {before}, this run has {now}");
     Err((at.to_owned(), what))
 }
 
@@ -316,7 +316,7 @@ fn same_entries(a: &[Value], b: &[Value], at: &str) -> FieldComparison {
     if before == now {
         return Ok(());
     }
-    let what = format!("the dataset was begun with {before} entries, this run has {now}");
+    let what = format!("the dataset was started with {before} entries, this run has {now}");
     Err((at.to_owned(), what))
 }
 
@@ -375,21 +375,21 @@ mod tests {
                 json!([asset("b0", 0.1), asset("b1", 0.3)]),
                 [
                     "assets[b1].mass",
-                    "the dataset was begun with 0.2, this run has 0.3",
+                    "the dataset was started with 0.2, this run has 0.3",
                 ],
             ),
             (
                 json!([asset("b0", 0.1), asset("a", 0.4)]),
                 [
                     "assets[1]",
-                    "the dataset was begun with \"b1\", this run has \"a\"",
+                    "the dataset was started with \"b1\", this run has \"a\"",
                 ],
             ),
             (
                 json!([asset("b0", 0.1)]),
                 [
                     "assets",
-                    "the dataset was begun with 2 entries, this run has 1",
+                    "the dataset was started with 2 entries, this run has 1",
                 ],
             ),
         ] {

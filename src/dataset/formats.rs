@@ -116,7 +116,7 @@ impl LabelConfig {
         }
         check_threshold(options.alpha_threshold)?;
         Bounds::new(0.0, 1000.0, "pixels").check("simplify", self.simplify)?;
-        Bounds::new(1.0, 1e6, "samples in an archive")
+        Bounds::new(1.0, 1e6, "samples per archive")
             .check("webdataset.samples", self.webdataset.samples as f64)
     }
 

@@ -130,7 +130,7 @@ pub fn generate(
         }
         None if plan.store.is_some() => Err(Error::value(
             "labels.formats",
-            "files of single samples, expected [\"webdataset\"] alone: an object store takes archives",
+            "files of single samples, expected only [\"webdataset\"]: an object store takes only archives",
         )),
         None => generate_files(plan, make, progress, stop),
     }

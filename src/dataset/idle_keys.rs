@@ -48,13 +48,13 @@ fn idle_labels(labels: &LabelConfig) -> Vec<String> {
             let name = serde_json::json!(format);
             let table = name.as_str().unwrap_or_default();
             format!(
-                "labels.{table}: changes nothing in the dataset, as {name} is not in labels.formats: {formats}"
+                "labels.{table}: has no effect on the dataset, as {name} is not in labels.formats: {formats}"
             )
         })
         .collect();
     if labels.simplify > 0.0 && !has_polygons(labels) {
         told.push(format!(
-            "labels.simplify: {}, but no layout of labels.formats: {formats} has polygons in the dataset, expected \
+            "labels.simplify: {}, but no layout in labels.formats: {formats} writes polygons, expected \
              labels.yolo.task = \"segment\" or labels.coco.masks = \"polygon\"",
             labels.simplify
         ));
@@ -84,7 +84,7 @@ fn idle_partners(recipe: &Recipe) -> Vec<String> {
 
 fn idle_focus(lens: &LensRanges) -> Vec<String> {
     let told = |key: &str, value: String| {
-        format!("scene.lens.{key}: {value}, but without scene.lens.f_number all is sharp")
+        format!("scene.lens.{key}: {value}, but without scene.lens.f_number everything is sharp")
     };
     let focus = lens.focus_m;
     let focus = focus.map(|metres| told("focus_m", serde_json::json!(metres).to_string()));
@@ -132,7 +132,7 @@ fn idle_light_direction<'a>(
     (!flat.is_empty()).then(|| {
         let names = some_of(&flat);
         format!(
-            "{key}, but neither scene.walls nor the label tells of walls in {names}: light stands there as it is drawn"
+            "{key}, but neither scene.walls nor the label gives walls in {names}: lights stay as drawn there"
         )
     })
 }
@@ -185,15 +185,15 @@ mod tests {
         assert_eq!(
             told("formats = ['yolo']\ncoco = { masks = 'polygon' }\nlayers = { cards = true }"),
             [
-                r#"labels.coco: changes nothing in the dataset, as "coco" is not in labels.formats: ["yolo"]"#,
-                r#"labels.layers: changes nothing in the dataset, as "layers" is not in labels.formats: ["yolo"]"#,
+                r#"labels.coco: has no effect on the dataset, as "coco" is not in labels.formats: ["yolo"]"#,
+                r#"labels.layers: has no effect on the dataset, as "layers" is not in labels.formats: ["yolo"]"#,
             ]
         );
         let polygons = "formats = ['coco']\nsimplify = 1\ncoco = { masks = 'polygon' }";
         assert_eq!(told(polygons), [""; 0]);
         assert_eq!(told("coco = { masks = 'rle' }"), [""; 0]);
         let simplified = told("simplify = 1");
-        assert!(simplified[0].starts_with("labels.simplify: 1, but no layout of labels.formats: "));
+        assert!(simplified[0].starts_with("labels.simplify: 1, but no layout in labels.formats: "));
     }
 
     #[test]
@@ -202,8 +202,8 @@ mod tests {
         assert_eq!(
             told("lens = { focus_m = [0.5, 0.8], sensor_mm = 6 }"),
             [
-                "scene.lens.focus_m: [0.5,0.8], but without scene.lens.f_number all is sharp",
-                "scene.lens.sensor_mm: 6, but without scene.lens.f_number all is sharp",
+                "scene.lens.focus_m: [0.5,0.8], but without scene.lens.f_number everything is sharp",
+                "scene.lens.sensor_mm: 6, but without scene.lens.f_number everything is sharp",
             ]
         );
         assert_eq!(
@@ -242,8 +242,7 @@ mod tests {
         assert_eq!(told(&drawn), None);
         assert_eq!(
             told(&matched).unwrap(),
-            "scene.light_direction: \"match_walls\", but neither scene.walls nor the label tells of walls in table, room: \
-             light stands there as it is drawn"
+            "scene.light_direction: \"match_walls\", but neither scene.walls nor the label gives walls in table, room: lights stay as drawn there"
         );
         assert!(told(&walled).unwrap().contains("walls in table: "));
         assert!(

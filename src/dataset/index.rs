@@ -119,7 +119,10 @@ impl DatasetIndex {
             classes: folder::known_classes(&identity),
             labelling: Labelling::of_identity(&identity),
             pictures: pictures.collect::<Option<_>>().ok_or_else(|| {
-                Error::file(folder.join(JOURNAL), "a sample without picture or record")
+                Error::file(
+                    folder.join(JOURNAL),
+                    "a sample without a picture or a record",
+                )
             })?,
         })
     }
@@ -197,10 +200,8 @@ impl DatasetIndex {
             of("rejected scenes", &|row| {
                 Some(written(row)?.rejected.into())
             }),
-            of("bytes of the picture", &|row| {
-                Some(written(row)?.bytes as f64)
-            }),
-            of("percent seen of the one seen least", &|row| {
+            of("bytes of the file", &|row| Some(written(row)?.bytes as f64)),
+            of("percent visible of the least visible object", &|row| {
                 facts(row)?.least_visible_percent()
             }),
         ]
@@ -431,7 +432,7 @@ mod tests {
         let index = DatasetIndex::open(dataset().path()).unwrap();
         let unlike = index.unlike(|_| None);
         assert_eq!((unlike.len(), unlike[0].row), (1, 4));
-        assert_eq!(unlike[0].why, "objects 41, as a rule 2");
+        assert_eq!(unlike[0].why, "objects 41, typically 2");
     }
 
     #[test]

@@ -47,7 +47,7 @@ impl Journal {
         let syncing = sync(&file, &path)?;
         let read = read_journal(&file, &path, false)?;
         let count = read.len();
-        warn_of_damage(&read, &path, "their samples are made again");
+        warn_of_damage(&read, &path, "their samples are generated again");
         let lines = lines_with_files(undamaged(read).collect(), folder);
         if lines.len() < count {
             // Or new lines would push those that are forgotten out of what the next run compares.
@@ -133,7 +133,7 @@ fn sync(journal: &File, path: &Path) -> Result<Syncing> {
         Ok(false) => Ok(Syncing::Alone),
         Err(e) => {
             let what = format!(
-                "the last samples cannot be put on the disk: {e}; the same command compares them and goes on"
+                "the last samples cannot be synced to the disk: {e}; rerun the same command to check them and resume"
             );
             Err(Error::file(path, what))
         }

@@ -186,7 +186,7 @@ impl WrittenFile {
         let path = &self.path;
         match Self::read_back(folder, Path::new(path)) {
             Ok(found) if found.crc32 == self.crc32 => None,
-            Ok(_) => Some(format!("{path} has other bytes than when it was written")),
+            Ok(_) => Some(format!("{path} has changed since it was written")),
             Err(e) => Some(e.to_string()),
         }
     }
@@ -212,9 +212,9 @@ const SEAL: &str = ",\"crc32\":";
 fn without_seal(text: &[u8], is_older: bool) -> std::result::Result<Vec<u8>, String> {
     match split_seal(text) {
         Some((body, crc32)) if crc32fast::hash(body) == crc32 => Ok([body, b"}"].concat()),
-        Some(_) => Err("has other bytes than when it was written".into()),
+        Some(_) => Err("has changed since it was written".into()),
         None if is_older => Ok(text.to_vec()),
-        None => Err("has no checksum, or is torn".into()),
+        None => Err("has no checksum, or is truncated".into()),
     }
 }
 

@@ -83,7 +83,7 @@ fn own_line(
         Ok(line)
     } else {
         Err(format!(
-            "sample {k} is none of shard {shard} of {count} samples"
+            "sample {k} is not in shard {shard} of {count} samples"
         ))
     }
 }

@@ -88,7 +88,10 @@ impl Pictures {
         let lossy = io::through_jpeg(&codes, self.quality(seed, k), self.chroma(seed, k));
         lossy.ok_or_else(|| {
             let (w, h) = codes.size();
-            Error::value("picture", format!("{w} x {h} pixels, which no JPEG holds"))
+            Error::value(
+                "picture",
+                format!("{w} x {h} pixels, more than a JPEG can hold"),
+            )
         })
     }
 

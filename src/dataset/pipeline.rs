@@ -165,7 +165,7 @@ impl Pipeline {
         }
         let what = format!(
             "the median object of {median:.3} m is {px:.1} px long in pictures of {w} x {h}, expected at least \
-             {LEAST_OBJECT_PX}; are width_m and height_m in metres, scene.image and scene.scale large enough?"
+             {LEAST_OBJECT_PX}; are width_m and height_m in metres, and scene.image and scene.scale large enough?"
         );
         Err(Error::value("surface", what).in_file(&place.label))
     }

@@ -69,7 +69,7 @@ fn parsed(value: &str) -> std::result::Result<Value, String> {
     value
         .trim()
         .parse()
-        .map_err(|_| format!("{value}, expected a value as TOML has it"))
+        .map_err(|_| format!("{value}, expected a TOML value"))
 }
 
 fn is_empty_table(value: &Value) -> bool {
@@ -263,7 +263,9 @@ fn insert(item: &mut Item, steps: &[Step], value: Value) -> std::result::Result<
 }
 
 fn insert_key(item: &mut Item, key: &str, value: Value) -> std::result::Result<(), String> {
-    let table = item.as_table_like_mut().ok_or("goes into a value")?;
+    let table = item
+        .as_table_like_mut()
+        .ok_or("its parent is not a table")?;
     table.insert(key, Item::Value(value));
     if let Some(inline) = item.as_inline_table_mut() {
         inline.fmt();
@@ -277,7 +279,9 @@ fn entry<'i>(
     key: &str,
     rest: &[Step],
 ) -> std::result::Result<&'i mut Item, &'static str> {
-    let table = item.as_table_like_mut().ok_or("goes into a value")?;
+    let table = item
+        .as_table_like_mut()
+        .ok_or("its parent is not a table")?;
     if !table.contains_key(key) {
         table.insert(key, empty_for(rest));
     }
@@ -466,6 +470,6 @@ mod tests {
         };
         assert!(error("scene = 3\n", "scene.scale", "1").contains("scene.scale: "));
         assert!(error("[scene\n", "scene.scale", "1").contains("line 1"));
-        assert!(error("", "scene.scale", "[1,").contains("expected a value as TOML has it"));
+        assert!(error("", "scene.scale", "[1,").contains("expected a TOML value"));
     }
 }

@@ -41,7 +41,7 @@ impl Progress {
 
     pub(super) fn describe(&self, folder: &Path) -> String {
         let (done, asked, folder) = (self.done, self.count, folder.display());
-        format!("{done} of {asked} samples are in {folder}; the same command goes on")
+        format!("{done} of {asked} samples are in {folder}; rerun the same command to resume")
     }
 
     /// That of a run of which another one is a part.
@@ -135,8 +135,7 @@ fn check_nothing_beyond(journal: &Journal, count: u64, plan: &Plan) -> Result<()
         return Ok(());
     }
     let what = format!(
-        "has image {}, but only {count} are asked for: ask for at least {end}, or begin a new folder (`petcomp dataset \
-         subset` lists a part of one)",
+        "has image {}, but only {count} are requested: request at least {end}, or use a new folder (`petcomp dataset subset` lists a part of one)",
         end - 1
     );
     Err(Error::file(&plan.folder, what))

@@ -82,7 +82,7 @@ impl DatasetConfig {
 
     fn with_scene_folders(mut self, scene: &Scene, path: &Path) -> Result<Self> {
         let files = scene.files.as_ref().ok_or_else(|| {
-            let what = "missing, expected a table that names the folders of assets and backgrounds, or a recipe beside the scene";
+            let what = "missing, expected a table that names the folders of assets and backgrounds, or a recipe in addition to the scene";
             Error::value("files", what)
         })?;
         let folder = folder_of(path);
@@ -168,7 +168,7 @@ fn check_scene_table(settings: &Table) -> Result<()> {
     }
 }
 
-/// Fails for a key of a recipe that does nothing in a scene.
+/// Fails for a key of a recipe that has no effect on a scene.
 fn check_counts(given: &io::Override) -> Result<()> {
     let path = given.path();
     match path.split('.').next() {
@@ -186,7 +186,7 @@ fn counts_for_scene(key: &str) -> bool {
 fn of_no_scene(key: &str) -> Error {
     let known = SCENE_KEYS.join(", ");
     let what =
-        format!("does nothing in a scene, expected {known} or pictures; folders are in files");
+        format!("has no effect on a scene, expected {known} or pictures; folders are in files");
     Error::value(key, what)
 }
 
@@ -368,7 +368,7 @@ mod tests {
         assert!(whole.starts_with("scene: decides"), "{whole}");
         let idle = given("split.val_percent=5").unwrap_err();
         assert!(
-            idle.starts_with("split.val_percent: does nothing in a scene"),
+            idle.starts_with("split.val_percent: has no effect on a scene"),
             "{idle}"
         );
         for counts in ["scene.settle.attempts=3", "pictures.jpeg_quality=5"] {
@@ -392,7 +392,7 @@ mod tests {
             ("assets", "assets = \"elsewhere\"\n"),
             ("backgrounds", "backgrounds = \"elsewhere\"\n"),
         ] {
-            let expected = format!("settings.{key}: does nothing in a scene, expected render, ");
+            let expected = format!("settings.{key}: has no effect on a scene, expected render, ");
             assert!(told(settings).starts_with(&expected), "{}", told(settings));
         }
         let misspelt = told("[rendr]\nsubsamples = 2\n");

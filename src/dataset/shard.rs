@@ -36,7 +36,7 @@ impl SampleRange {
     pub(crate) fn check(self, count: u64) -> Result<()> {
         match self {
             Self::One(k) if k >= count => {
-                let what = format!("{k}, expected a number below that of the images, {count}");
+                let what = format!("{k}, expected a number below the number of images, {count}");
                 Err(Error::value("only", what))
             }
             _ => Ok(()),
@@ -215,7 +215,7 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
             return Err(Error::value("shard", what));
         };
         let of = of.ok_or_else(|| {
-            let what = "Kubernetes does not tell the number of shards: say auto/N";
+            let what = "Kubernetes does not give the number of shards: use auto/N";
             Error::value("shard", what)
         })?;
         Shard::new(index.saturating_add(1), of)
@@ -224,7 +224,7 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
     fn aws_batch_shard(&self, index: u64, of: Option<u64>) -> Result<Shard> {
         let of = of.or(self.number("AWS_BATCH_JOB_ARRAY_SIZE")?);
         let of = of.ok_or_else(|| {
-            let what = "AWS_BATCH_JOB_ARRAY_SIZE is not set: say auto/N";
+            let what = "AWS_BATCH_JOB_ARRAY_SIZE is not set: use auto/N";
             Error::value("shard", what)
         })?;
         Shard::new(index.saturating_add(1), of)
@@ -244,7 +244,7 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
         check_first_task(first)?;
         let step = self.number("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1).max(1);
         let of = self.slurm_task_count(first, step)?.ok_or_else(|| {
-            let what = "SLURM_ARRAY_TASK_COUNT is not set: say auto/N";
+            let what = "SLURM_ARRAY_TASK_COUNT is not set: use auto/N";
             Error::value("shard", what)
         })?;
         let past = tasks_before(id, first)?;
@@ -272,7 +272,7 @@ fn shard_of_task(id: u64, first: Option<u64>, of: u64) -> Result<Shard> {
     if id > 0 && first != Some(0) {
         return Shard::new(id, of);
     }
-    let what = format!("an array from 0, expected 1-{of} for auto/{of}; otherwise say I/{of}");
+    let what = format!("an array from 0, expected 1-{of} for auto/{of}; otherwise use I/{of}");
     Err(Error::value("SLURM_ARRAY_TASK_MIN", what))
 }
 
@@ -282,7 +282,7 @@ fn check_first_task(first: u64) -> Result<()> {
         return Ok(());
     }
     let what = format!(
-        "{first}, expected 0 or 1: tasks are missing; to repeat tasks of an array 1-N say auto/N, of another one I/N"
+        "{first}, expected 0 or 1: tasks are missing; to repeat tasks of an array 1-N use auto/N, of any other array I/N"
     );
     Err(Error::value("SLURM_ARRAY_TASK_MIN", what))
 }

@@ -90,9 +90,9 @@ impl UnlabelledReason {
     pub fn description(self) -> &'static str {
         match self {
             Self::Covered => "another object lies over it",
-            Self::Outside => "nothing of it lies in the picture",
-            Self::Truncated => "too much of it lies outside of the picture",
-            Self::NoMask => "it covers too little of every pixel for a mask",
+            Self::Outside => "it lies outside the picture",
+            Self::Truncated => "too much of it lies outside the picture",
+            Self::NoMask => "it covers too little of each pixel for a mask",
             Self::LeftOut => "left out by the recipe",
         }
     }

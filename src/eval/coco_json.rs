@@ -228,13 +228,13 @@ fn places(list: &str, ids: impl Iterator<Item = i64>) -> Result<BTreeMap<i64, us
 }
 
 fn repeated_id(list: &str, i: usize, id: i64, first: usize) -> Error {
-    let what = format!("{id}, as of {list}[{first}], expected another");
+    let what = format!("{id}, the same as {list}[{first}], expected a unique id");
     Error::value(format!("{list}[{i}].id"), what)
 }
 
 fn look_up<T: Copy>(places: &BTreeMap<i64, T>, field: &str, id: i64) -> Result<T> {
     let place = places.get(&id).copied();
-    place.ok_or_else(|| Error::value(field, format!("{id}, expected one that the truth lists")))
+    place.ok_or_else(|| Error::value(field, format!("{id}, expected one listed in the truth")))
 }
 
 impl ImageRecord {
@@ -449,7 +449,7 @@ mod tests {
         };
         assert_eq!(
             truth("\"id\": 3,", "\"id\": 7,"),
-            "images[1].id: 7, as of images[0], expected another"
+            "images[1].id: 7, the same as images[0], expected a unique id"
         );
         assert!(
             truth("[1, 2, 3, 4]", "[1, 2, -3, 4]")
@@ -514,7 +514,7 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(
-            said.contains("[0].image_id: 8, expected one that the truth lists"),
+            said.contains("[0].image_id: 8, expected one listed in the truth"),
             "{said}"
         );
     }

@@ -113,7 +113,7 @@ pub(crate) fn confusion_picture(confusion: &Confusion, names: &[String], shown: 
          font-family=\"sans-serif\" font-size=\"{:.1}\">\n<rect width=\"{width}\" height=\"{side}\" fill=\"white\"/>\n",
         (0.42 * cell).min(12.0)
     );
-    svg += &word([8.0, 20.0], "start", "found, down; true, across", "");
+    svg += &word([8.0, 20.0], "start", "rows: found; columns: true", "");
     svg += &matrix.names(cell);
     svg += &matrix.lines(cell);
     for (&at, &count) in &matrix.counts {

@@ -71,7 +71,7 @@ fn pass_over(unknown: Vec<Error>, are_all: bool) -> Result<()> {
     if are_all {
         return Err(first);
     }
-    log::warn!("tags: {count} lines are passed over, the first: {first}");
+    log::warn!("tags: {count} lines are ignored, the first: {first}");
     Ok(())
 }
 
@@ -118,8 +118,9 @@ impl<'a> Images<'a> {
             None | Some(&[]) => Ok(None),
             Some(&[image]) => Ok(Some(image)),
             Some(&[first, second, ..]) => {
-                let what =
-                    format!("image \"{name}\" may be {first} or {second}, expected its folder too");
+                let what = format!(
+                    "image \"{name}\" could be {first} or {second}, expected its folder too"
+                );
                 Err(Error::value("document", what))
             }
         }
@@ -236,7 +237,7 @@ mod tests {
         );
         assert_eq!(
             tags_of("image,light\n1.png,dim\n", &images).unwrap_err(),
-            "line 2: image \"1.png\" may be cam0/1 or cam1/1, expected its folder too"
+            "line 2: image \"1.png\" could be cam0/1 or cam1/1, expected its folder too"
         );
     }
 

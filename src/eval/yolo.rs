@@ -152,7 +152,7 @@ impl LabelFolder {
     fn missing_image(&self, name: &str) -> Error {
         let label = self.labels[name].display();
         let what = format!(
-            "no image \"{name}\" (.jpg, .png, ..) for {label} to take the size from; name their folder (--images) or their size (--size)"
+            "no image \"{name}\" (.jpg, .png, ..) for {label} to take the size from; give their folder (--images) or their size (--size)"
         );
         Error::file(&self.image_folder, what)
     }
@@ -283,7 +283,7 @@ pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> 
     let (known, files) = (truth.places_by_name()?, text_files(folder, |_| true)?);
     if files.is_empty() {
         let folder = folder.display();
-        log::warn!("{folder}: no NAME.txt, so nothing was found in any image");
+        log::warn!("{folder}: no NAME.txt, so there are no detections in any image");
     }
     let found: Vec<(usize, Vec<Detection>)> = files
         .par_iter()
@@ -339,7 +339,7 @@ fn warn_repeated(images: &[LabelledImage]) {
     if let Some(first) = images.iter().find(|image| image.repeated > 0) {
         let name = &first.sheet.image;
         log::warn!(
-            "labels: rows of equal class, box and keypoints count once, as in training: {count} are left out, the first of image \"{name}\""
+            "labels: rows with the same class, box and keypoints count once, as in training: {count} are ignored, the first in image \"{name}\""
         );
     }
 }
@@ -442,7 +442,7 @@ fn by_name(paths: Vec<PathBuf>) -> Result<FilesByName> {
 fn same_name(path: &Path, first: &Path) -> Error {
     let first = first.display();
     let what = format!(
-        "named as {first}, expected another name: folders do not tell images apart; of several runs, name each one's own folder"
+        "the same name as {first}, expected another: folders do not distinguish images; for several runs, give each one's own folder"
     );
     Error::file(path, what)
 }
@@ -483,7 +483,7 @@ fn parse_row(line: &str, extra: usize, keypoints: usize) -> Parsed<LabelRow> {
     let shares = box_around(place).ok_or_else(|| too_few(&numbers, extra))?;
     let confidence = rest.first().copied().unwrap_or(1.0);
     check_confidence(confidence)
-        .map_err(|what| format!("{what}; is it the id of a track? (save_conf=True)"))?;
+        .map_err(|what| format!("{what}; is it a track id? (save_conf=True)"))?;
     Ok(LabelRow {
         class,
         shares,
@@ -509,7 +509,7 @@ fn take_keypoints(numbers: &mut Vec<f64>, extra: usize, keypoints: usize) -> Par
             ", and a confidence (save_conf=True)"
         };
         return Err(format!(
-            "{count} numbers behind the class, expected cx cy w h and {keypoints} of keypoints (kpt_shape){confidence}"
+            "{count} numbers after the class, expected cx cy w h and {keypoints} of keypoints (kpt_shape){confidence}"
         ));
     }
     let taken = numbers.drain(BOX_NUMBERS..BOX_NUMBERS + keypoints);
@@ -550,7 +550,7 @@ fn parse_finite(word: &str) -> Parsed<f64> {
 fn check_shares(place: &[f64]) -> Parsed<()> {
     if let Some(far) = place.iter().find(|share| share.abs() > MAX_SHARE) {
         return Err(format!(
-            "{far}, expected a share of the image, 0 to 1; is it in pixels?"
+            "{far}, expected a fraction of the image, 0 to 1; is it in pixels?"
         ));
     }
     match *place {
@@ -589,7 +589,7 @@ fn too_few(numbers: &[f64], extra: usize) -> String {
         "cx cy w h confidence"
     };
     format!(
-        "{} numbers behind the class, expected {expected}",
+        "{} numbers after the class, expected {expected}",
         numbers.len()
     )
 }
@@ -665,8 +665,8 @@ mod tests {
         let labels = folder(&[("a.txt", BOX), ("room1/a.txt", BOX)]);
         let told = read_yolo_truth(labels.path(), None, Some([9, 9])).unwrap_err();
         let told = told.to_string();
-        assert!(told.contains("room1/a.txt: named as ") && told.contains("/a.txt, expected"));
-        assert!(told.ends_with("name each one's own folder"), "{told}");
+        assert!(told.contains("room1/a.txt: the same name as ") && told.contains("/a.txt, expected"));
+        assert!(told.ends_with("give each one's own folder"), "{told}");
         let labels = folder(&[("a.txt", BOX)]);
         let images = folder(&[("a.jpg", ""), ("a.heic", "")]);
         let truth = read_yolo_truth(labels.path(), Some(images.path()), Some([9, 9])).unwrap();
@@ -676,7 +676,7 @@ mod tests {
         std::fs::write(images.path().join("room1/a.jpg"), "").unwrap();
         let told = read_yolo_truth(labels.path(), Some(images.path()), Some([9, 9])).unwrap_err();
         assert!(
-            told.to_string().contains("room1/a.jpg: named as "),
+            told.to_string().contains("room1/a.jpg: the same name as "),
             "{told}"
         );
     }
@@ -731,8 +731,7 @@ mod tests {
     #[test]
     fn the_id_of_a_track_is_no_confidence() {
         let parsed = |line: &str| parse_detections(line, [10, 10], 0);
-        let said =
-            "line 1: 7, expected a confidence, 0 to 1; is it the id of a track? (save_conf=True)";
+        let said = "line 1: 7, expected a confidence, 0 to 1; is it a track id? (save_conf=True)";
         assert_eq!(parsed("0 0.5 0.5 0.2 0.2 7").unwrap_err(), said);
         let tracked = parsed("0 0.5 0.5 0.2 0.2 0.25 7").unwrap();
         assert_eq!(tracked, parsed("0 0.5 0.5 0.2 0.2 0.25").unwrap());
@@ -743,7 +742,7 @@ mod tests {
         );
         for bad in ["0 0.5 0.5 0.2 0.2 7 0.25", "0 0.1 0.1 0.2 0.2 0.3 0.25"] {
             let told = parsed(bad).unwrap_err();
-            assert!(told.contains("6 numbers behind the class"), "{told}");
+            assert!(told.contains("6 numbers after the class"), "{told}");
         }
     }
 
@@ -755,7 +754,7 @@ mod tests {
         assert_eq!(truth("0.1 0.2 2 0.9 0.8 1"), boxes);
         assert_eq!(truth(""), boxes);
         let expected =
-            "line 1: 6 numbers behind the class, expected cx cy w h and 6 of keypoints (kpt_shape)";
+            "line 1: 6 numbers after the class, expected cx cy w h and 6 of keypoints (kpt_shape)";
         assert_eq!(truth("0.1 0.2").unwrap_err(), expected);
         let found = |points: &str, end: &str| {
             let line = format!("{place} {points} {end}");
@@ -765,7 +764,7 @@ mod tests {
             assert_eq!(found("0.1 0.2 0.9 0.9 0.8 0.7", end), found("", "0.25"));
         }
         let unsure = parse_detections(&format!("{place} 0.1 0.2 2 0.9 0.8 1"), size, 6);
-        let expected = "line 1: 10 numbers behind the class, expected cx cy w h and 6 of keypoints (kpt_shape), and a confidence (save_conf=True)";
+        let expected = "line 1: 10 numbers after the class, expected cx cy w h and 6 of keypoints (kpt_shape), and a confidence (save_conf=True)";
         assert_eq!(unsure.unwrap_err(), expected);
     }
 
@@ -811,13 +810,13 @@ mod tests {
                 .unwrap_err()
                 .to_string()
         };
-        assert!(said("0 0.5 0.5 0.1\n").contains("a.txt: line 1: 3 numbers behind the class"));
+        assert!(said("0 0.5 0.5 0.1\n").contains("a.txt: line 1: 3 numbers after the class"));
         assert!(said("0 0.5 0.5 0.1 0.1\ncap 0 0 0 0\n").contains("line 2: class \"cap\""));
         assert!(said("0 0.5 NaN 0.1 0.1").contains("\"NaN\", expected a number"));
         assert!(said("0 0.5 1e999 0.1 0.1").contains("\"1e999\", expected a number"));
         assert!(
             said("0 320 240 100 80")
-                .contains("320, expected a share of the image, 0 to 1; is it in pixels?")
+                .contains("320, expected a fraction of the image, 0 to 1; is it in pixels?")
         );
         assert!(
             said("0 0.5 0.5 -0.1 0.1")

@@ -109,7 +109,7 @@ pub(super) fn warn_unreadable(notes: &CameraNotes, path: &Path) {
     if notes.unreadable {
         let path = path.display();
         log::warn!(
-            "{path}: its EXIF data cannot be read: focal length, and orientation if it stands only there, are unknown"
+            "{path}: its EXIF data cannot be read: the focal length, and the orientation if stored only there, are unknown"
         );
     }
 }

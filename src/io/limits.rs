@@ -149,7 +149,7 @@ impl Limits {
             return Ok(());
         }
         Err(format!(
-            "{width} x {height} pixels, expected at least 1 x 1 and at most {side} a side and {pixels} in all"
+            "{width} x {height} pixels, expected at least 1 x 1 and at most {side} a side and {pixels} in total"
         ))
     }
 
@@ -247,7 +247,7 @@ impl Limits {
         if bytes <= RATIO_FREE_BYTES {
             return Ok(());
         }
-        let what = "decoded bytes for each byte of the file";
+        let what = "decoded bytes per byte of the file";
         at_most(bytes / file_bytes.max(1), self.ratio, what, "ratio")
     }
 
@@ -367,7 +367,7 @@ pub(super) fn affordable(bytes: u64) -> std::result::Result<(), String> {
     }
     let mebibytes = bytes >> 20;
     Err(format!(
-        "needs {mebibytes} MiB of memory, more than the system gives"
+        "needs {mebibytes} MiB of memory, more than the system provides"
     ))
 }
 
@@ -499,7 +499,7 @@ mod tests {
         assert!(
             affordable(u64::MAX)
                 .unwrap_err()
-                .contains("more than the system gives")
+                .contains("more than the system provides")
         );
     }
 
@@ -517,7 +517,7 @@ mod tests {
         };
         assert_eq!(wide.check_bounds(demand), Ok(1 << 54));
         let e = wide.check(demand).unwrap_err();
-        assert!(e.contains("more than the system gives"), "{e}");
+        assert!(e.contains("more than the system provides"), "{e}");
     }
 
     #[test]

@@ -181,7 +181,7 @@ fn usable_profile(
         .is_some_and(|profile| profile.has_unapplied_table)
     {
         log::warn!(
-            "{path}: has a colour profile with a lookup table, which is not applied; its primaries and curves are"
+            "{path}: has a colour profile with a lookup table, which is ignored; its primaries and curves are used"
         );
     }
     profile
@@ -246,7 +246,7 @@ fn warn_left_out(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     if left_out.unwrap_or(false) {
         let path = source.path.display();
         log::warn!(
-            "{path}: has samples beside its colours, the first of which is not called alpha (ExtraSamples 1 or 2); left out"
+            "{path}: has extra samples, the first of which is not declared as alpha (ExtraSamples 1 or 2); ignored"
         );
     }
 }
@@ -259,7 +259,7 @@ fn warn_narrow_range(source: &SourceFile, limits: &Limits, wanted: Wanted) {
     let is_narrow = catch_panic(|| Ok(png::has_narrow_range(&source.bytes, limits)));
     if is_narrow.unwrap_or(false) {
         let path = source.path.display();
-        log::warn!("{path}: has codes of narrow range (cICP), taken as full range");
+        log::warn!("{path}: has narrow-range codes (cICP), treated as full range");
     }
 }
 

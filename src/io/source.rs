@@ -72,7 +72,9 @@ fn recognized(path: &Path, start: &[u8]) -> std::result::Result<Format, String> 
     match Format::from_bytes(start) {
         Some(format) if is_misnamed_scan(path, format) => {
             let name = format.name();
-            Err(format!("is {name} under another name, {EXPECTED_FORMATS}"))
+            Err(format!(
+                "is {name} with another extension, {EXPECTED_FORMATS}"
+            ))
         }
         Some(format) => Ok(format),
         None => Err(format!(

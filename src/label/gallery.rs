@@ -55,7 +55,7 @@ impl Figure {
         let scale = scale_of(&picture, size);
         let [columns, rows] = visible_pixels(&picture, &view, scale);
         if columns.is_empty() || rows.is_empty() {
-            let what = "nothing of it lies in the part to be shown";
+            let what = "none of it is in the part to show";
             return Err(Error::file(path, what));
         }
         Ok(Self {

@@ -27,7 +27,7 @@ fn check_lights(lights: &[AreaLight]) -> Result<()> {
     let mut numbered = lights.iter().enumerate();
     numbered.try_for_each(|(i, light)| {
         let at = format!("lights[{i}]");
-        require(is_finite(light), &at, "not finite, expected numbers")
+        require(is_finite(light), &at, "not finite, expected finite numbers")
     })
 }
 
@@ -60,7 +60,7 @@ fn check_sky(shot: &Shot) -> Result<()> {
     require(
         shot.exposure.is_finite() && shot.ambient.is_finite(),
         "exposure",
-        "exposure or ambient is not finite, expected numbers",
+        "exposure or ambient is not finite, expected finite numbers",
     )
 }
 
@@ -81,7 +81,10 @@ fn check_ids(cards: &[Card]) -> Result<()> {
     ids.sort_unstable();
     match ids.windows(2).find(|pair| pair[0] == pair[1]) {
         Some(pair) => {
-            let what = format!("id {} is used twice, expected one card each", pair[0]);
+            let what = format!(
+                "id {} is used twice, expected a unique id for each card",
+                pair[0]
+            );
             Err(Error::value("cards", what))
         }
         None => Ok(()),

@@ -75,7 +75,7 @@ impl Default for RenderOptions {
 const SUBSAMPLES: Bounds = Bounds::new(1.0, 16.0, "quality reference has 6");
 const LIGHT_SAMPLES: Bounds = Bounds::new(1.0, 32.0, "quality reference has 8");
 const AMBIENT_SAMPLES: Bounds = Bounds::new(1.0, 4096.0, "quality reference has 400");
-const CELL_PX: Bounds = Bounds::new(0.25, 16.0, "pixels; smaller cells resolve nothing more");
+const CELL_PX: Bounds = Bounds::new(0.25, 16.0, "pixels; smaller cells resolve no more");
 
 /// Longest pictures whose cells are as long as they are told. Two of 1920 x 1080 with 30 bottles have
 /// the same error at cells of 1.5 and 3 pixels (0.00167, 0.00166), and 8 % more at 4.5.

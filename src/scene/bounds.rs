@@ -12,25 +12,26 @@ pub(crate) const MAX_LIGHTS: usize = 64;
 
 pub(super) const SHARE: Bounds = Bounds::new(0.0, 1.0, "a share");
 pub(super) const SCALE: Bounds = Bounds::new(0.01, 100.0, "a factor on objects of 5 mm to 5 m");
-pub(super) const EV: Bounds = Bounds::new(-32.0, 32.0, "what 32-bit pictures hold");
+pub(super) const EV: Bounds = Bounds::new(-32.0, 32.0, "the range of 32-bit pictures");
 /// The exposure of a scene, which is solved from light of any brightness: more than what people
 /// type.
-pub(super) const SOLVED_EV: Bounds = Bounds::new(-100.0, 100.0, "what single precision holds");
+pub(super) const SOLVED_EV: Bounds = Bounds::new(-100.0, 100.0, "the range of single precision");
 pub(super) const TURN: Bounds = Bounds::new(-3600.0, 3600.0, "degrees; a turn is 360");
 pub(super) const TILT: Bounds = Bounds::new(-180.0, 180.0, "degrees");
 pub(super) const ACROSS: Bounds = Bounds::new(-1.0, 1.0, "the walls");
 pub(super) const SHIFT: Bounds = Bounds::new(-1.0, 1.0, "the photo's edges");
 pub(super) const GAP: Bounds = Bounds::metres(1e-6, 1.0, "objects are stacked before they fall");
 pub(super) const GRADE: Bounds = Bounds::new(0.0, 100.0, "a factor");
-pub(super) const WEIGHT: Bounds = Bounds::new(0.0, 1e6, "how likely beside the others");
+pub(super) const WEIGHT: Bounds = Bounds::new(0.0, 1e6, "likelihood relative to the others");
 /// Degrees that a card turns from one end to the other. Beyond 60 it hides parts of itself from a
 /// camera that looks down on it by 45 degrees, and its body would no longer fall as a flat one.
 pub(super) const BEND: Bounds = Bounds::new(-60.0, 60.0, "degrees from end to end");
 pub(super) const LIGHT_HEIGHT: Bounds =
-    Bounds::metres(0.001, 1000.0, "farther off a light is a sun");
-pub(super) const LIGHT_OFFSET: Bounds = Bounds::metres(0.0, 1000.0, "farther off a light is a sun");
+    Bounds::metres(0.001, 1000.0, "a light farther away is a sun");
+pub(super) const LIGHT_OFFSET: Bounds =
+    Bounds::metres(0.0, 1000.0, "a light farther away is a sun");
 pub(super) const LIGHT_SIZE: Bounds = Bounds::metres(1e-4, 1000.0, "from a point to a sky");
-pub(super) const RADIANCE: Bounds = Bounds::new(0.0, 1e9, "what single precision adds up");
+pub(super) const RADIANCE: Bounds = Bounds::new(0.0, 1e9, "what single precision can sum");
 /// Temperatures that [`planckian`](crate::color::planckian) knows.
 pub(super) const KELVIN: Bounds =
     Bounds::new(1667.0, 25_000.0, "kelvin, from a candle to a blue sky");
@@ -52,14 +53,14 @@ pub(super) const F_NUMBER: Bounds = Bounds::new(
     1000.0,
     "focal length over aperture; photo lenses have 1 to 32",
 );
-pub(super) const FOCUS: Bounds = Bounds::metres(0.001, 1e6, "farther off is at infinity");
+pub(super) const FOCUS: Bounds = Bounds::metres(0.001, 1e6, "anything farther is at infinity");
 pub(super) const WAY: Bounds = Bounds::new(-1e6, 1e6, "metres on a belt");
-pub(super) const FRAMES: Bounds = Bounds::new(1.0, 1e6, "pictures of a sequence");
-pub(super) const FRAME_RATE: Bounds = Bounds::new(1e-3, 1e5, "pictures in a second");
+pub(super) const FRAMES: Bounds = Bounds::new(1.0, 1e6, "pictures per sequence");
+pub(super) const FRAME_RATE: Bounds = Bounds::new(1e-3, 1e5, "pictures per second");
 pub(super) const BELT_SPEED: Bounds = Bounds::new(
     0.0,
     100.0,
-    "metres in a second; sorting belts run at 0.3 to 4",
+    "metres per second; sorting belts run at 0.3 to 4",
 );
 pub(super) const EXPOSURE_TIME: Bounds =
     Bounds::new(0.0, 10.0, "seconds; cameras over belts take 0.0001 to 0.01");
@@ -71,7 +72,8 @@ pub(super) const SENSOR: Bounds = Bounds::new(
 pub(super) const CHROMATIC: Bounds =
     Bounds::new(-50.0, 50.0, "pixels; cheap lenses have 1 in the corners");
 pub(super) const BLUR: Bounds = Bounds::new(0.0, 100.0, "pixels; a sharp photo has 0.3 to 0.7");
-pub(super) const SHARPENING: Bounds = Bounds::new(0.0, 100.0, "a share of what a blur takes away");
+pub(super) const SHARPENING: Bounds =
+    Bounds::new(0.0, 100.0, "a share of the detail that a blur removes");
 pub(super) const NOISE: Bounds = Bounds::new(0.0, 1e3, "scene-linear; 1 is white");
 
 /// Time step of a fall, seconds. Of 150 heaps of 5 to 30 cards, 81 failed at 1/120 s (cards that
@@ -83,7 +85,8 @@ pub(super) const STEP: Bounds = Bounds::new(
     "seconds; longer steps let cards pass through each other, shorter ones only take longer",
 );
 pub(super) const TIME_LIMIT: Bounds = Bounds::new(0.01, 600.0, "seconds; heaps rest within a few");
-pub(super) const ATTEMPTS: Bounds = Bounds::new(1.0, 100.0, "what fails so often will not rest");
+pub(super) const ATTEMPTS: Bounds =
+    Bounds::new(1.0, 100.0, "what fails this often will not come to rest");
 pub(super) const ITERATIONS: Bounds = Bounds::new(1.0, 100.0, "contacts are exact with fewer");
 pub(super) const WORK: Bounds = Bounds::new(1.0, 1e12, "objects and pairs, summed over time steps");
 pub(super) const CCD: Bounds = Bounds::new(0.0, 100.0, "stops within a step");

@@ -287,7 +287,7 @@ fn check_light(light: &AreaLight, at: &str) -> Result<()> {
         light.position != light.target,
         &field(at, "target"),
         light.target,
-        "another point than its position",
+        "a point other than its position",
     )?;
     check_within(&light.size, &field(at, "size"), &LENGTH)?;
     RADIANCE.check(&field(at, "power"), light.power)?;
@@ -381,7 +381,7 @@ mod tests {
         let reported = complaint(|s| s.lights[0].power = f64::NAN);
         assert_eq!(
             reported,
-            "lights[0].power: NaN, expected 0 to 1e9 (what single precision adds up)"
+            "lights[0].power: NaN, expected 0 to 1e9 (what single precision can sum)"
         );
     }
 

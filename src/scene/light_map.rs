@@ -52,7 +52,8 @@ impl LightMap {
 
 fn check_rows(rows: &[Vec<f32>]) -> Result<()> {
     if !is_grid(rows) {
-        let what = format!("{rows:?}, expected at most {MAX_CELLS} rows of as many factors each");
+        let what =
+            format!("{rows:?}, expected at most {MAX_CELLS} rows with equal numbers of factors");
         return Err(Error::value("light_map.known", what));
     }
     let mut factors = rows.iter().flatten();
@@ -115,7 +116,7 @@ mod tests {
             LightMap::Known(rows).check().unwrap_err().to_string()
         };
         assert!(told(&[&[1.0, 2.0], &[1.0]]).contains("light_map.known: "));
-        assert!(told(&[&[]]).contains("rows of as many factors"));
+        assert!(told(&[&[]]).contains("rows with equal numbers of factors"));
         assert!(told(&[&[1.0, -1.0]]).contains("-1"));
         assert!(told(&[&[f32::NAN]]).contains("light_map.known"));
         let share = LightMap::MatchSurface { share: 1.5 };

@@ -100,7 +100,7 @@ pub(super) fn check_palette(palette: &[PaletteEntry], at: &str) -> Result<()> {
     if palette.is_empty() || palette.iter().any(|entry| entry.weight() > 0.0) {
         return Ok(());
     }
-    let what = "weights of 0 alone, expected one above 0";
+    let what = "all weights are 0, expected one above 0";
     Err(Error::value(at, what))
 }
 

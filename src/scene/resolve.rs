@@ -250,14 +250,14 @@ impl Scene {
         if across >= 1.0 && down >= 1.0 && (across - down).abs() < tolerance {
             return Ok(());
         }
-        let expected = format!("{width} x {height} or larger of that shape");
+        let expected = format!("{width} x {height} or larger with the same aspect ratio");
         let what = format!("{w} x {h} pixels, expected {expected}");
         Err(Error::value("plate", what))
     }
 }
 
 fn unmatched(at: &str) -> Error {
-    Error::value(at, "still to be matched to the plate; light it first")
+    Error::value(at, "not matched to the plate yet; light it first")
 }
 
 fn missing_panorama(file: &str) -> Error {
@@ -281,7 +281,7 @@ fn resting_card(
 
 fn unknown_asset(i: usize, object: &Object) -> Error {
     let what = format!(
-        "\"{}\", photo {}, expected one that the library has",
+        "\"{}\", photo {}, expected one in the library",
         object.asset, object.photo
     );
     Error::value(format!("objects[{i}].asset"), what)
@@ -388,7 +388,7 @@ mod tests {
             ("finish.blur_px", |s| s.finish.blur_px = Blur::MatchPlate),
         ];
         for (at, spoil) in unmatched {
-            let expected = format!("{at}: still to be matched to the plate; light it first");
+            let expected = format!("{at}: not matched to the plate yet; light it first");
             assert_eq!(complaint(spoil), expected);
         }
         let rectangle = CameraSource::Rectangle {
@@ -407,7 +407,7 @@ mod tests {
         let reported = complaint(|s| s.objects[1].asset = "b9".into());
         assert_eq!(
             reported,
-            "objects[1].asset: \"b9\", photo 0, expected one that the library has"
+            "objects[1].asset: \"b9\", photo 0, expected one in the library"
         );
     }
 
@@ -457,7 +457,7 @@ mod tests {
             .to_string();
         assert_eq!(
             reported,
-            "plate: 3 x 6 pixels, expected 8 x 6 or larger of that shape"
+            "plate: 3 x 6 pixels, expected 8 x 6 or larger with the same aspect ratio"
         );
     }
 }

@@ -17,7 +17,7 @@ impl DropRanges {
         match &self.spread {
             Some(_) if !self.positions.is_empty() => Err(Error::value(
                 "start.spread",
-                "given beside start.positions, expected one of them",
+                "given together with start.positions, expected one of them",
             )),
             Some(spread) => spread.check("start.spread", &SHARE),
             None => Ok(()),
@@ -30,7 +30,7 @@ impl DropRanges {
             return Ok(());
         }
         let what = format!(
-            "{rows:?}, expected at most {MAX_CELLS} rows of as many weights each, 0 or above and not all 0"
+            "{rows:?}, expected at most {MAX_CELLS} rows with equal numbers of weights, 0 or above and not all 0"
         );
         Err(Error::value("start.positions", what))
     }
@@ -238,7 +238,7 @@ mod tests {
         let both = told("spread = 1\npositions = [[1]]");
         assert_eq!(
             both,
-            "start.spread: given beside start.positions, expected one of them"
+            "start.spread: given together with start.positions, expected one of them"
         );
     }
 }

@@ -276,7 +276,7 @@ fn check_starts(scene: &Scene) -> Result<()> {
 fn starts_outside(i: usize, [x, y]: [f64; 2], [w, h]: [f64; 2]) -> Error {
     Error::value(
         format!("objects[{i}].placement.drop.above"),
-        format!("[{x}, {y}], expected over the surface of {w} x {h} m around the origin"),
+        format!("[{x}, {y}], expected a point over the surface of {w} x {h} m around the origin"),
     )
 }
 
@@ -710,7 +710,8 @@ mod tests {
             &SettleOptions::default(),
         )
         .unwrap_err();
-        let expected = "[0.1, -0.3], expected over the surface of 0.6 x 0.4 m around the origin";
+        let expected =
+            "[0.1, -0.3], expected a point over the surface of 0.6 x 0.4 m around the origin";
         assert_eq!(
             reported.to_string(),
             format!("objects[1].placement.drop.above: {expected}")

@@ -108,7 +108,7 @@ unsafe fn options_of(options: *const c_char) -> Result<KeyOptions, Failure> {
     let json = unsafe { text("options", options) }?;
     // A list would be read as the settings in their order.
     if !json.trim_start().starts_with('{') {
-        let what = r#"no JSON object, expected one as {"clip_black": 0.1}"#;
+        let what = r#"not a JSON object, expected one such as {"clip_black": 0.1}"#;
         return Err(Error::value("options", what).into());
     }
     Ok(serde_json::from_str(json).map_err(|e| Error::value("options", e))?)

@@ -113,7 +113,7 @@ pub(crate) unsafe fn store_text(
 }
 
 fn too_small(name: &str, capacity: usize, needed: usize) -> Failure {
-    let message = format!("{name}: room for {capacity}, expected {needed}");
+    let message = format!("{name}: capacity {capacity}, expected at least {needed}");
     Failure::new(Status::BufferTooSmall, message)
 }
 
@@ -130,7 +130,7 @@ fn check<T>(name: &str, pointer: *const T, count: usize) -> Result<(), Failure> 
         Some(_) => Ok(()),
         None => Err(Failure::argument(
             name,
-            format_args!("{count} values, which no memory holds"),
+            format_args!("{count} values, more than memory can hold"),
         )),
     }
 }

@@ -65,7 +65,7 @@ fn wrong_sizes_of_a_picture_are_refused() {
     assert_fails(
         key(&pixels, [0, 1, 4], null()),
         refused,
-        "width, height: 0 x 1 pixels, expected at least 1 x 1 and at most 32768 a side and 134217728 in all",
+        "width, height: 0 x 1 pixels, expected at least 1 x 1 and at most 32768 a side and 134217728 in total",
     );
     assert_fails(
         key(&pixels, [2, 2, 7], null()),
@@ -112,7 +112,7 @@ fn numbers_that_are_none_and_wrong_options_are_refused() {
     assert_fails(
         key(&pixels, [2, 2, 8], c"[]".as_ptr()),
         Status::Value,
-        r#"options: no JSON object, expected one as {"clip_black": 0.1}"#,
+        r#"options: not a JSON object, expected one such as {"clip_black": 0.1}"#,
     );
     pixels[9] = f32::NAN;
     assert_fails(

@@ -323,7 +323,7 @@ fn describe_unlisted(files: &[String]) -> String {
     } else {
         ""
     };
-    format!("also in the folder, not in the list: {shown}{more}")
+    format!("in the folder but not in the list: {shown}{more}")
 }
 
 /// Range of the objects' lengths, and the largest of their errors.
@@ -518,7 +518,7 @@ fn show_classes(classes: &[String], how: &str, global: &GlobalArgs) {
     let numbered = numbered.map(|(i, class)| format!("{i} {class}"));
     let list = numbered.collect::<Vec<_>>().join(", ");
     global.print_status(format_args!(
-        "classes {list}; another order: {how}, into a new folder"
+        "classes {list}; for another order, use {how} and a new folder"
     ));
 }
 

@@ -47,7 +47,7 @@ impl DemoArgs {
         if list.exists() {
             return Ok(list);
         }
-        let what = "no such file; run in petcomp's repository, or name its tests/samples folder with --samples";
+        let what = "no such file; run this in petcomp's repository, or give its tests/samples folder with --samples";
         Err(Error::file(list, what))
     }
 

@@ -170,7 +170,7 @@ impl PicturePair {
         if !a.channels.is_empty() {
             let (count, names) = (a.channels.len(), a.channels.join(", "));
             global.print_status(format_args!(
-                "Colours and alpha alone were compared, none of {count} other channels ({names})"
+                "Only colours and alpha were compared, none of {count} other channels ({names})"
             ));
         }
         a.print_parts(&args.a, global);
@@ -257,7 +257,7 @@ impl PassedOver {
             let (path, count) = (path.display(), self.parts.len());
             let others = others.join(", ");
             global.print_status(format_args!(
-                "{path}: of {count} parts \"{compared}\" alone was compared, not {others}"
+                "{path}: of {count} parts only \"{compared}\" was compared, not {others}"
             ));
         }
     }

@@ -76,7 +76,7 @@ fn png_alpha() -> anyhow::Result<String> {
 fn exr_round_trip() -> anyhow::Result<String> {
     let value = PremulRgba::new(0.25, 3.5, -0.125, 0.5);
     let back = round_trip("value.exr", value)?;
-    anyhow::ensure!(back == value, "what was written is not what is read");
+    anyhow::ensure!(back == value, "what was read differs from what was written");
     Ok("values above 1 and below 0 survive".into())
 }
 

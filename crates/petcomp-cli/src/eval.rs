@@ -77,7 +77,7 @@ fn print_scores(metrics: &[Metrics], options: &EvalReportOptions, global: &Globa
     print::text(classes.markdown());
     if others > 0 {
         global.print_status(format_args!(
-            "the classes with the lowest AP; {others} others: -o FOLDER writes classes.csv"
+            "the classes with the lowest AP; for the {others} others, -o FOLDER writes classes.csv"
         ));
     }
 }
@@ -114,13 +114,13 @@ impl EvalArgs {
     fn check_options(&self) -> petcomp::Result<()> {
         let truth = self.paths.last();
         let is_yolo = truth.is_some_and(|truth| !EvalTruth::is_coco(truth));
-        let yolo = "a folder of YOLO labels as TRUTH: COCO has sizes itself";
+        let yolo = "a folder of YOLO labels as TRUTH: COCO files contain the sizes";
         check_companion("--size", self.size.is_some(), yolo, is_yolo)?;
         match self.images.as_ref().filter(|folder| !folder.is_dir()) {
             None => Ok(()),
             Some(folder) => Err(Error::file(
                 folder,
-                "no such folder, expected that of the images",
+                "no such folder, expected the folder of the images",
             )),
         }
     }

@@ -78,7 +78,7 @@ fn stop_soon() {
     }
     std::thread::spawn(stop_after_grace_period);
     print::aside(format_args!(
-        "stopping after the pictures in hand, in {} s at the latest; interrupt again to stop at once",
+        "stopping after the pictures in progress, in {} s at the latest; interrupt again to stop at once",
         GRACE_PERIOD.as_secs()
     ));
 }

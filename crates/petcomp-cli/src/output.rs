@@ -107,7 +107,7 @@ mod stores {
 
     fn unknown(_url: &str) -> Error {
         let what =
-            "a URL, expected a folder: this program is built without the feature object-store";
+            "a URL, expected a folder: this program was built without the feature object-store";
         Error::value("output", what)
     }
 }

@@ -59,7 +59,7 @@ impl RenderArgs {
     fn check_targets(&self) -> anyhow::Result<()> {
         if !self.aov.is_empty() && !io::has_extension(&self.output, "exr") {
             let path = self.output.display();
-            bail!("{path}: parts need a file called .exr");
+            bail!("{path}: parts need the extension .exr");
         }
         let mut pictures = self.preview.iter().chain([&self.output]);
         pictures.try_for_each(|path| check_picture_target(path))?;

@@ -94,7 +94,7 @@ fn export_scene(args: &ExportSceneArgs, global: &GlobalArgs) -> anyhow::Result<(
         .map_err(|e| e.in_file(&args.scene))?;
     let left_out = left_out(&scene, &shot);
     if !left_out.is_empty() {
-        log::warn!("left out, Cycles renders without: {}", left_out.join(", "));
+        log::warn!("left out of the Cycles render: {}", left_out.join(", "));
     }
     let retouched = petcomp::render::retouched_fully(&shot, &pipeline.config().render);
     cycles::export(&retouched, scene.surface.size, &args.folder)
@@ -110,7 +110,7 @@ fn left_out(scene: &Scene, shot: &Shot) -> Vec<&'static str> {
     let bends = |card: &Card| card.refraction.flows.iter().any(Option::is_some);
     let parts = [
         (shot.light_grid.is_some(), "the light map"),
-        (shot.holdout.is_some(), "what the walls hide"),
+        (shot.holdout.is_some(), "occlusion by the walls"),
         (shot.motion_m != [0.0; 2], "motion blur"),
         (shot.cards.iter().any(bends), "refraction"),
         (

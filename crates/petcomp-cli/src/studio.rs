@@ -21,7 +21,7 @@ pub(crate) struct StudioArgs {
 pub(crate) fn run(args: &StudioArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let server = Server::open(&args.folder, args.port)?;
     print::line(server.address());
-    global.print_status("open this address in a browser of this machine; Ctrl-C ends the studio");
+    global.print_status("open this address in a browser on this machine; Ctrl-C stops the studio");
     let stop = server.stop();
     on_interrupt(move || stop.stop())?;
     server.run();

@@ -254,7 +254,7 @@ fn labels_that_are_solved_alone_are_named() {
             desk.label(name, &label);
         }
         let [_, said] = desk.ok(&joint);
-        said.matches("label.json: solved alone: no other label has its camera.id")
+        said.matches("label.json: solved alone: no other label has the same camera.id")
             .count()
     };
     assert_eq!(alone(Value::Null), 2);
@@ -527,7 +527,10 @@ fn no_camera_and_no_overlay_takes_the_place_of_the_photo() {
         let path = desk.path(format!("bg/{photo}.png"));
         let before = std::fs::read(&path).unwrap();
         let told = desk.refused(&["camera", "solve", "bg/a.label.json", "-o", output]);
-        assert!(told.contains("is read and would be written over"), "{told}");
+        assert!(
+            told.contains("is an input and would be overwritten"),
+            "{told}"
+        );
         assert_eq!(std::fs::read(&path).unwrap(), before);
     }
 }
@@ -664,7 +667,7 @@ fn an_image_beyond_the_dataset_is_refused() {
     let generate = "dataset generate recipe.toml -n 60 -o out --only";
     let told = desk.refused(&words(&format!("{generate} 60")));
     assert!(
-        told.contains("only: 60, expected a number below that of the images, 60"),
+        told.contains("only: 60, expected a number below the number of images, 60"),
         "{told}"
     );
     assert!(!desk.path("out").exists());

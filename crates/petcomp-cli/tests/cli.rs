@@ -325,12 +325,12 @@ fn what_is_trained_on_twice_or_validates_too_is_told() {
     let output = desk.run(&words(&format!("{kit} made")));
     let told = text(&output.stderr);
     assert!(output.status.success(), "{told}");
-    let why = "real: 3 of 3 images for validation are also trained on; see `dataset split`";
+    let why = "real: 3 of 3 images for validation are also used for training; see `dataset split`";
     assert!(told.contains(why), "{told}");
     let batches = "dataset batches -o batches.jsonl --real real --synthetic";
     for line in [kit, batches] {
         let told = desk.refused(&words(&format!("{line} ./real")));
-        let why = "real/images/0.png is also a real image, expected other images than in real";
+        let why = "real/images/0.png is also a real image, expected images that are not in real";
         assert!(told.contains(why), "{told}");
     }
 }
@@ -411,7 +411,7 @@ fn a_photo_that_its_cut_out_would_replace_is_refused() {
     let add = ["asset", "add", "slab/slab.png", "--class", "ring"];
     let told = desk.refused(&[&add[..], &["--length", "0.2", "-o", "."]].concat());
     assert!(
-        told.contains("slab.png: is read and would be written over"),
+        told.contains("slab.png: is an input and would be overwritten"),
         "{told}"
     );
     let after = std::fs::read(desk.path("slab/slab.png")).expect("a photo");
@@ -419,7 +419,10 @@ fn a_photo_that_its_cut_out_would_replace_is_refused() {
     add_ring(&desk, "slab/slab.png", "assets");
     for taken in ["assets/slab/slab.exr", "assets/assets.toml"] {
         let told = desk.refused(&["asset", "sheet", "assets", "-o", taken]);
-        assert!(told.contains("is read and would be written over"), "{told}");
+        assert!(
+            told.contains("is an input and would be overwritten"),
+            "{told}"
+        );
     }
 }
 
@@ -546,7 +549,7 @@ fn a_build_without_one_of_its_photos_is_incomplete() {
     desk.write("photos.csv", "file,asset,class,length\none.png,b,cap,0.3\n");
     let said = desk.ok(&["asset", "build", "photos.csv", "-o", "built"]);
     assert!(
-        said.contains("also in the folder, not in the list: a/one.exr\n"),
+        said.contains("in the folder but not in the list: a/one.exr\n"),
         "{said}"
     );
 }
@@ -718,7 +721,7 @@ fn a_recipe_beside_a_dataset_is_not_written_over() {
     let before = recipes();
     let refused = desk.refused(&[&ablate[..], &["--set", "scene.objects=4"]].concat());
     assert!(
-        refused.contains("scene.scale=1.5/recipe.toml: says something else"),
+        refused.contains("scene.scale=1.5/recipe.toml: differs from this run"),
         "{refused}"
     );
     assert_eq!(recipes(), before);
@@ -796,7 +799,7 @@ fn the_frames_of_a_sequence_are_keyed_into_folders() {
     }
     let same = ["matte", "key", "shot/0.png", "shot/0.png", "-o", "twice"];
     let refused = desk.run(&[&same[..], &screen].concat());
-    assert!(text(&refused.stderr).contains("two files would go here"));
+    assert!(text(&refused.stderr).contains("two files would be written here"));
 }
 
 #[test]
@@ -819,10 +822,13 @@ fn nothing_that_a_keyer_reads_is_written_over() {
         "shot/0.exr -o 0.exr --garbage shot/1.exr --matte shot/1.exr",
     ] {
         let told = refused(line);
-        assert!(told.contains("is read and would be written over"), "{told}");
+        assert!(
+            told.contains("is an input and would be overwritten"),
+            "{told}"
+        );
     }
     let told = refused("shot/0.exr -o 0.exr --matte ./0.exr");
-    assert!(told.contains("two files would go here"), "{told}");
+    assert!(told.contains("two files would be written here"), "{told}");
     assert!(desk.content() == before && !desk.path("keyed").exists());
 }
 
@@ -894,7 +900,10 @@ fn no_command_writes_over_what_it_reads() {
         "eval p.json t.json --tags res/factors.csv -o res",
     ] {
         let told = desk.refused(&words(line));
-        assert!(told.contains("is read and would be written over"), "{told}");
+        assert!(
+            told.contains("is an input and would be overwritten"),
+            "{told}"
+        );
     }
     assert!(desk.content() == before);
 }
@@ -909,7 +918,7 @@ fn a_fit_finds_out_at_once_where_it_cannot_write() {
     };
     assert!(refused("-o none/f.toml").contains("no folder none"));
     assert!(refused("-o f.toml --page none/f.html").contains("no folder none"));
-    assert!(refused("-o f.toml --page f.toml").contains("two files would go here"));
+    assert!(refused("-o f.toml --page f.toml").contains("two files would be written here"));
 }
 
 #[test]
@@ -928,7 +937,7 @@ fn an_evaluation_takes_no_option_in_vain() {
     );
     let told = desk.refused(&eval("--images nowhere"));
     assert!(
-        told.contains("nowhere: no such folder, expected that of the images"),
+        told.contains("nowhere: no such folder, expected the folder of the images"),
         "{told}"
     );
     let output = desk.run(&eval("--rounds 0"));
@@ -982,7 +991,10 @@ fn no_picture_of_a_scene_goes_over_what_it_is_made_from() {
         draw("places/bg0003.label.json"),
     ] {
         let told = desk.refused(&args);
-        assert!(told.contains("is read and would be written over"), "{told}");
+        assert!(
+            told.contains("is an input and would be overwritten"),
+            "{told}"
+        );
     }
     assert!(desk.content() == before);
 }
@@ -1080,7 +1092,7 @@ fn what_is_keyed_lies_where_its_exr_does_and_lost_pixels_are_told() {
     io::write_with(&photo, &grey, &placed).expect("a picture");
     let header = |name: &str| io::read_header(desk.path(name)).expect("an EXR");
     let key = words("matte key a.exr -o cut.exr --matte m.exr --screen 0.02,0.6,0.05");
-    let warned = "24 x 4 stored pixels, those outside the display window are not kept";
+    let warned = "24 x 4 stored pixels, those outside the display window are dropped";
     assert!(!text(&desk.run(&key).stderr).contains(warned));
     for name in ["cut.exr", "m.exr"] {
         assert_eq!(header(name).canvas, canvas, "{name}");
@@ -1261,7 +1273,7 @@ fn film_is_written_into_files_called_exr_alone() {
     for args in [&["film", "a.png"][..], &["triangulate", "a.png", "b.png"]] {
         let told = desk.refused(&[&["matte"], args, &["-o", "film.png"]].concat());
         assert!(
-            told.contains("film.png: film needs a file called .exr"),
+            told.contains("film.png: film needs the extension .exr"),
             "{told}"
         );
     }
@@ -1356,7 +1368,10 @@ fn every_step_of_a_search_is_a_picture() {
     write_slab(&hull);
     let photo = hull.to_str().expect("letters");
     let told = desk.refused(&["matte", "segment", photo, "-o", "steps"]);
-    assert!(told.contains("is read and would be written over"), "{told}");
+    assert!(
+        told.contains("is an input and would be overwritten"),
+        "{told}"
+    );
 }
 
 /// Folded film that mirrors light, in an ellipse: what it reflects, and what it lets through.
@@ -1552,7 +1567,7 @@ fn diff_tells_which_of_several_parts_it_compares() {
     }
     let told = desk.ok(&["diff", "a.exr", "b.exr"]);
     for name in ["a.exr", "b.exr"] {
-        let line = format!("{name}: of 2 parts \"beauty\" alone was compared, not depth");
+        let line = format!("{name}: of 2 parts only \"beauty\" was compared, not depth");
         assert!(told.contains(&line), "{told}");
     }
 }
@@ -1757,7 +1772,7 @@ fn an_environment_map_lies_beside_its_recipe() {
     let told = text(&desk.run(&words(&format!("{generate} 2"))).stderr);
     assert!(
         told.contains(
-            "out/dataset.json: recipe.environments[sky.exr].content: the dataset was begun with"
+            "out/dataset.json: recipe.environments[sky.exr].content: the dataset was started with"
         ),
         "{told}"
     );

@@ -222,7 +222,7 @@ fn classes_are_called_by_name_wherever_eval_runs_or_it_says_why_not() {
     let output = desk.run(&["eval", "found", "set/labels/val"]);
     let said = text(&output.stderr);
     assert!(
-        said.contains("class 1, expected 0; classes are called by their numbers"),
+        said.contains("class 1, expected 0; classes are shown by number"),
         "{said}"
     );
     assert!(output.status.success());

@@ -108,7 +108,7 @@ fn a_picture_larger_than_memory_is_refused_and_not_attempted() {
     let text = said(&output);
     assert!(output.status.signal().is_none(), "{text}");
     assert!(
-        text.contains("large.png: needs 926 MiB of memory, more than the system gives"),
+        text.contains("large.png: needs 926 MiB of memory, more than the system provides"),
         "{text}"
     );
 }
@@ -379,7 +379,7 @@ fn a_signal_stops_a_fall() {
     send("TERM", &child);
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", said(&output));
-    let expected = "interrupted: 0 of 2 samples are in out; the same command goes on";
+    let expected = "interrupted: 0 of 2 samples are in out; rerun the same command to resume";
     assert!(said(&output).contains(expected), "{}", said(&output));
 }
 

@@ -191,7 +191,7 @@ fn array_of<'a, 'py>(
 ) -> PyResult<&'a Bound<'py, PyUntypedArray>> {
     let array = argument.cast::<PyUntypedArray>().map_err(|_| {
         let found = argument.get_type();
-        wrong_type(name, &format!("{found}, expected an array of NumPy"))
+        wrong_type(name, &format!("{found}, expected a NumPy array"))
     })?;
     let masked = argument.py().import("numpy.ma")?.getattr("MaskedArray")?;
     match argument.is_instance(&masked)? {

@@ -62,7 +62,7 @@ impl Camera {
         if eye == target {
             return Err(wrong_value(
                 "target",
-                format_args!("{target:?}, expected another place than eye"),
+                format_args!("{target:?}, expected a point other than eye"),
             ));
         }
         checked(petcomp::Camera::look_at(

@@ -73,7 +73,7 @@ fn scores_of(
 
 fn read_truth(path: &Path, size: Option<[u32; 2]>) -> Result<EvalTruth> {
     if size.is_some() && EvalTruth::is_coco(path) {
-        let what = "given without a folder of YOLO labels as truth: COCO has sizes itself";
+        let what = "given without a folder of YOLO labels as truth: COCO files contain the sizes";
         return Err(Error::value("size", what));
     }
     EvalTruth::read(path, None, size)

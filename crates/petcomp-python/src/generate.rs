@@ -129,8 +129,7 @@ impl DatasetLayout {
             return Ok(sample);
         }
         let what = format!(
-            "webdataset alone, which holds no labels of sample {k}, for it has no scene, \
-             expected \"yolo\", \"coco\" or \"voc\" as well"
+            "only webdataset, which holds no labels of sample {k} because it has no scene, expected \"yolo\", \"coco\" or \"voc\" as well"
         );
         Err(Error::value("labels.formats", what))
     }
@@ -171,8 +170,9 @@ fn check_class_names(sample: &Sample, classes: &[String], k: u64) -> PyResult<()
         return Ok(());
     }
     let theirs = &sample.policy().classes;
-    let what =
-        format!("{classes:?}, but sample {k} has {theirs:?}, expected them to begin with those");
+    let what = format!(
+        "{classes:?}, but sample {k} has {theirs:?}, expected the former to begin with the latter"
+    );
     Err(wrong_value("classes", what))
 }
 

@@ -69,7 +69,7 @@ fn check_places(places: &[Place], textures: usize, settings: &Settings) -> PyRes
     if ids.len() != places.len() || ids.contains(&0) || textures != places.len() {
         return Err(wrong_value(
             "cards",
-            "expected ids of their own, and none of 0",
+            "expected a unique id above 0 for each",
         ));
     }
     let classes = settings.classes.len();

@@ -32,7 +32,7 @@ def key(image, screen=GREEN, **options):
         (PHOTO.astype(np.complex64), TypeError, "image: dtype complex64"),
         (PHOTO.astype(object), TypeError, "image: dtype object"),
         (np.zeros((4, 4, 3), "U3"), TypeError, "image: dtype <U3"),
-        ([[[0.1, 0.2, 0.3]]], TypeError, "image: <class 'list'>, expected an array of NumPy"),
+        ([[[0.1, 0.2, 0.3]]], TypeError, "image: <class 'list'>, expected a NumPy array"),
         (None, TypeError, "image: <class 'NoneType'>"),
         (PHOTO[..., 0], ValueError, "image: shape [6, 8], expected (height, width, 3) or (height, width, 4)"),
         (PHOTO[..., :2], ValueError, "image: shape [6, 8, 2]"),
@@ -162,8 +162,8 @@ def test_a_shot_that_cannot_be_is_refused():
     good = petcomp.Shot(camera).with_card(card)
     assert petcomp.render(good).size == (64, 48)
     bad = [
-        (good.with_card(card), "ids of their own"),
-        (petcomp.Shot(camera).with_card(petcomp.Card(0, film, (0.2, 0.1))), "none of 0"),
+        (good.with_card(card), "a unique id above 0"),
+        (petcomp.Shot(camera).with_card(petcomp.Card(0, film, (0.2, 0.1))), "a unique id above 0"),
         (petcomp.Shot(camera).with_card(petcomp.Card(1, film, (0.0, 0.1))), r"cards\[0\].size"),
         (petcomp.Shot(camera).with_card(petcomp.Card(1, film + 2, (0.2, 0.1))), "alpha 2"),
         (petcomp.Shot(camera).with_card(petcomp.Card(1, film, (0.2, 0.1), class_=3)), "class 3"),
@@ -293,8 +293,8 @@ def test_a_lens_that_folds_the_picture_over_needs_force():
 def test_what_a_function_would_not_hear_is_refused(tmp_path):
     sample = petcomp.Sample.from_masks(np.zeros((4, 4, 3), np.uint8), [np.ones((4, 4), bool)], [0], ["a"])
     for arguments, says in (
-        ({"set": {"scene.objects": 3}}, "set, quality: act on recipes alone"),
-        ({"quality": "draft"}, "set, quality: act on recipes alone"),
+        ({"set": {"scene.objects": 3}}, "set, quality: apply only to recipes"),
+        ({"quality": "draft"}, "set, quality: apply only to recipes"),
         ({"labels": {"min_visible": 0.5}}, "labels.min_visible: acts when labels are made"),
         ({"labels": {"alpha_threshold": 0.5}}, "labels.alpha_threshold: acts when labels are made"),
         ({"labels": {"formats": ["webdataset"]}}, "labels.formats: webdataset alone"),
@@ -358,7 +358,7 @@ def test_evaluation_of_files_takes_nothing_in_vain(tmp_path, monkeypatch, caplog
     Path("truth.json").write_text('{"images": [{"id": 1, "file_name": "a.png"}], "annotations": [], "categories": []}')
     Path("metrics.json").write_text("[]")
     for options, says in (
-        ({"output": "."}, "metrics.json: is read and would be written over"),
+        ({"output": "."}, "metrics.json: is an input and would be overwritten"),
         ({"size": (64, 48)}, "size: given without a folder of YOLO labels"),
         ({"output": "s3://bucket/page"}, "output: s3://bucket/page is a URL, expected a folder"),
     ):
@@ -396,7 +396,7 @@ def test_classes_are_names_of_their_own(tmp_path, classes):
         ({"a=b": 1}, "set: key 'a=b'"),
         ({"scene.objects": None}, "set.scene.objects: None"),
         ({"scene.image[7]": 1}, "no such entry in the list"),
-        ({"scene.image.x": 1}, "goes into a value that is not a table"),
+        ({"scene.image.x": 1}, "its parent is not a table"),
         ({"assets": "/nowhere/\U0001f600"}, "/nowhere/\U0001f600/assets.toml: no such file"),
         ([1], "set: list, expected a dict"),
     ],

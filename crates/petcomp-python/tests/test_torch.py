@@ -58,7 +58,7 @@ def test_a_sample_stays_in_its_worker(recipe):
     inside = torch.utils.data.DataLoader(data, batch_size=COUNT, collate_fn=digests, **options)
     assert list(inside) == [digests(data[k] for k in range(COUNT))]
     outside = torch.utils.data.DataLoader(data, batch_size=None, **options)
-    with pytest.raises(petcomp.errors.ArgumentTypeError, match="transform: a Sample, which stays"):
+    with pytest.raises(petcomp.errors.ArgumentTypeError, match="transform: a Sample, which cannot leave"):
         list(outside)
 
 

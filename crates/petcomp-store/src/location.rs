@@ -145,7 +145,7 @@ fn scheme_of(url: &Url) -> Result<Scheme> {
 /// A percent sign stands for what no store has in the name of a bucket.
 fn check_bucket(bucket: &str) -> std::result::Result<(), &'static str> {
     match bucket {
-        "" => Err("expected a bucket behind the ://"),
+        "" => Err("expected a bucket after the ://"),
         _ if bucket.contains('%') => Err("expected a bucket of ASCII letters, digits, - and ."),
         _ => Ok(()),
     }
@@ -156,8 +156,7 @@ fn refuse_credentials(url: &Url) -> Result<()> {
     if is_bare && url.query().is_none() && url.fragment().is_none() && url.port().is_none() {
         return Ok(());
     }
-    let what = "a URL with more than a bucket and a prefix, expected credentials and endpoints in the environment \
-                alone (AWS_ACCESS_KEY_ID, AWS_ENDPOINT_URL, ..)";
+    let what = "a URL with more than a bucket and a prefix, expected credentials and endpoints only in the environment (AWS_ACCESS_KEY_ID, AWS_ENDPOINT_URL, ..)";
     Err(Error::value("output", what))
 }
 
@@ -244,7 +243,7 @@ mod tests {
             ),
             (
                 "s3:///a",
-                "output: \"s3:///a\", expected a bucket behind the ://",
+                "output: \"s3:///a\", expected a bucket after the ://",
             ),
             (
                 "s3://bücket/a",

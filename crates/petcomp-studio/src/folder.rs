@@ -185,7 +185,7 @@ impl Folder {
             for entry in visible_entries(&folder) {
                 if left == 0 {
                     let here = self.here().display();
-                    log::warn!("{here}: more than {most} files and folders; the rest is not seen");
+                    log::warn!("{here}: more than {most} files and folders; the rest is ignored");
                     return files;
                 }
                 left -= 1;
@@ -241,7 +241,7 @@ fn check_name(name: &str) -> Answer<()> {
 
 fn missing(name: &str, expected: &str) -> Refusal {
     let name = petcomp::printable(name);
-    let what = format!("{name}: no such {expected} in the folder of this studio");
+    let what = format!("{name}: no such {expected} in this studio's folder");
     Refusal::new(StatusCode::NOT_FOUND, what)
 }
 

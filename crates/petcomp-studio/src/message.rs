@@ -70,7 +70,10 @@ fn is_json(headers: &HeaderMap) -> bool {
 }
 
 fn stalled() -> Refusal {
-    let what = format!("the body has not come within {} s", PATIENCE.as_secs());
+    let what = format!(
+        "the request body did not arrive within {} s",
+        PATIENCE.as_secs()
+    );
     Refusal::new(StatusCode::REQUEST_TIMEOUT, what)
 }
 

@@ -28,9 +28,8 @@ impl Refusal {
 
     /// The file is another one by now than the page has read.
     pub(crate) fn stale(name: &str) -> Self {
-        let what = format!(
-            "{name}: has changed since this page read it; load it again, or save over it knowingly"
-        );
+        let what =
+            format!("{name}: has changed since this page loaded it; reload it, or overwrite it");
         Self::new(StatusCode::CONFLICT, what)
     }
 

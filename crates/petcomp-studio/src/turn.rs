@@ -21,7 +21,7 @@ pub(crate) async fn blocking<T: Send + 'static>(
 }
 
 fn broken() -> Refusal {
-    let what = "petcomp failed at this; its message is in the terminal";
+    let what = "petcomp failed; see its message in the terminal";
     Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, what)
 }
 

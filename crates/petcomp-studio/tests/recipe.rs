@@ -294,7 +294,7 @@ fn a_recipe_that_leads_out_of_the_folder_is_refused() {
     let answer = studio.post("api/recipe/picture", asked);
     assert!(answer.starts_with("HTTP/1.1 422"), "{answer}");
     assert!(
-        answer.contains("is not in the folder of this studio"),
+        answer.contains("is not in this studio's folder"),
         "{answer}"
     );
 }
@@ -305,7 +305,7 @@ fn a_new_recipe_takes_no_name_of_another_file() {
     io::write_text(dir.path().join("recipe.toml"), tray::RECIPE).unwrap();
     let studio = Studio::over(dir.path());
     let answer = studio.post("api/recipe/new", r#"{ "file": "recipe.toml" }"#);
-    let expected = "recipe.toml: there is such a file already";
+    let expected = "recipe.toml: already exists";
     assert!(answer.contains(expected), "{answer}");
 }
 

@@ -94,7 +94,7 @@ impl Checked {
         let sides = self.boxes.iter().filter_map(|b| b.sides);
         let tiny = sides.filter(|sides| sides.iter().any(|side| *side < TINY_SIDE_SHARE));
         let (count, percent) = (tiny.count(), 100.0 * TINY_SIDE_SHARE);
-        let message = format!("{count} boxes are below {percent:.0} % of the image's side");
+        let message = format!("{count} boxes have a side below {percent:.0} % of the image's");
         (count > 0).then(|| Diagnostic::note(Code::TinyBoxes, message))
     }
 }

@@ -79,7 +79,7 @@ impl CheckedImage {
     fn read_labels(&mut self, folder: &Path, class_count: Option<usize>) {
         let label = YoloSet::label_of(&self.path);
         let Ok(text) = io::read_text(folder.join(&label)) else {
-            let message = format!("missing or not text, but there is {}", self.path.display());
+            let message = format!("missing or not text, but {} exists", self.path.display());
             return self
                 .findings
                 .push(Finding::in_file(label, Code::MissingLabel, message));

@@ -78,7 +78,7 @@ impl RowFormat {
         let values = self.parse(row).map_err(|what| (Code::BadLabelRow, what))?;
         match known.insert(values.iter().copied()) {
             true => Ok(values),
-            false => Err((Code::DuplicateLabelRow, "the same row stands above".into())),
+            false => Err((Code::DuplicateLabelRow, "duplicates an earlier row".into())),
         }
     }
 
@@ -88,7 +88,7 @@ impl RowFormat {
         }
         let expected = match self.outlines {
             false => "5",
-            true => "a class and at least 3 pairs as in the file's other rows",
+            true => "a class and at least 3 pairs like the file's other rows",
         };
         Err(format!("{count} columns, expected {expected}"))
     }
@@ -104,7 +104,7 @@ impl RowFormat {
         let class = class_number(text)?;
         match self.class_count {
             Some(count) if class >= count => Err(format!(
-                "class {class}, but data.yaml has {count} classes, from 0"
+                "class {class}, but data.yaml has {count} classes, numbered from 0"
             )),
             _ => Ok(()),
         }
@@ -124,7 +124,7 @@ fn parse_number(text: &str) -> Result<f64, String> {
 fn check_shares(row: &[&str], values: &[f64]) -> Result<(), String> {
     let mut shares = row.iter().zip(values).skip(1);
     match shares.find(|(_, share)| !(0.0..=1.0).contains(*share)) {
-        Some((text, _)) => Err(format!("{text}, expected a share of the image, 0 to 1")),
+        Some((text, _)) => Err(format!("{text}, expected a fraction of the image, 0 to 1")),
         None => Ok(()),
     }
 }

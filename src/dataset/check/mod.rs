@@ -125,7 +125,7 @@ fn is_for_others(folder: &Path) -> Result<bool> {
         true => Ok(true),
         false => Err(Error::file(
             folder,
-            "archives alone, expected YOLO labels or a journal; `dataset generate --resume` finds torn archives",
+            "only archives, expected YOLO labels or a journal; `dataset generate --resume` finds damaged archives",
         )),
     }
 }
@@ -283,7 +283,7 @@ impl Checker<'_> {
             // The same bytes are reported already.
             if image.checksum != twin.checksum {
                 let twin = twin.path.display();
-                let message = format!("leak: differs from {twin} by {rms:.2} of 255 only");
+                let message = format!("leak: differs from {twin} by only {rms:.2} of 255");
                 self.add(&image.path, Code::Leak, message);
             }
         }
@@ -300,7 +300,7 @@ impl Checker<'_> {
         for folder in folders {
             for label in list_labels(self.folder, &io::relative(&folder, self.folder)) {
                 if !wanted.contains(&label) {
-                    self.add(label, Code::OrphanLabel, "no image of this name");
+                    self.add(label, Code::OrphanLabel, "no image with this name");
                 }
             }
         }
@@ -365,7 +365,7 @@ fn twin_message(image: &CheckedImage, twin: &CheckedImage) -> (Code, String) {
         (true, _) => (Code::DuplicateImage, message),
         (false, false) => (Code::Leak, format!("leak: {message}")),
         (false, true) => {
-            let message = "leak: validation image is also trained on";
+            let message = "leak: validation image is also used for training";
             (Code::Leak, message.into())
         }
     }

@@ -55,7 +55,7 @@ fn find_in(dataset: &Path, path: PathBuf, options: &SettleOptions) -> Option<Fin
         Ok(objects) if objects.is_empty() => None,
         Ok(objects) => {
             let objects = objects.join(", ");
-            let message = format!("nothing holds {objects}: make this picture again");
+            let message = format!("nothing supports {objects}: generate this picture again");
             Some(Finding::in_file(path, Code::UnsupportedObject, message))
         }
     }

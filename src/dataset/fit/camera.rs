@@ -19,7 +19,7 @@ impl Fitting<'_> {
         let mut key = unfitted(knob.key, range_text(before), describe(knob, difference));
         if let Some(fitted) = knob.fitted(scene, difference) {
             match self.with_range(knob, fitted) {
-                Err(error) => key.why = format!("{} was found, but: {error}", range_text(fitted)),
+                Err(error) => key.why = format!("{} was fitted, but: {error}", range_text(fitted)),
                 Ok(changed) => {
                     self.config.scene = changed;
                     key.fitted = Some(range_text(fitted));
@@ -59,7 +59,7 @@ impl Fitting<'_> {
 
     fn too_small_for(&self, knob: &Knob) -> FittedKey {
         let before = range_text((knob.get)(&self.config.scene));
-        let why = "real pictures are smaller than scene.image, and show it otherwise";
+        let why = "real pictures are smaller than scene.image and show it differently";
         unfitted(knob.key, before, why.into())
     }
 
@@ -108,7 +108,7 @@ fn describe(knob: &Knob, difference: &Difference) -> String {
     let [value, low, high] = [mean.value, mean.low, mean.high].map(knobs::three_digits);
     let unit = knob.unit;
     let limit = match value < 0.0 && knob.least == 0.0 {
-        true => "; no key takes away what the photos of the place have",
+        true => "; no key removes what the photos of the place already have",
         false => "",
     };
     format!("real pictures differ by {value} ({low} to {high}) {unit} on average{limit}")

@@ -80,7 +80,7 @@ impl FallPlan<'_> {
 
 pub(super) fn stopped() -> Error {
     Error::Interrupted {
-        what: "nothing is written".into(),
+        what: "nothing was written".into(),
     }
 }
 

@@ -63,7 +63,7 @@ pub(super) const KNOBS: [Knob; 5] = [
     },
     Knob {
         key: "scene.finish.camera_noise.shot",
-        unit: "of variance for a unit of light",
+        unit: "of variance per unit of light",
         of_picture: |p| p.shot,
         get: |recipe| recipe.finish.camera_noise.shot,
         set: |recipe, range| recipe.finish.camera_noise.shot = range,

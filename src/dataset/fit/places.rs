@@ -361,9 +361,7 @@ fn describe_objects(
     let [low, middle, high] = counts::deciles(&own.weights);
     let likelier = gain.interval();
     format!(
-        "{} pictures tell of {:.1} objects on average ({:.1} to {:.1}), a tenth of them with at most {low}, half with at most \
-         {middle}, nine tenths with at most {high}; a picture left out is likelier than with the recipe by a factor of \
-         {:.2} ({:.2} to {:.2})",
+        "{} pictures suggest {:.1} objects on average ({:.1} to {:.1}), percentiles 10, 50 and 90: {low}, {middle} and {high}; a held-out picture is likelier than with the recipe by a factor of {:.2} ({:.2} to {:.2})",
         counts.len(),
         interval.value,
         interval.low,
@@ -376,8 +374,7 @@ fn describe_objects(
 
 fn unexplained(labels: f64) -> String {
     format!(
-        "; but even these have {labels:.1} labels a picture, unlike the real ones: objects fall otherwise there \
-         (see scene.walls, scene.friction, scene.collider and the assets' thickness), and their number cannot be told"
+        "; but even these have {labels:.1} labels per picture, unlike the real ones: objects fall differently there (see scene.walls, scene.friction, scene.collider and the assets' thickness), so their number cannot be fitted"
     )
 }
 
@@ -402,7 +399,7 @@ fn describe_lever(lever: &Lever, candidates: &[Candidate], fitted: &FittedLever)
     let best = match fitted.best {
         0 => String::new(),
         best => format!(
-            "; {} is nearer than as it was in {:.0} % of bootstraps",
+            "; {} is closer than the original in {:.0} % of bootstraps",
             named(candidates[best].value),
             100.0 * fitted.agreement
         ),

@@ -125,7 +125,7 @@ fn vary(knob: &Knob, config: &mut DatasetConfig, plates: &[MeasuredPlate]) -> Fi
         Ok(fitted) => {
             (knob.set)(&mut config.scene, fitted);
             key.fitted = Some(range_text(fitted));
-            key.why = "one standard deviation between the photos, either way".into();
+            key.why = "one standard deviation of the photos, either way".into();
         }
     }
     key
@@ -134,11 +134,11 @@ fn vary(knob: &Knob, config: &mut DatasetConfig, plates: &[MeasuredPlate]) -> Fi
 /// A fixed value with the photos' standard deviation about it, or why there is none.
 fn varied(knob: &Knob, before: Range, plates: &[MeasuredPlate]) -> Result<Range, String> {
     if before.min != before.max {
-        return Err("the recipe says how it varies".into());
+        return Err("the recipe already gives a range".into());
     }
     if plates.len() < MIN_PLATES {
         return Err(format!(
-            "fewer than {MIN_PLATES} photos do not tell how it varies"
+            "fewer than {MIN_PLATES} photos do not show how it varies"
         ));
     }
     let values = plates.iter().map(|plate| (knob.of_picture)(&plate.pixels));

@@ -38,7 +38,7 @@ fn warn_of_unlabelled(folder: &Path, set: &LabelledSet) {
     if unlabelled > 0 {
         let (folder, all) = (folder.display(), set.pictures.len());
         log::warn!(
-            "{folder}: {unlabelled} of {all} images have no label file and are left out; an empty one tells of no object"
+            "{folder}: {unlabelled} of {all} images have no label file and are left out; add an empty one where there is no object"
         );
     }
 }

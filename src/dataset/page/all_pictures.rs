@@ -16,8 +16,7 @@ const MAX_LISTED_PICTURES: usize = 5_000;
 pub(super) fn add_all(page: &mut Page, folder: &Path, summary: &Summary, page_folder: &Path) {
     let root = io::relative(&absolute_path(folder), &absolute_path(page_folder));
     page.subheading("All pictures").text(
-        "What stands behind these headings is not on this page: pictures are read from the dataset's folder when a heading \
-         is opened, and each leads to its file.",
+        "The pictures below are not stored in this page: opening a heading loads them from the dataset's folder. Each links to its file.",
     );
     let count = summary.glances.len().min(MAX_LISTED_PICTURES);
     for samples in summary.glances[..count].chunks(PICTURES_PER_HEADING) {

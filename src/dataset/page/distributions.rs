@@ -26,7 +26,7 @@ pub(super) fn add_drawn(page: &mut Page, summary: &Summary) {
     };
     page.heading("What was drawn").text(&format!(
         "Bars: {values}. Dashed line: the recipe's distribution; about one bar in twenty lies outside the \
-         band around it by chance. What does not vary, and what happens in a share of the cases, is in tables below.",
+         band around it by chance. Values that do not vary, and events that happen by chance, are in the tables below.",
     ));
     let DrawnValues {
         mut charts,
@@ -56,7 +56,7 @@ struct DrawnValues {
 fn drawn_values(summary: &Summary) -> DrawnValues {
     let mut drawn = DrawnValues {
         charts: Vec::new(),
-        fixed: Table::new(["not varying", "value"]),
+        fixed: Table::new(["fixed", "value"]),
         chances: Table::new(["by chance", "share in the recipe", "share in the dataset"]),
     };
     for (key, values) in &summary.drawn {

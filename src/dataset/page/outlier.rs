@@ -18,7 +18,7 @@ pub struct Outlier {
     pub row: usize,
     /// How far it is from the median, in robust standard deviations.
     pub deviations: f64,
-    /// By what: `objects 17, as a rule 8`.
+    /// By what: `objects 17, typically 8`.
     pub why: String,
 }
 
@@ -72,7 +72,7 @@ impl Feature<'_> {
         (shown != typical && deviations > MIN_DEVIATIONS).then(|| Outlier {
             row,
             deviations,
-            why: format!("{} {shown}, as a rule {typical}", self.name),
+            why: format!("{} {shown}, typically {typical}", self.name),
         })
     }
 }
@@ -114,7 +114,7 @@ mod tests {
         assert_eq!(found.len(), 1);
         assert_eq!(
             (found[0].row, found[0].why.as_str()),
-            (5, "objects 40, as a rule 8")
+            (5, "objects 40, typically 8")
         );
         assert_eq!(outliers(&[]), []);
         assert_eq!(outliers(&[feature("", vec![])]), []);

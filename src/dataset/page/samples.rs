@@ -27,7 +27,7 @@ pub(super) const SAMPLES_STYLE: &str = "<style>.samples text{display:none}.sampl
 /// The switches over the samples.
 const SWITCHES: [(&str, &str, bool); 3] = [
     ("boxes", "boxes of labelled objects", true),
-    ("masks", "what is seen of them", false),
+    ("masks", "their visible parts", false),
     ("others", "outlines of objects without a label", true),
 ];
 
@@ -75,8 +75,7 @@ fn describe_selection(selected: &[SelectedSample], all: usize) -> String {
     let outliers = selected.iter().filter(|sample| sample.why.is_some());
     let (count, outliers) = (selected.len(), outliers.count());
     format!(
-        "{count} of {all} pictures: first {outliers} that are unlike the others, with what sets them apart, then others evenly \
-         spread. Click one to enlarge it; Escape and the arrow keys work too."
+        "{count} of {all} pictures: first {outliers} outliers, with what sets them apart, then others evenly spread. Click one to enlarge it; Escape and the arrow keys work too."
     )
 }
 
@@ -139,7 +138,7 @@ const SAMPLE_MEASURES: [SampleMeasure; 7] = [
     ("objects without a label", |s| {
         (s.objects - s.labels.len()) as f64
     }),
-    ("least seen label, %", |s| 100.0 * s.least_visible),
+    ("least visible label, %", |s| 100.0 * s.least_visible),
     ("largest box, px", |s| {
         longer_sides(s).fold(f64::NAN, f64::max)
     }),

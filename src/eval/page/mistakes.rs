@@ -59,9 +59,7 @@ pub(crate) fn add_to(
     page.heading("Mistakes")
         .text(&describe_mistakes(mistakes, options));
     if options.pictures.iter().flatten().next().is_none() {
-        page.text(
-            "No pictures of them: the images were not found; say where they are with --images.",
-        );
+        page.text("No pictures: the images were not found; give their folder with --images.");
         return;
     }
     page.html(gallery::STYLE).html(&legend());
@@ -71,9 +69,9 @@ pub(crate) fn add_to(
 fn add_galleries(page: &mut Page, run: &Run, mistakes: &[Mistake], options: &EvalReportOptions) {
     let (misses, detections): (Vec<&Mistake>, Vec<&Mistake>) =
         mistakes.iter().partition(|m| m.is_miss());
-    let title = "False alarms and wrong classes, the surest first";
+    let title = "False alarms and wrong classes, most confident first";
     add_figures(page, ["alarm", title], run, &detections, options);
-    let title = "Boxes that were missed, the largest first";
+    let title = "Missed boxes, largest first";
     add_figures(page, ["miss", title], run, &misses, options);
 }
 
@@ -86,8 +84,7 @@ fn describe_mistakes(mistakes: &[Mistake], options: &EvalReportOptions) -> Strin
     .map(|kind| mistakes.iter().filter(|m| m.kind == kind).count());
     let ConfusionOptions { confidence, iou } = options.confusion;
     format!(
-        "{alarms} false alarms, {wrong} of another class than the box that they name, {missed} boxes missed; detections \
-         surer than {confidence} that overlap a box by more than {iou}. All of them, the worst first, are in mistakes.csv."
+        "{alarms} false alarms, {wrong} of another class than their box, {missed} boxes missed; detections with a confidence above {confidence} and an IoU above {iou}. All of them, worst first, are in mistakes.csv."
     )
 }
 

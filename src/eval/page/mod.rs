@@ -226,7 +226,7 @@ pub fn warn_of_empty_truth(truth: &Path, runs: &[Metrics]) {
     let is_empty = |metrics: &Metrics| metrics.yolov5.classes.is_empty();
     if runs.iter().all(is_empty) {
         let truth = truth.display();
-        log::warn!("{truth}: no object, so there was nothing to be found in any image");
+        log::warn!("{truth}: no objects, so there is nothing to find in any image");
     }
 }
 
@@ -563,7 +563,7 @@ fn pictures(
 fn describe_curves(classes: usize) -> String {
     let most = eval::MAX_CURVES;
     if classes > most {
-        format!(" The mean of {classes} classes, and {most} of them.")
+        format!(" The mean of {classes} classes, and {most} single classes.")
     } else {
         String::new()
     }
@@ -571,7 +571,7 @@ fn describe_curves(classes: usize) -> String {
 
 fn describe_confusion(ConfusionOptions { confidence, iou }: &ConfusionOptions) -> String {
     format!(
-        "Which class is found where which is true; detections surer than {confidence} that overlap a box by more than {iou}. \
+        "Found class by true class, for detections with a confidence above {confidence} and an IoU above {iou}. \
          Shades are shares of a column. All counts are in confusion.csv."
     )
 }

@@ -102,9 +102,9 @@ impl DisplayProfile {
                 let matrix = to_rec709(&RgbSpace::ADOBE_RGB)?;
                 Self::from_power(Some(ADOBE_EXPONENT), matrix).map(Some)
             }
-            ColorDescription::Uncalibrated => {
-                Err("colours other than sRGB by its EXIF data, and no colour profile".into())
-            }
+            ColorDescription::Uncalibrated => Err(
+                "colours other than sRGB according to its EXIF data, and no colour profile".into(),
+            ),
         }
     }
 

@@ -163,20 +163,20 @@ fn first_picture<R: Read + Seek>(mut file: R) -> Result<Decoder<R>, Refusal> {
     }
     let mut of_both = [Tag::TileWidth, Tag::StripOffsets].iter();
     if of_both.all(|tag| tags.contains_key(&tag.to_u16())) {
-        return Err(unsupported(&"tiles under the tags of strips"));
+        return Err(unsupported(&"tiles under strip tags"));
     }
     let mut decoder = Decoder::new(file)?;
     if is_reduced(&mut decoder) {
         return Err(raw_file());
     }
     if decoder.find_tag_unsigned(Tag::FillOrder)? == Some(LOWEST_BIT_FIRST) {
-        return Err(unsupported(&"pixels from the lowest bit up"));
+        return Err(unsupported(&"lowest bit first (FillOrder 2)"));
     }
     Ok(decoder)
 }
 
 fn raw_file() -> Refusal {
-    format!("is {RAW}, of which the first picture is no photo: {DEVELOP}").into()
+    format!("is {RAW}, whose first picture is not a photo: {DEVELOP}").into()
 }
 
 /// By its tags the file is a DNG, or its first picture is raw data of a sensor.
@@ -580,7 +580,7 @@ impl ChunkGrid {
             (Samples::U16(to), Samples::U16(from)) => self.put(to, from, index, size),
             (Samples::F16(to), Samples::F16(from)) => self.put(to, from, index, size),
             (Samples::F32(to), Samples::F32(from)) => self.put(to, from, index, size),
-            _ => return Err("damaged TIFF: samples of two kinds".into()),
+            _ => return Err("damaged TIFF: mixed sample types".into()),
         }
         Ok(())
     }
@@ -627,7 +627,7 @@ fn read_chunk(
     decoder: &mut Decoder<impl Read + Seek>,
     index: usize,
 ) -> Result<(Samples, [usize; 2]), Refusal> {
-    let number = u32::try_from(index).map_err(|_| "damaged TIFF: strips without number")?;
+    let number = u32::try_from(index).map_err(|_| "damaged TIFF: too many strips")?;
     let decoded = decoder.read_chunk(number);
     // Of tiles that reach over the right border, which it decodes row by row, it takes the last
     // codes for missing (weezl 0.1.12).

@@ -82,7 +82,7 @@ impl<'de> Visitor<'de> for KeyCheck {
         while let Some(key) = object.next_key::<String>()? {
             object.next_value_seed(inside)?;
             if let Some(twice) = keys.replace(key) {
-                return Err(A::Error::custom(format!("key \"{twice}\" twice")));
+                return Err(A::Error::custom(format!("duplicate key \"{twice}\"")));
             }
         }
         Ok(())
@@ -150,7 +150,7 @@ mod tests {
     fn a_key_twice_is_named_with_its_line() {
         let e = check_json("{\"a\": [{\"b\": 1,\n \"b\": 2}]}", 9).unwrap_err();
         assert!(
-            e.to_string().contains("key \"b\" twice") && e.line() == 2,
+            e.to_string().contains("duplicate key \"b\"") && e.line() == 2,
             "{e}"
         );
         assert!(check_json(r#"{"a": {"b": 1.5, "c": null}, "b": [true, "a", -1]}"#, 9).is_ok());

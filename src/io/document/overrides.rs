@@ -45,7 +45,7 @@ fn parse_value(text: &str) -> std::result::Result<Value, String> {
     match table.ok().and_then(|mut table| table.remove("value")) {
         Some(value) => Ok(value),
         None if text.trim_start().starts_with(['[', '{']) => Err(format!(
-            "{text} is not TOML, expected as in [4, 12] or [\"yolo\"], quoted for the shell"
+            "{text} is not TOML, expected a value such as [4, 12] or [\"yolo\"], quoted for the shell"
         )),
         None => Ok(Value::String(text.to_owned())),
     }
@@ -100,8 +100,8 @@ impl PathStep<'_> {
             (Value::Array(list), Self::Index(i)) => {
                 list.get_mut(i).ok_or("no such entry in the list")
             }
-            (_, Self::Key(_)) => Err("goes into a value that is not a table"),
-            (_, Self::Index(_)) => Err("goes into a value that is not a list"),
+            (_, Self::Key(_)) => Err("its parent is not a table"),
+            (_, Self::Index(_)) => Err("its parent is not a list"),
         }
     }
 }
@@ -185,7 +185,7 @@ mod tests {
     fn a_list_that_is_not_toml_is_refused() {
         for list in ["[1,2", "[yolo]", "{a=1"] {
             let told = applied("", &format!("a.b={list}")).unwrap_err().to_string();
-            let expected = format!("a.b: {list} is not TOML, expected as in ");
+            let expected = format!("a.b: {list} is not TOML, expected a value such as ");
             assert!(told.starts_with(&expected), "{told}");
         }
     }

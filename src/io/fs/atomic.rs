@@ -287,7 +287,7 @@ pub fn create_folder(path: impl AsRef<Path>) -> Result<()> {
         return Err(Error::file(file, "is a file, expected a folder"));
     }
     std::fs::create_dir_all(path)
-        .map_err(|e| Error::file(path, format!("cannot be made: {}", reason(&e))))
+        .map_err(|e| Error::file(path, format!("cannot be created: {}", reason(&e))))
 }
 
 #[cfg(test)]

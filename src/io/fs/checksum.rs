@@ -51,7 +51,7 @@ pub fn copy(from: impl AsRef<Path>, to: impl AsRef<Path>, expected: Checksum) ->
 }
 
 fn changed(path: &Path) -> Error {
-    Error::file(path, "has other bytes than when it was written")
+    Error::file(path, "has changed since it was written")
 }
 
 /// Bytes that are moved at a time.
@@ -111,7 +111,7 @@ mod tests {
         ] {
             let message = copy(&from, &to, wrong).unwrap_err().to_string();
             assert!(
-                message.ends_with("a: has other bytes than when it was written"),
+                message.ends_with("a: has changed since it was written"),
                 "{message}"
             );
             assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);

@@ -19,10 +19,10 @@ pub fn check_distinct(
         let target = target.as_ref();
         let path = real_path(target);
         if inputs.contains(&path) {
-            return Err(Error::file(target, "is read and would be written over"));
+            return Err(Error::file(target, "is an input and would be overwritten"));
         }
         if !written.insert(path) {
-            return Err(Error::file(target, "two files would go here"));
+            return Err(Error::file(target, "two files would be written here"));
         }
     }
     Ok(())

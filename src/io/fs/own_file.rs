@@ -46,7 +46,7 @@ pub(crate) fn refuse_foreign(path: &Path) -> Result<()> {
 fn foreign(path: &Path) -> Error {
     Error::file(
         path,
-        "is a link or no regular file, expected petcomp's own file; take it away",
+        "is a link or not a regular file, expected petcomp's own file; remove it",
     )
 }
 
@@ -76,7 +76,7 @@ mod tests {
                 open_own(refused)
                     .unwrap_err()
                     .to_string()
-                    .contains("is a link or no regular file")
+                    .contains("is a link or not a regular file")
             );
         }
         open_own(&own).unwrap().write_all(b"a").unwrap();

@@ -58,7 +58,7 @@ fn found_inside(folder: &Path, file: &Path) -> Result<(PathBuf, Metadata)> {
 
 fn leads_out(path: PathBuf, folder: &Path) -> Error {
     let folder = or_working_folder(folder).display();
-    let what = format!("is a link out of {folder}, expected a file in that folder");
+    let what = format!("is a link that leads out of {folder}, expected a file in that folder");
     Error::file(path, what)
 }
 
@@ -160,9 +160,9 @@ mod tests {
         let refused = |file: &str| inside(&folder, file).unwrap_err().to_string();
         for (file, why) in [
             ("../secret.txt", "expected a path below"),
-            ("far.txt", "is a link out of"),
-            ("up/secret.txt", "is a link out of"),
-            ("endless", "is a link out of"),
+            ("far.txt", "is a link that leads out of"),
+            ("up/secret.txt", "is a link that leads out of"),
+            ("endless", "is a link that leads out of"),
             ("pipe", "not a regular file"),
             ("sub", "not a regular file"),
             ("none", "no such file"),

@@ -57,7 +57,7 @@ pub(crate) fn ask(
     request: Request,
 ) -> std::result::Result<Response, Refusal> {
     let program = find_program().ok_or_else(|| {
-        format!("needs OpenImageIO, and {PROGRAM} is not beside this program ({PROGRAM_VARIABLE} may name it)")
+        format!("needs OpenImageIO, but {PROGRAM} is not next to this program (or set {PROGRAM_VARIABLE} to its path)")
     })?;
     IDLE.ask(&program, source, limits, strict, request)
 }
@@ -68,7 +68,7 @@ pub(crate) fn ask(
 /// [`Error::File`] where there is no worker program or it does not start.
 pub fn worker_version() -> Result<String> {
     let program =
-        find_program().ok_or_else(|| Error::file(PROGRAM, "not found beside this program"))?;
+        find_program().ok_or_else(|| Error::file(PROGRAM, "not found next to this program"))?;
     let worker =
         Worker::start(&program, &Limits::default()).map_err(|e| Error::file(&program, e))?;
     Ok(worker.greeting.libraries.clone())
@@ -231,7 +231,7 @@ impl Worker {
         }
         if strict {
             return Err(format!(
-                "needs OpenImageIO, and its worker has no full sandbox here ({missing})"
+                "needs OpenImageIO, but its worker has no full sandbox here ({missing})"
             )
             .into());
         }
@@ -339,7 +339,7 @@ fn spawn_program(program: &Path, limits: &Limits, stdin: OwnedFd) -> std::io::Re
 
 fn not_started(program: &Path, how: &str) -> Refusal {
     let program = program.display();
-    format!("needs OpenImageIO, and {program} does not start: {how}").into()
+    format!("needs OpenImageIO, but {program} does not start: {how}").into()
 }
 
 /// The other end of a stream is gone.

@@ -23,7 +23,7 @@ pub fn serve(mut arguments: impl Iterator<Item = OsString>) -> ExitCode {
     let Ok(limits) = serde_json::from_str(&argument.to_string_lossy()) else {
         let _ = writeln!(
             std::io::stderr(),
-            "petcomp starts this program to read pictures; people do not"
+            "petcomp starts this program to read pictures; do not run it yourself"
         );
         return ExitCode::FAILURE;
     };
@@ -70,7 +70,7 @@ impl Responder {
         self.memory.allow(request.bytes, 0);
         let bytes = self.receive_file(request.bytes, from)?;
         let Some(format) = Format::from_name(&request.format) else {
-            return send_refusal(to, &"a format of an unknown name".into());
+            return send_refusal(to, &"a format with an unknown name".into());
         };
         let source = SourceFile {
             path: PathBuf::new(),

@@ -66,7 +66,7 @@ fn check_image([width, height]: [u32; 2]) -> Result<()> {
         return Ok(());
     }
     let what = format!(
-        "{width} x {height}, expected at least {LEAST_SIDE_PX} x {LEAST_SIDE_PX}: Blender renders nothing smaller"
+        "{width} x {height}, expected at least {LEAST_SIDE_PX} x {LEAST_SIDE_PX}: Blender cannot render a smaller picture"
     );
     Err(Error::value("image", what))
 }
@@ -77,7 +77,7 @@ fn check_lights(lights: &[AreaLight]) -> Result<()> {
         None => Ok(()),
         Some((i, side)) => {
             let what = format!(
-                "{side} m, expected at least {LEAST_LIGHT_M}: Cycles makes noise of smaller lights"
+                "{side} m, expected at least {LEAST_LIGHT_M}: smaller lights are noisy in Cycles"
             );
             Err(Error::value(format!("lights[{i}].size"), what))
         }
@@ -90,18 +90,17 @@ fn check_lens(shot: &Shot) -> Result<()> {
         return Ok(());
     }
     if shot.thin_lens.is_some() {
-        return Err(bent_lens(shot.k1, "no f_number beside it"));
+        return Err(bent_lens(shot.k1, "no f_number with it"));
     }
     if off_axis_px(&shot.camera) > OFF_AXIS_PX {
-        let expected = "the principal point in the picture's middle and square pixels with it";
+        let expected = "a centred principal point and square pixels with it";
         return Err(bent_lens(shot.k1, expected));
     }
     Ok(())
 }
 
 fn bent_lens(k1: f64, expected: &str) -> Error {
-    let what =
-        format!("{k1}, expected {expected}, or 0: Cycles has no other lens that bends lines");
+    let what = format!("{k1}, expected {expected}, or 0: Cycles has no other lens with distortion");
     Error::value("lens.k1", what)
 }
 

@@ -81,9 +81,7 @@ impl PictureFolder {
     }
 
     fn outside(&self, name: &str) -> Error {
-        let what = format!(
-            "\"{name}\", expected a path below the scene's folder or the one that holds it"
-        );
+        let what = format!("\"{name}\", expected a path below the scene's folder or its parent");
         Error::value("path", what).in_file(&self.scene)
     }
 

@@ -178,7 +178,7 @@ impl Choice<'_> {
         };
         Err(Error::value(
             self.at,
-            format!("{count} asked for, but {what}"),
+            format!("{count} requested, but {what}"),
         ))
     }
 
@@ -189,7 +189,7 @@ impl Choice<'_> {
         }
         let (at, role) = (self.at, self.role);
         let what = format!(
-            "{count} asked for, but there are {assets} assets of role \"{role}\" and at_most_once is true; \
+            "{count} requested, but there are {assets} assets of role \"{role}\" and at_most_once is true; \
              expected {at} up to {assets}"
         );
         Err(Error::value(at, what))

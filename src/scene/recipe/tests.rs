@@ -153,7 +153,7 @@ fn distractors_that_no_asset_is_are_told() {
     let told = recipe.scene(7, 0, &[tray("a")], &catalog(10)).unwrap_err();
     assert_eq!(
         told.to_string(),
-        "distractors: 2 asked for, but no asset has the role \"distractor\""
+        "distractors: 2 requested, but no asset has the role \"distractor\""
     );
     // And before the first picture, however seldom they are drawn.
     let seldom = Recipe {
@@ -231,7 +231,7 @@ fn at_most_once_is_an_error_where_there_are_too_few_assets() {
         let e = recipe.check_room(&[tray("a")], &catalog(10)).unwrap_err();
         e.to_string()
     };
-    let expected = "objects: 12 asked for, but there are 10 assets of role \"object\" and \
+    let expected = "objects: 12 requested, but there are 10 assets of role \"object\" and \
                     at_most_once is true; expected objects up to 10";
     assert_eq!(told(&once(Range::new(4.0, 12.0))), expected);
     let fixed = once(Range::fixed(12.0));
@@ -411,7 +411,7 @@ fn nothing_to_choose_from_is_told() {
         "backgrounds: none, expected at least one labelled photo"
     );
     assert!(
-        reported(&[tray("a")], &[]).ends_with("asked for, but there is no asset to choose from")
+        reported(&[tray("a")], &[]).ends_with("requested, but there is no asset to choose from")
     );
     let bare = AssetVariant {
         photo_sizes: vec![],

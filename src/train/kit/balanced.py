@@ -168,7 +168,7 @@ def main():
     parser.add_argument("--name", default="combined")
     args = parser.parse_args()
     if args.data != COMBINED and args.real_share is not None:
-        parser.error(f"--real-share: of {args.data}, expected {COMBINED}")
+        parser.error(f"--real-share: given with {args.data}, expected {COMBINED}")
     settings = dict(
         model=args.model, data=str(HERE / args.data), epochs=args.epochs, batch=args.batch, imgsz=args.img,
         seed=args.seed, workers=args.workers, device=args.device, name=args.name, project=str(HERE / "runs"),

@@ -174,7 +174,8 @@ pub fn check_sets(sets: [&YoloSet; 2], folders: [&Path; 2]) -> Result<()> {
         return Ok(());
     };
     let (image, real_folder) = (image.display(), folders[0].display());
-    let what = format!("{image} is also a real image, expected other images than in {real_folder}");
+    let what =
+        format!("{image} is also a real image, expected images that are not in {real_folder}");
     Err(Error::value("synthetic", what))
 }
 
@@ -194,7 +195,7 @@ fn warn_of_known_validation([real, synthetic]: [&YoloSet; 2], folder: &Path) {
     let known = shared_images(&trained, &real.val).count();
     if known > 0 {
         log::warn!(
-            "{}: {known} of {} images for validation are also trained on; see `dataset split`",
+            "{}: {known} of {} images for validation are also used for training; see `dataset split`",
             folder.display(),
             real.val.len()
         );

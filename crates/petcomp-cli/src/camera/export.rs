@@ -53,7 +53,9 @@ pub(super) fn export_cameras(args: &ExportCameraArgs) -> anyhow::Result<()> {
 fn warn_of_bent_lines(path: &Path, file: &CameraFile) {
     if file.k1() != 0.0 {
         let (path, k1) = (path.display(), file.k1());
-        log::warn!("{path}: k1 = {k1:.4} of its lens is left out, Blender's cameras have none");
+        log::warn!(
+            "{path}: k1 = {k1:.4} of its lens is left out, as Blender's cameras have no distortion"
+        );
     }
 }
 
@@ -100,8 +102,7 @@ fn check_names(paths: &[PathBuf], files: &[CameraFile]) -> anyhow::Result<()> {
         );
         if let Some(other) = named.insert(name, path) {
             anyhow::bail!(
-                "{shown}: image.file: \"{name}\", which {} has too; COLMAP needs another name for \
-                 each picture: export these cameras into folders of their own",
+                "{shown}: image.file: \"{name}\", which {} also has; COLMAP needs a different name for each picture: export these cameras to separate folders",
                 other.display()
             );
         }

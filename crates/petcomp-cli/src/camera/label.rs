@@ -105,7 +105,7 @@ impl InitLabelArgs {
     }
 
     fn needs_corners(&self, why: &Error) -> Error {
-        let what = format!("{why}; --corners says where the rectangle is instead");
+        let what = format!("{why}; give the rectangle with --corners instead");
         Error::file(&self.photo, what)
     }
 

@@ -19,7 +19,7 @@ fn question_of_outside(label: &Label) -> Option<String> {
     let is_before = corners.iter().flatten().any(|&at| at < 0.0);
     (count > 1 && !is_before).then(|| {
         format!(
-            "{count} of 4 corners lie outside the {w} x {h} picture; were they marked in another size of it?"
+            "{count} of 4 corners lie outside the {w} x {h} picture; were they marked on a copy of another size?"
         )
     })
 }

@@ -122,8 +122,7 @@ pub(super) fn solve_joint(args: &JointArgs, global: &GlobalArgs) -> anyhow::Resu
             && labels.len() > 1
         {
             log::warn!(
-                "{alone}: solved alone: no other label has its camera.id, picture's shape and lens, \
-                 or it was cropped and states no principal point"
+                "{alone}: solved alone: no other label has the same camera.id, picture shape and lens, or it was cropped and has no principal point"
             );
         }
         match solve_together(&members) {
@@ -216,7 +215,7 @@ pub(super) fn accepted(
 }
 
 fn needs_force(label: &Path, why: Error) -> Error {
-    let advised = |what: &dyn std::fmt::Display| format!("{what}; --force accepts it nevertheless");
+    let advised = |what: &dyn std::fmt::Display| format!("{what}; --force accepts it anyway");
     match why {
         Error::Value { at, what } => Error::value(at, advised(&what)).in_file(label),
         other => Error::file(label, advised(&other)),
@@ -239,7 +238,7 @@ fn write_camera(
     match labelled.photo() {
         Some(photo) => write_overlay(target, &photo, solution)?,
         None => log::warn!(
-            "{labelled}: image.file: \"{}\" is not there: no overlay, and its size and EXIF data are not checked",
+            "{labelled}: image.file: \"{}\" is missing: no overlay is drawn, and its size and EXIF data are not checked",
             labelled.label.image.file
         ),
     }

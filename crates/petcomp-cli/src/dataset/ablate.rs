@@ -75,7 +75,7 @@ fn check_recipe(folder: &Path, config: &DatasetConfig) -> petcomp::Result<()> {
         return Ok(());
     }
     let what = format!(
-        "says something else than this run, and {} was begun with it; ablate into a new folder, or delete the file if only folders were moved",
+        "differs from this run, and {} was started with it; ablate into a new folder, or delete the file if only folders were moved",
         dataset.display()
     );
     Err(Error::file(recipe, what))
@@ -126,7 +126,8 @@ fn check_folders(switches: &[Override]) -> petcomp::Result<()> {
     let mut known = BTreeMap::new();
     for switch in switches {
         if let Some(first) = known.insert(folder_name(switch), switch) {
-            let what = format!("{switch}, whose folder would be that of {first}, expected another");
+            let what =
+                format!("{switch}, which would use the folder of {first}, expected another switch");
             return Err(Error::value("--switch", what));
         }
     }
@@ -180,7 +181,7 @@ mod tests {
         let alike = ["a=1".parse().unwrap(), switch("1")];
         assert_eq!(
             check_folders(&alike).unwrap_err().to_string(),
-            "--switch: a=\"1\", whose folder would be that of a=1, expected another"
+            "--switch: a=\"1\", which would use the folder of a=1, expected another switch"
         );
     }
 

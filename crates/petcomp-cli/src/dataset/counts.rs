@@ -30,7 +30,7 @@ fn class_line(class: &ClassCount) -> String {
 
 fn images_line(counts: &DatasetCounts) -> String {
     format!(
-        "images       {} ({} for validation), {} made now, {} scenes resampled",
+        "images       {} ({} for validation), {} generated now, {} scenes resampled",
         counts.images, counts.val, counts.made, counts.retries
     )
 }
@@ -56,7 +56,7 @@ fn counted_in(counts: &DatasetCounts) -> String {
 }
 
 const WITHOUT_LABEL: &str = "without a label";
-const TO_BE_IGNORED: &str = "to be ignored, in YOLO without a label";
+const TO_BE_IGNORED: &str = "ignored, unlabelled in YOLO";
 
 /// What became of the labels of obstructed objects.
 fn obstructed_labels(policy: Obstructed) -> &'static str {
@@ -64,19 +64,19 @@ fn obstructed_labels(policy: Obstructed) -> &'static str {
         Obstructed::Drop => WITHOUT_LABEL,
         Obstructed::Keep => "labelled like the others",
         Obstructed::Ignore => TO_BE_IGNORED,
-        Obstructed::Class => "labelled as a class of their own",
+        Obstructed::Class => "labelled as a separate class",
     }
 }
 
 /// Objects that were left out, where there are any, and what became of their labels.
 fn left_out(counts: &DatasetCounts) -> String {
     let labels = match counts.policy {
-        Obstructed::Ignore => "to be ignored, or without a label",
+        Obstructed::Ignore => "ignored or without a label",
         Obstructed::Drop | Obstructed::Keep | Obstructed::Class => WITHOUT_LABEL,
     };
     match counts.left_out() {
         0 => String::new(),
-        some => format!(", {some} cut off too much or not seen ({labels})"),
+        some => format!(", {some} too truncated or not visible ({labels})"),
     }
 }
 
@@ -95,13 +95,13 @@ mod tests {
 
     #[test]
     fn the_line_of_objects_adds_up() {
-        let to_be_ignored = "(to be ignored, in YOLO without a label)";
+        let to_be_ignored = "(ignored, unlabelled in YOLO)";
         for (policy, obstructed, left_out) in [
             (Obstructed::Drop, "(without a label)", "(without a label)"),
             (
                 Obstructed::Ignore,
                 to_be_ignored,
-                "(to be ignored, or without a label)",
+                "(ignored or without a label)",
             ),
         ] {
             let counts = DatasetCounts {
@@ -112,7 +112,7 @@ mod tests {
                 ..DatasetCounts::default()
             };
             let expected = format!(
-                "objects      10, 5 labelled, 3 obstructed {obstructed}, 2 cut off too much or not seen {left_out}"
+                "objects      10, 5 labelled, 3 obstructed {obstructed}, 2 too truncated or not visible {left_out}"
             );
             assert_eq!(objects_line(&counts), expected);
         }

@@ -90,7 +90,7 @@ impl GenerateArgs {
             Output::Folder(_) => repair_folder(folder),
             Output::Store(_) => Err(Error::value(
                 "resume",
-                "an object store, expected a folder: what has a receipt there is whole",
+                "an object store, expected a folder: archives with a receipt are complete there",
             )),
         }
     }
@@ -138,7 +138,7 @@ impl GenerateArgs {
 fn repair_folder(folder: &Path) -> petcomp::Result<()> {
     let (good, bad) = dataset::repair(folder)?;
     print::line(format_args!(
-        "{}: {good} images are as they were written, {bad} are made again",
+        "{}: {good} images are intact, {bad} are generated again",
         folder.display()
     ));
     Ok(())
@@ -147,7 +147,7 @@ fn repair_folder(folder: &Path) -> petcomp::Result<()> {
 fn repair_archives(folder: &Path, range: SampleRange) -> petcomp::Result<()> {
     let (good, bad) = dataset::repair_archives(folder, range)?;
     print::line(format_args!(
-        "{}: {good} archives are whole, {bad} are made again",
+        "{}: {good} archives are intact, {bad} are generated again",
         folder.display()
     ));
     Ok(())

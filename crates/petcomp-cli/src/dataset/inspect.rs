@@ -97,7 +97,7 @@ fn print_findings(checked: &Checked, folder: &Path) -> anyhow::Result<()> {
 
 fn what_was_checked(checked: &Checked) -> String {
     if !checked.has_yolo {
-        return "no labels for YOLO, files alone compared with index.jsonl".into();
+        return "no YOLO labels, only the files compared with index.jsonl".into();
     }
     let (images, rows) = (checked.images, checked.rows.iter().sum::<usize>());
     format!("{}, {}", counted(images, "image"), counted(rows, "label"))

@@ -70,11 +70,13 @@ fn explain_draws(args: &ExplainArgs) -> anyhow::Result<()> {
 
 fn print_rejected(provenance: &Provenance) {
     for reason in &provenance.rejected {
-        print::line(format_args!("# rejected a scene: {reason}"));
+        print::line(format_args!("# rejected scene: {reason}"));
     }
     if !provenance.rejected.is_empty() {
         let seed = provenance.scene_seed;
-        print::line(format_args!("# what follows was drawn with seed {seed}"));
+        print::line(format_args!(
+            "# the values below were drawn with seed {seed}"
+        ));
     }
 }
 

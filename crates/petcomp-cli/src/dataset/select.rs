@@ -165,12 +165,12 @@ fn write_lists(set: &YoloSet, folder: &Path, global: &GlobalArgs) -> anyhow::Res
 fn report_leakage(leakage: &Leakage) {
     for (group, [all, shared]) in &leakage.groups {
         print::line(format_args!(
-            "leak: {shared} of {all} {group}s of the validation images are also trained on"
+            "leak: {shared} of {all} {group}s of the validation images are also used for training"
         ));
     }
     let pairs = &leakage.near_duplicates;
     print::line(format_args!(
-        "leak: {} validation images look like one that is trained on",
+        "leak: {} validation images look like a training image",
         pairs.len()
     ));
     pairs.iter().take(MAX_LISTED_PAIRS).for_each(list_pair);

@@ -48,7 +48,7 @@ pub(crate) fn generate_supervised(
     });
     match (made, long_run) {
         (Err(Error::Interrupted { what }), Some(long)) => {
-            anyhow::bail!("this would take {long}; say --yes to go on ({what})")
+            anyhow::bail!("this would take {long}; add --yes to continue ({what})")
         }
         (made, _) => Ok(made?),
     }

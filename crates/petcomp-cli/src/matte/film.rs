@@ -145,7 +145,7 @@ impl FilmOptionArgs {
     fn check(&self, photos: &[PathBuf]) -> Result<()> {
         anyhow::ensure!(
             is_exr(&self.output),
-            "{}: film needs a file called .exr",
+            "{}: film needs the extension .exr",
             self.output.display()
         );
         let inputs = photos.iter().chain(&self.plates).chain(&self.mask);
@@ -221,14 +221,14 @@ impl FilmOptionArgs {
 fn describe_plate(plate: &ScreenPlate, flat: LinearRgb) -> String {
     let (screen, uneven) = (plate_source(plate), 100.0 * plate.unevenness);
     format!(
-        "screen {screen}, {uneven:.0} % uneven; flat plastic lets through {:.2} {:.2} {:.2}",
+        "screen {screen}, {uneven:.0} % uneven; flat plastic transmits {:.2} {:.2} {:.2}",
         flat.r, flat.g, flat.b
     )
 }
 
 fn plate_source(plate: &ScreenPlate) -> String {
     match plate.degree {
-        Some(degree) => format!("fitted by degree {degree}"),
+        Some(degree) => format!("fitted with degree {degree}"),
         None => "photographed".into(),
     }
 }

@@ -315,7 +315,8 @@ impl KeyerWork<'_> {
 }
 
 fn interrupted(done: u64, count: u64) -> Error {
-    let what = format!("{done} of {count} frames are done; the same command begins with the first");
+    let what =
+        format!("{done} of {count} frames are done; the same command starts again from the first");
     Error::Interrupted { what }
 }
 

@@ -64,7 +64,7 @@ fn canvas_of_exr(photo: &Path) -> petcomp::Result<Option<Canvas>> {
     if stores_more_than_shown(&header) {
         let (photo, [w, h]) = (photo.display(), header.data_size);
         log::warn!(
-            "{photo}: of {w} x {h} stored pixels, those outside the display window are not kept"
+            "{photo}: of {w} x {h} stored pixels, those outside the display window are dropped"
         );
     }
     Ok(Some(header.canvas))

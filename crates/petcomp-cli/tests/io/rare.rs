@@ -539,8 +539,7 @@ fn colour_of_half_the_size_in_b44_is_read_or_named() {
         let channels = [0.25, -0.5, 0.5].map(flat_b44).concat();
         let path = folder.with("a.exr", &chroma_exr(method, &[channels]));
         let expected = format!(
-            "a.exr: unsupported EXR: channels with fewer samples than pixels, \
-             compressed by {name}; save it as RGB or with ZIP compression"
+            "a.exr: unsupported EXR: subsampled channels compressed by {name}; save it as RGB or with ZIP compression"
         );
         match io::read::<LinearRgb>(&path) {
             Ok(read) => {

@@ -87,7 +87,7 @@ def overrides(values: Any) -> list[str]:
 
 def _override(key: str, value: Any) -> str:
     if not key or "=" in key:
-        raise InvalidValueError(f"set: key {key!r}, expected one as scene.objects")
+        raise InvalidValueError(f"set: key {key!r}, expected one such as scene.objects")
     return f"{key}={_toml(f'set.{key}', value)}"
 
 
@@ -124,7 +124,7 @@ def path_of(name: str, value: Any) -> str:
         raise ArgumentTypeError(f"{name}: {type(value).__name__}, expected a path") from None
     path = os.fsdecode(path)
     if "\0" in path:
-        raise InvalidValueError(f"{name}: a zero in a path, expected none")
+        raise InvalidValueError(f"{name}: a null character in a path, expected none")
     return path
 
 

@@ -74,7 +74,7 @@ class Camera:
 
     def __init__(self, native: _petcomp.Camera) -> None:
         if not isinstance(native, _petcomp.Camera):
-            raise InvalidValueError("camera: made by from_rectangle, looking_down, look_at or from_dict")
+            raise InvalidValueError("camera: not callable, expected from_rectangle, looking_down, look_at or from_dict")
         self._native = native
 
     @classmethod

@@ -117,7 +117,7 @@ def generate(
         number = _number("seed", seed or 0)
         return _counts(_with(source, classes, layout, (*target, number, *part), report))
     if labels is not None or pictures is not None or split is not None or classes is not None:
-        raise InvalidValueError("classes, labels, pictures, split: are those of the recipe; set changes them")
+        raise InvalidValueError("classes, labels, pictures, split: taken from the recipe; change them with set")
     pipeline = _opened(source, seed, set, quality)
     number = pipeline.seed if seed is None else _number("seed", seed)
     return _counts(_petcomp.generate_from(pipeline._native, (*target, number, *part), report))
@@ -130,7 +130,7 @@ _OF_MAKING = ("overlap_iou", "min_visible", "max_truncation", "alpha_threshold",
 def _check_acts(set: Any, quality: Any, labels: Any) -> None:
     """Refuses what would change nothing, for the function makes its samples without it."""
     if set or quality:
-        raise InvalidValueError("set, quality: act on recipes alone, expected none with a function")
+        raise InvalidValueError("set, quality: apply only to recipes, expected none with a function")
     if not isinstance(labels, Mapping):
         return
     formats = labels.get("formats")
@@ -159,7 +159,7 @@ def _opened(source: Any, seed: int | None, set: Mapping[str, Any] | None, qualit
     if not isinstance(source, Pipeline):
         return Pipeline(source, seed=seed or 0, set=set, quality=quality)
     if set or quality:
-        raise InvalidValueError("set, quality: are those of the pipeline, which is open already")
+        raise InvalidValueError("set, quality: already fixed by the open pipeline")
     return source
 
 

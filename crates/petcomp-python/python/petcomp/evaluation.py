@@ -94,7 +94,7 @@ def evaluate(
     else:
         sheets = _sheets(predictions, truth)
         if size is not None or output is not None:
-            raise InvalidValueError("size, output: are for files, expected none for boxes in memory")
+            raise InvalidValueError("size, output: only for files, expected none for boxes in memory")
         text = _petcomp.evaluate_boxes(sheets, question)
     record = loaded(text)
     return Metrics(record["metrics"], record["classes"])
@@ -103,7 +103,7 @@ def evaluate(
 def _sheets(predictions: Any, truth: Any) -> list[Any]:
     for name, value in (("predictions", predictions), ("truth", truth)):
         if isinstance(value, (str, os.PathLike)) or not isinstance(value, Sequence):
-            raise ArgumentTypeError(f"{name}: {type(value).__name__}, expected a path or a list, as the other")
+            raise ArgumentTypeError(f"{name}: {type(value).__name__}, expected a path or a list, like the other argument")
     if len(predictions) != len(truth):
         raise InvalidValueError(f"predictions: {len(predictions)} images, but the truth has {len(truth)}")
     pairs = enumerate(zip(truth, predictions))

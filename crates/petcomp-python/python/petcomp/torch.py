@@ -103,7 +103,7 @@ def _stays(sample: Sample) -> tuple[Any, ...]:
 
 
 def _refuse_sample() -> None:
-    raise ArgumentTypeError("transform: a Sample, which stays in the process that made it; expected its arrays")
+    raise ArgumentTypeError("transform: a Sample, which cannot leave the process that created it; expected its arrays")
 
 
 def collate(batch: list[tuple[Any, Any]]) -> tuple[list[Any], list[Any]]:

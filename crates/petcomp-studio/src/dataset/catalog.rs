@@ -62,7 +62,7 @@ impl Catalogs {
 
 fn forgotten(name: &str) -> Refusal {
     let name = petcomp::printable(name);
-    let what = format!("this listing of \"{name}\" is not kept any more: load the page again");
+    let what = format!("this listing of \"{name}\" has expired; reload the page");
     Refusal::new(StatusCode::NOT_FOUND, what)
 }
 

@@ -227,6 +227,6 @@ fn picture_file(folder: &Folder, catalog: &Catalog, row: usize) -> Answer<PathBu
 
 fn outside(catalog: &Catalog) -> Refusal {
     let folder = petcomp::printable(&catalog.index.folder.to_string_lossy());
-    let what = format!("{folder}: lists a picture that is not in the folder of this studio");
+    let what = format!("{folder}: lists a picture outside this studio's folder");
     Refusal::new(StatusCode::NOT_FOUND, what)
 }

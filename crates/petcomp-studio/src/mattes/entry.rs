@@ -35,7 +35,7 @@ impl EntryName {
 }
 
 fn missing(EntryName { list, photo }: &EntryName) -> Refusal {
-    let what = format!("{photo}: not in {list} (any more), expected one of its photos");
+    let what = format!("{photo}: not (or no longer) in {list}, expected one of its photos");
     Refusal::new(StatusCode::NOT_FOUND, petcomp::printable(&what))
 }
 

@@ -112,7 +112,7 @@ impl Mattes {
     /// What was solved under a number.
     pub(super) fn solved(&self, number: u64) -> Answer<Arc<Solved>> {
         self.solved.get(&number).ok_or_else(|| {
-            let what = "this cut-out is not kept any more: load the page again";
+            let what = "this cut-out has expired; reload the page";
             Refusal::new(StatusCode::NOT_FOUND, what)
         })
     }

@@ -74,7 +74,7 @@ fn check_free(folder: &Folder, file: &str) -> Answer<()> {
         return Ok(());
     }
     let file = petcomp::printable(file);
-    let what = format!("{file}: there is such a file already, expected a new name");
+    let what = format!("{file}: already exists, expected a new name");
     Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
 }
 

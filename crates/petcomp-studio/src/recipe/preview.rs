@@ -158,8 +158,7 @@ fn check_stays_inside(config: &DatasetConfig, folder: &Folder) -> Answer<()> {
 fn outside(key: &str, path: &Path) -> Refusal {
     let path = petcomp::printable(&path.to_string_lossy());
     let what = format!(
-        "{key}: {path} is not in the folder of this studio, expected one that is there; \
-         `petcomp studio` opens a folder that holds the recipe and all that it names"
+        "{key}: {path} is outside this studio's folder; run `petcomp studio` on a folder that contains the recipe and everything it names"
     );
     Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what)
 }

@@ -173,7 +173,7 @@ pub(super) fn save(folder: &Folder, new: &ScaledPhoto<'_>, version: Option<&str>
 fn no_list(folder: &Folder, list: &str) -> Answer<String> {
     let other = list.replace(LIST_NAME, OTHER_LIST_NAME);
     if folder.file(&other).is_ok() {
-        let what = format!("{other}: lists the photos here; write the scale there");
+        let what = format!("{other}: already lists the photos here; write the scale there");
         return Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what));
     }
     Ok(String::new())
@@ -204,7 +204,7 @@ fn changed_entry<'a>(
 
 /// What is wrong with a list whose photos are no tables of their own.
 fn not_in_tables(list: &str) -> Refusal {
-    let what = format!("{list}: its photos are not written as {HEADER}; copy the line there");
+    let what = format!("{list}: its photos are not written as {HEADER}; copy the line into it");
     Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what)
 }
 
@@ -438,7 +438,7 @@ mod tests {
         let captured = "captured = { photos = [\"b.png\"] }\n";
         assert!(refused(LIST_NAME, captured, 2e3).contains("one of several scales"));
         assert!(refused(LIST_NAME, "", 0.004).contains("photos.toml: px_per_metre: 0, expected"));
-        assert!(refused(OTHER_LIST_NAME, "", 2e3).contains("photos.csv: lists the photos"));
+        assert!(refused(OTHER_LIST_NAME, "", 2e3).contains("photos.csv: already lists the photos"));
         let declared = "classes = [\"cup\", \"lid\"]\n";
         let class = saved(LIST_NAME, declared, &cup("a.png", 2e3)).unwrap_err();
         let expected = "photos.toml: class: \"cup \"1\"\", expected one of cup, lid";

@@ -71,7 +71,7 @@ impl Guard {
         let host = text(headers, ORIGIN).and_then(|origin| origin.strip_prefix("http://"));
         match host {
             Some(host) if self.hosts.iter().any(|known| known == host) => Ok(()),
-            _ => Err(Refusal::forbidden("origin: another site's page")),
+            _ => Err(Refusal::forbidden("origin: a page of another site")),
         }
     }
 
@@ -80,7 +80,7 @@ impl Guard {
         if self.token.is(first) {
             Ok(())
         } else {
-            let what = "no token: open the address that `petcomp studio` printed, all of it";
+            let what = "no token: open the full address that `petcomp studio` printed";
             Err(Refusal::forbidden(what))
         }
     }
@@ -93,7 +93,7 @@ fn check_site(method: &Method, headers: &HeaderMap) -> Answer<()> {
     match site {
         None | Some("same-origin" | "none") => Ok(()),
         _ if method == Method::GET && mode == Some("navigate") => Ok(()),
-        _ => Err(Refusal::forbidden("another site's page asks")),
+        _ => Err(Refusal::forbidden("request from another site's page")),
     }
 }
 

@@ -54,7 +54,7 @@ impl Sampling {
         let divides = self.0.iter().all(|&pair| divides(pair, header));
         match header.blocks {
             exr::meta::BlockDescription::ScanLines if divides => Ok(()),
-            _ => Err("damaged EXR: sampling of channels that does not divide the picture".into()),
+            _ => Err("damaged EXR: channel subsampling that does not divide the picture".into()),
         }
     }
 
@@ -110,7 +110,7 @@ impl Sampling {
         let pixels = width * rows.len();
         if !bytes.is_multiple_of(pixels) {
             return Err(Refusal::Unsupported(
-                "unsupported EXR: channels of this sampling".into(),
+                "unsupported EXR: this channel subsampling".into(),
             ));
         }
         let declared = self.declared(header, bytes / pixels);
@@ -181,7 +181,7 @@ fn check_decodable(compression: Compression) -> Result<(), Refusal> {
         _ => return Ok(()),
     };
     let what = format!(
-        "unsupported EXR: channels with fewer samples than pixels, compressed by {name}; save it as RGB or with ZIP compression"
+        "unsupported EXR: subsampled channels compressed by {name}; save it as RGB or with ZIP compression"
     );
     Err(Refusal::Unsupported(what))
 }
