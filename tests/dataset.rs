@@ -704,7 +704,7 @@ fn a_dataset_without_labels_for_yolo_is_compared_with_its_journal() {
     );
     std::fs::remove_file(dir.path().join("index.jsonl")).unwrap();
     let refused = check(dir.path()).unwrap_err().to_string();
-    assert!(refused.contains("archives alone"), "{refused}");
+    assert!(refused.contains("only archives"), "{refused}");
 }
 
 /// A card that fell, one that fell on it, and one that its sidecar file has so far up.
@@ -1366,7 +1366,9 @@ fn a_store_of_something_else_is_refused() {
     store.objects.lock().unwrap().insert(name, vec![7; 3]);
     let e = refused(store_plan(other.path(), 30, &store));
     assert!(
-        e.starts_with("s3://bucket/prefix/webdataset/train-000001.tar: holds 3 bytes that differ from the"),
+        e.starts_with(
+            "s3://bucket/prefix/webdataset/train-000001.tar: holds 3 bytes that differ from the"
+        ),
         "{e}"
     );
     let loose = Plan {
@@ -1525,8 +1527,14 @@ fn a_merge_reads_regular_files_of_the_shard_alone() {
     };
     let secret = dir.path().join("secret");
     for (target, why) in [
-        (Some(secret.as_path()), "000003.txt: is a link that leads out of"),
-        (Some(Path::new("/dev/zero")), "000003.txt: is a link that leads out of"),
+        (
+            Some(secret.as_path()),
+            "000003.txt: is a link that leads out of",
+        ),
+        (
+            Some(Path::new("/dev/zero")),
+            "000003.txt: is a link that leads out of",
+        ),
         (None, "000003.txt: not a regular file"),
     ] {
         std::fs::remove_file(&file).unwrap();

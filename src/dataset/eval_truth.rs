@@ -250,7 +250,11 @@ mod tests {
         std::fs::write(root.path().join("choice/val.txt"), double).unwrap();
         let truth = EvalTruth::read(&root.path().join("choice"), None, None).unwrap();
         let told = truth.with_detections(&root.path().join("found"));
-        assert!(told.unwrap_err().to_string().contains("a.png: the same name as "));
+        assert!(
+            told.unwrap_err()
+                .to_string()
+                .contains("a.png: the same name as ")
+        );
         let told = refused("set", None, None);
         assert!(told.contains("a dataset (it has data.yaml)"), "{told}");
         std::fs::remove_file(root.path().join("set/labels/val/a.txt")).unwrap();
@@ -258,9 +262,6 @@ mod tests {
         assert!(told.contains("no label files"), "{told}");
         std::fs::write(root.path().join("choice/val.txt"), "").unwrap();
         let told = refused("choice", None, None);
-        assert!(
-            told.contains("choice: no validation images"),
-            "{told}"
-        );
+        assert!(told.contains("choice: no validation images"), "{told}");
     }
 }

@@ -431,7 +431,7 @@ mod tests {
     fn an_indexed_job_tells_its_index_but_not_of_how_many() {
         let pod = [("JOB_COMPLETION_INDEX", "0")];
         assert_eq!(within("auto/8", &pod).unwrap(), "1/8");
-        assert!(within("auto", &pod).unwrap_err().contains("say auto/N"));
+        assert!(within("auto", &pod).unwrap_err().contains("use auto/N"));
         assert!(within("auto/4", &[("JOB_COMPLETION_INDEX", "4")]).is_err());
         assert!(within("auto", &[]).unwrap_err().contains("none of"));
         let most = u64::MAX.to_string();
@@ -447,7 +447,7 @@ mod tests {
         let size = ("AWS_BATCH_JOB_ARRAY_SIZE", "8");
         assert_eq!(within("auto", &[index, size]).unwrap(), "3/8");
         assert_eq!(within("auto/4", &[index, size]).unwrap(), "3/4");
-        assert!(within("auto", &[index]).unwrap_err().contains("say auto/N"));
+        assert!(within("auto", &[index]).unwrap_err().contains("use auto/N"));
         let beyond = [("AWS_BATCH_JOB_ARRAY_INDEX", "8"), size];
         assert!(within("auto", &beyond).unwrap_err().contains("at most 8/8"));
     }

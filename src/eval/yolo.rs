@@ -665,7 +665,9 @@ mod tests {
         let labels = folder(&[("a.txt", BOX), ("room1/a.txt", BOX)]);
         let told = read_yolo_truth(labels.path(), None, Some([9, 9])).unwrap_err();
         let told = told.to_string();
-        assert!(told.contains("room1/a.txt: the same name as ") && told.contains("/a.txt, expected"));
+        assert!(
+            told.contains("room1/a.txt: the same name as ") && told.contains("/a.txt, expected")
+        );
         assert!(told.ends_with("give each one's own folder"), "{told}");
         let labels = folder(&[("a.txt", BOX)]);
         let images = folder(&[("a.jpg", ""), ("a.heic", "")]);

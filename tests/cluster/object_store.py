@@ -90,7 +90,7 @@ def check(options, line, s3, scratch):
 
     again = cluster.worker("1/1", "again")
     said = again.communicate()[0]
-    expect(again.returncode == 0 and " 0 made now" in said, f"nothing is made again: {said}")
+    expect(again.returncode == 0 and " 0 generated now" in said, f"nothing is made again: {said}")
     expect(SECRET not in cluster.said, "no message has the secret key")
 
 

@@ -741,7 +741,7 @@ fn a_portrait_photo_is_not_cropped_in_silence() {
     let (_, said) = desk.scene(&[]);
     let line = said
         .lines()
-        .find(|line| line.contains("another shape"))
+        .find(|line| line.contains("differ in aspect ratio"))
         .unwrap_or_default();
     assert!(
         line.contains("1 of 1 backgrounds") && line.contains("the middle 480 x 360"),
@@ -751,7 +751,7 @@ fn a_portrait_photo_is_not_cropped_in_silence() {
         !desk
             .scene(&["--set", "scene.image=[240,320]"])
             .1
-            .contains("another shape")
+            .contains("differ in aspect ratio")
     );
 }
 

@@ -28,7 +28,7 @@ async function write() {
   say("drawing ..");
   await trying(async () => {
     const written = await api("api/capture/write", display);
-    say(`written: open ${written.page} in the browser of the other display`, "good");
+    say(`saved: open ${written.page} in the browser of the other display`, "good");
   });
 }
 
@@ -36,6 +36,6 @@ at("show").addEventListener("click", show);
 at("write").addEventListener("click", write);
 at("display").addEventListener("submit", (event) => { event.preventDefault(); show(); });
 shortcuts([
-  ["Enter", "show the frames here, in another tab", show],
+  ["Enter", "show the frames here, in a new tab", show],
   ["w", "write them into the folder capture", write],
 ]);

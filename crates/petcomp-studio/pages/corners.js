@@ -64,7 +64,7 @@ async function photoOf({ photo, label }) {
   const image = await loaded(photo);
   const [shown, expected] = [[image.naturalWidth, image.naturalHeight], [label.image.width, label.image.height]];
   if (String(shown) === String(expected)) return image;
-  say(`${photo}: ${shown.join(" x ")} pixels in this browser, expected ${expected.join(" x ")} as its label says`, "bad");
+  say(`${photo}: ${shown.join(" x ")} pixels in this browser, expected ${expected.join(" x ")} as in its label`, "bad");
   return null;
 }
 
@@ -103,7 +103,7 @@ async function load(photo) {
   const like = entryOf(photo)?.label ? null : likeOf(photo);
   return trying(async () => {
     const { label, version, remark } = await api(query("api/corners/label", { photo, like }));
-    if (remark) say(`${remark}: the label of ${photo} begins without it`, "bad");
+    if (remark) say(`${remark}: the label of ${photo} starts without it`, "bad");
     return {
       photo, label, version, corners: fromLabel(label), history: [], camera: null, markers: [],
       lensSigma: statedSigma(label.camera), changes: 0, saving: false,
@@ -205,12 +205,12 @@ async function snap() {
     const snapped = await api("api/corners/snap", { photo: here.photo, corners_px: here.corners });
     if (open !== here) return;
     if (String(here.corners) !== before) {
-      say("the corners have moved meanwhile, and stay: S looks for edges near them");
+      say("the corners moved in the meantime and were kept: press S to snap them again");
       return;
     }
     const found = snapped.found.filter(Boolean).length;
     setCorners(snapped.corners_px, view.chosen);
-    say(found === 4 ? "all four sides lie on edges" : `${found} of 4 sides show an edge; the others stay`, found === 4 ? "good" : "");
+    say(found === 4 ? "all four sides lie on edges" : `${found} of 4 sides show an edge; the others were kept`, found === 4 ? "good" : "");
   });
 }
 
@@ -226,7 +226,7 @@ async function findMarkers() {
       keep(here);
     }
     if (open !== here) return;
-    const known = label ? `, ${label.points.length} corners of known place` : markers.length ? "; a click near a corner of one takes it" : "";
+    const known = label ? `, ${label.points.length} corners with known positions` : markers.length ? "; click near a marker corner to use it" : "";
     say(`${markers.length} ${markers.length === 1 ? "marker" : "markers"}${known}`, markers.length ? "good" : "");
     showMarks();
     view.draw();
@@ -340,7 +340,7 @@ function isComplete() {
 }
 
 function missing() {
-  return open.corners.length < 4 ? "Four corners and a size, and the camera is here." : "Type the size of the rectangle.";
+  return open.corners.length < 4 ? "Mark four corners and type the size to see the camera." : "Type the size of the rectangle.";
 }
 
 const plusMinus = (value, sigma, digits) => `${value.toFixed(digits)} ± ${sigma.toFixed(digits)}`;
@@ -354,7 +354,7 @@ function facts(camera) {
     [`${camera.per_corner_px ? "Corners" : "Points"} fit to`, `${camera.rms_px.toFixed(2)} px`],
     ["Rectangle", `${camera.size.map((side) => side.toFixed(3)).join(" × ")} m`],
     ["Scale", `${camera.px_per_metre.toFixed(0)} px/m`],
-    [`${(1000 * camera.reference_height).toFixed(0)} mm above it`, `drawn to ${camera.height_px.toFixed(1)} px`],
+    [`${(1000 * camera.reference_height).toFixed(0)} mm above it`, `accurate to ${camera.height_px.toFixed(1)} px`],
     ["Grid", `${camera.sketch.grid_step} m`],
   ];
 }
@@ -380,7 +380,7 @@ function advice(camera) {
 
 /** Buttons that do what a line advises. */
 function remedies(line) {
-  if (line.includes("\"cropped\": false")) return [element("button", { type: "button", onclick: sayWhole }, "Nothing was cut off")];
+  if (line.includes("\"cropped\": false")) return [element("button", { type: "button", onclick: sayWhole }, "It was not cropped")];
   if (line.startsWith("Measure")) return [element("button", { type: "button", onclick: askLens }, "Type the height")];
   return [];
 }
@@ -412,7 +412,7 @@ function showHint() {
   const count = open.corners.length;
   at("hint").textContent = count < 4
     ? `Click the ${NAMES[count]} corner${count === 0 ? " of the surface (its inner edge)" : ""}.`
-    : view.chosen < 0 ? "Drag a corner, or choose one and press the arrows." : `Corner ${view.chosen + 1}, ${NAMES[view.chosen]}.`;
+    : view.chosen < 0 ? "Drag a corner, or choose one and press the arrow keys." : `Corner ${view.chosen + 1}, ${NAMES[view.chosen]}.`;
 }
 
 function middle(a, b) {
@@ -471,7 +471,7 @@ async function saveOpened(here, next) {
   last = here.photo;
   Object.assign(entryOf(here.photo), { label: true, camera: Boolean(saved.camera) });
   showMarks();
-  const rest = isWhole ? "" : "; not what was changed meanwhile";
+  const rest = isWhole ? "" : "; not the changes made since";
   say(saved.camera ? `saved ${saved.name} and ${saved.camera}${rest}` : `saved ${saved.name}${rest}; no camera: ${saved.why}`,
     saved.camera && isWhole ? "good" : "bad");
   if (next && saved.camera && isWhole) list.next(isOpen);
@@ -500,7 +500,7 @@ async function solveTogether() {
     const shared = solved.filter((one) => one.together > 1).length;
     say("");
     await choice("Solved together", table(solved), ["Close"]);
-    say(shared ? `${shared} of ${solved.length} photos share a camera` : "no two photos share a camera: give them the same name of a camera", shared ? "good" : "");
+    say(shared ? `${shared} of ${solved.length} photos share a camera` : "no two photos share a camera: give them the same camera name", shared ? "good" : "");
   });
 }
 
@@ -527,18 +527,18 @@ for (const [id, act] of [["snap", snap], ["turn", turn], ["undo", undo], ["marke
 addEventListener("beforeunload", (event) => drafts.size && event.preventDefault());
 
 shortcuts([
-  ["Enter", "save, and on to the next photo", () => save()],
+  ["Enter", "save and go to the next photo", () => save()],
   ["Ctrl+s", "save", () => save(false)],
   ["s", "snap corners to edges", snap],
   ["m", "find markers", findMarkers],
-  ["r", "turn: the next corner is the first", turn],
+  ["r", "turn: make the next corner the first", turn],
   ...[1, 2, 3, 4].map((i) => [String(i), i === 1 ? "choose corner 1 (to 4)" : "", () => view.choose(i - 1)]),
   ...viewKeys(view),
   ["Ctrl+z", "undo", undo],
   ["Delete", "remove the corner", removeCorner],
   ["Backspace", "", removeCorner],
   ["n", "next photo", () => list.step(1)],
-  ["p", "photo before", () => list.step(-1)],
+  ["p", "previous photo", () => list.step(-1)],
   ["g", "type the size", () => at("width").select()],
 ]);
 

@@ -211,8 +211,8 @@ class Pane {
       ...folders.map((name) => element("option", { value: name, selected: name === folder }, name || ".")));
     this.root = element("figure", { class: "pane", onpointerdown: () => activate(this) },
       element("figcaption", {}, this.title, this.folders,
-        element("button", { type: "button", title: "the one before", onclick: () => this.move(-1) }, "‹"),
-        element("button", { type: "button", title: "the next one", onclick: () => this.move(1) }, "›")),
+        element("button", { type: "button", title: "previous", onclick: () => this.move(-1) }, "‹"),
+        element("button", { type: "button", title: "next", onclick: () => this.move(1) }, "›")),
       element("div", { class: "picture" }, this.image, this.canvas));
     this.canvas.addEventListener("pointermove", (event) => this.mark(this.objectAt(event)));
     this.canvas.addEventListener("pointerleave", () => this.mark(null));
@@ -457,7 +457,7 @@ function showDetails(pane) {
 
 function advice(sample) {
   const lines = sample.rejected.map((why) => `a scene was rejected: ${why}`);
-  if (sample.knotted.length) lines.push(`objects ${sample.knotted.join(", ")} lie over each other in a circle`);
+  if (sample.knotted.length) lines.push(`objects ${sample.knotted.join(", ")} overlap in a cycle`);
   return lines.length ? [element("ul", { class: "advice" }, ...lines.map((line) => element("li", { class: "warn" }, line)))] : [];
 }
 
@@ -483,7 +483,7 @@ function drawTable(sample) {
     .filter(([name]) => name.includes(words))
     .flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, String(Number(value.toPrecision(6))))]));
   show("");
-  const search = element("input", { type: "search", placeholder: "objects[0], yaw, lights …", "aria-label": "find a draw", oninput: () => show(search.value.trim()) });
+  const search = element("input", { type: "search", placeholder: "objects[0], yaw, lights …", "aria-label": "find a drawn value", oninput: () => show(search.value.trim()) });
   return [element("h2", {}, `Draws (${draws.length})`), search, list];
 }
 
@@ -515,8 +515,8 @@ function step(by) {
 }
 
 shortcuts([
-  ["ArrowRight", "the next picture", () => step(1)],
-  ["ArrowLeft", "the picture before", () => step(-1)],
+  ["ArrowRight", "next picture", () => step(1)],
+  ["ArrowLeft", "previous picture", () => step(-1)],
   ["ArrowDown", "", () => step(grid.columns)],
   ["ArrowUp", "", () => step(-grid.columns)],
   ["Escape", "back to all pictures", closeViewer],
@@ -524,8 +524,8 @@ shortcuts([
   ["m", "masks", () => toggle("masks")],
   ["i", "ids", () => toggle("ids")],
   ["c", "what covers what", () => toggle("covers")],
-  ["2", "another picture beside it", beside],
-  ["x", "the other picture of two", () => viewer.panes.length > 1 && activate(viewer.panes.find((pane) => pane !== viewer.active))],
+  ["2", "compare with another picture", beside],
+  ["x", "switch between two pictures", () => viewer.panes.length > 1 && activate(viewer.panes.find((pane) => pane !== viewer.active))],
   ["o", "outliers first", () => { at("order").value = "unlike"; closeViewer(); trying(find); }],
 ]);
 
@@ -534,5 +534,5 @@ await trying(async () => {
   at("folder").replaceChildren(...folders.map((name) => element("option", { value: name }, name || ".")));
   const asked = new URLSearchParams(location.search).get("folder");
   if (asked !== null || folders.length) await open(asked ?? folders[0]);
-  else say("no dataset and no picture in this folder");
+  else say("no dataset or picture in this folder");
 });

@@ -6,15 +6,15 @@ const count = (list, one, many = `${one}s`) => `${list.length} ${list.length ===
 
 /** What each page is for, and how far this folder is. */
 const CARDS = [
-  ["corners", "Corners", "Click the four corners of a surface, and see the camera at once.",
+  ["corners", "Corners", "Click the four corners of a surface and see the camera at once.",
     (found) => `${count(found.photos, "photo")}, ${count(found.labels, "label")}, ${count(found.cameras, "camera")}`],
-  ["scale", "Scale", "Click the two ends of a ruler, or the corners of the screen: pixels per metre.",
+  ["scale", "Scale", "Click the two ends of a ruler, or the corners of the screen, to get pixels per metre.",
     (found) => count(found.photos, "photo")],
   ["capture", "Capture", "Photograph objects on a display that shows black, white and stripes.",
-    () => "for what they let through, measured"],
-  ["mattes", "Mattes", "Look at every cut-out, and correct it with a few strokes.",
+    () => "measures what they let through"],
+  ["mattes", "Mattes", "Check every cut-out and correct it with a few strokes.",
     (found) => count(found.assets, "folder of assets", "folders of assets")],
-  ["recipe", "Recipe", "Move a slider, and see what the pictures become.",
+  ["recipe", "Recipe", "Move a slider and see how the pictures change.",
     (found) => count(found.recipes, "recipe")],
   ["dataset", "Dataset", "Pictures with their labels, outliers first.",
     (found) => count(found.datasets, "dataset")],

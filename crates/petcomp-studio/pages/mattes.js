@@ -17,22 +17,22 @@ const LAYERS_IN_WORDS = {
   checker: "the cut-out over a checkerboard",
   black: "the cut-out over black",
   white: "the cut-out over white",
-  plate: "the cut-out in the photo of a place",
+  plate: "the cut-out on a background photo",
   matte: "opacity: white hides what is behind",
-  transmittance: "what the line of sight lets through, in its colour",
-  uncertainty: "how far the transmittance may be off: dark not at all, yellow by half",
+  transmittance: "what is transmitted along the line of sight, in colour",
+  uncertainty: "uncertainty of the transmittance: dark is none, yellow is 0.5",
 };
 
 const TOOLS = [
   [null, "Move", "m", "move the photo (or hold the middle button)"],
   ["object", "Object", "o", "this is the object"],
   ["not_object", "Not object", "n", "this is not the object"],
-  ["see_through", "See-through", "t", "one sees through this"],
-  ["opaque", "Opaque", "p", "nothing is seen through this"],
+  ["see_through", "See-through", "t", "this is see-through"],
+  ["opaque", "Opaque", "p", "this is opaque"],
 ];
 
 const VERDICTS = { accepted: ["accepted", "good"], rejected: ["rejected", "bad"] };
-const EMPTY = "There is no list of photos in this folder. Write photos.csv with the columns file, asset, class and length, and a line for each photo.";
+const EMPTY = "There is no list of photos in this folder. Write photos.csv with the columns file, asset, class and length and a line for each photo.";
 /** The finest brush and the coarsest, shares of the photo's longer side. */
 const BRUSHES = [0.002, 0.12];
 
@@ -143,12 +143,12 @@ const percent = (share) => share === null ? "unknown" : `${(100 * share).toFixed
 function showSolved() {
   const { refused, diagnostics, outline_confidence, color_confidence } = state.solved;
   const flags = diagnostics.map(({ severity, message }) => element("li", { class: severity === "note" ? "" : "warn" }, message));
-  if (refused) flags.unshift(element("li", { class: "bad" }, refused, " (or paint what is the object and what is not)"));
+  if (refused) flags.unshift(element("li", { class: "bad" }, refused, " (or mark what is the object and what is not)"));
   if (!flags.length) flags.push(element("li", { class: "good" }, "nothing"));
   at("flags").replaceChildren(...flags);
   at("facts").replaceChildren(...(refused ? [] : [
-    element("dt", {}, "outline is certain to"), element("dd", {}, percent(outline_confidence)),
-    element("dt", {}, "colour is certain to"), element("dd", {}, percent(color_confidence))]));
+    element("dt", {}, "outline confidence"), element("dd", {}, percent(outline_confidence)),
+    element("dt", {}, "colour confidence"), element("dd", {}, percent(color_confidence))]));
 }
 
 // Strokes.
@@ -289,21 +289,21 @@ function showStrokes() {
 shortcuts([
   ...LAYERS.map(([layer, , key]) => [key, LAYERS_IN_WORDS[layer], () => setLayer(layer)]),
   ...TOOLS.map(([tool, , key, what]) => [key, what, () => setTool(tool)]),
-  ["[", "finer brush", () => changeRadius(-8)],
-  ["]", "coarser brush", () => changeRadius(8)],
-  ["Ctrl+z", "take back the last stroke", undo],
-  ["Ctrl+Shift+z", "paint it again", redo],
+  ["[", "smaller brush", () => changeRadius(-8)],
+  ["]", "larger brush", () => changeRadius(8)],
+  ["Ctrl+z", "undo the last stroke", undo],
+  ["Ctrl+Shift+z", "redo it", redo],
   ["h", "hide or show the strokes", showStrokes],
   ["ArrowLeft", "more of the cut-out", () => setWipe(stage.wipe * 100 - 5)],
   ["ArrowRight", "more of the photo", () => setWipe(stage.wipe * 100 + 5)],
   ["b", "photo or cut-out", () => setWipe(stage.wipe > 0.5 ? 0 : 100)],
-  ["+", "larger", () => stage.zoom(1.5)],
-  ["-", "smaller", () => stage.zoom(1 / 1.5)],
-  ["0", "all of it", () => stage.fit()],
-  ["a", "accept, and to the next one", () => setVerdict("accepted")],
-  ["x", "reject, and to the next one", () => setVerdict("rejected")],
+  ["+", "zoom in", () => stage.zoom(1.5)],
+  ["-", "zoom out", () => stage.zoom(1 / 1.5)],
+  ["0", "fit the photo", () => stage.fit()],
+  ["a", "accept and go to the next photo", () => setVerdict("accepted")],
+  ["x", "reject and go to the next photo", () => setVerdict("rejected")],
   ["ArrowDown", "next photo", () => list.step(1)],
-  ["ArrowUp", "photo before", () => list.step(-1)],
+  ["ArrowUp", "previous photo", () => list.step(-1)],
 ]);
 
 setTool(null);
@@ -311,7 +311,7 @@ setLayer("checker");
 await trying(async () => {
   const { photos, problems, plates } = await api("api/mattes/photos");
   const options = plates.map((plate) => element("option", { value: plate }, plate));
-  at("plate").replaceChildren(...(options.length ? options : [element("option", { value: "" }, "no labelled photo of a place")]));
+  at("plate").replaceChildren(...(options.length ? options : [element("option", { value: "" }, "no labelled background photo")]));
   at("plate").disabled = !plates.length;
   at("empty").hidden = photos.length > 0;
   at("empty").textContent = problems.join("\n") || EMPTY;

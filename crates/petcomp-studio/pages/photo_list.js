@@ -50,7 +50,7 @@ export function photoList(place, show, mark) {
       const asked = new URLSearchParams(location.search).get("photo");
       const first = entryOf(asked) ?? entries.find(wanted) ?? entries[0];
       if (first) await show(first.photo);
-      else say("no photo in this folder: put some there, and load this page again");
+      else say("no photo in this folder: add some and reload this page");
     },
     choose(photo) {
       current = photo;

@@ -364,14 +364,14 @@ export function viewKeys(view) {
     .map(([key, dx, dy], i) => [modifier + key, i ? "" : shown, move(dx, dy)]);
   return [
     [".", "next point", step(1)],
-    [",", "point before", step(-1)],
+    [",", "previous point", step(-1)],
     ...arrows("", 0.1, "move the point by 0.1 pixel (all four arrows)"),
-    ...arrows("Shift+", 1, "by a pixel"),
+    ...arrows("Shift+", 1, "by 1 pixel"),
     ...arrows("Ctrl+", 10, "by 10 pixels"),
-    ["b", "a brighter photo, to see dark corners", () => view.brighten()],
-    ["f", "the whole photo", () => view.fit()],
-    ["+", "nearer (or the wheel)", () => view.zoomBy(1.5)],
+    ["b", "brighten the photo to see dark corners", () => view.brighten()],
+    ["f", "fit the photo", () => view.fit()],
+    ["+", "zoom in (or the wheel)", () => view.zoomBy(1.5)],
     ["=", "", () => view.zoomBy(1.5)],
-    ["-", "farther", () => view.zoomBy(1 / 1.5)],
+    ["-", "zoom out", () => view.zoomBy(1 / 1.5)],
   ];
 }

@@ -232,7 +232,7 @@ const nextScenes = (step) => pictures.set({ first: Math.max(0, pictures.first + 
 async function showWhole(k) {
   const image = element("img", { alt: `scene ${k}` });
   const dialog = element("dialog", { class: "whole", "aria-label": `scene ${k}` },
-    image, element("form", { method: "dialog" }, element("span", { class: "soft" }, `scene ${k}, as the dataset would have it`), element("button", { class: "main" }, "Close")));
+    image, element("form", { method: "dialog" }, element("span", { class: "soft" }, `scene ${k}, as in the dataset`), element("button", { class: "main" }, "Close")));
   dialog.addEventListener("close", () => { URL.revokeObjectURL(image.src); dialog.remove(); });
   document.body.append(dialog);
   dialog.showModal();
@@ -355,7 +355,7 @@ function switchControl(setting, path, value) {
 
 function textControl(setting, path, value) {
   return element("input", { class: "toml", "aria-label": path, spellcheck: "false",
-    value: value === undefined ? "" : toToml(value), placeholder: `like ${toToml(setting.value)}`,
+    value: value === undefined ? "" : toToml(value), placeholder: `such as ${toToml(setting.value)}`,
     onchange: (event) => edit(path, event.target.value.trim() || null) });
 }
 
@@ -492,7 +492,7 @@ async function listFiles() {
 }
 
 at("file").addEventListener("change", (event) => trying(async () => {
-  if (recipe.edits.length && !confirm("Leave what is not saved?")) event.target.value = recipe.file;
+  if (recipe.edits.length && !confirm("Discard unsaved changes?")) event.target.value = recipe.file;
   else if (event.target.value === "") await begin();
   else await open(event.target.value);
   at("file").value = recipe.file;
@@ -515,8 +515,8 @@ shortcuts([
   ["Ctrl+s", "save", () => trying(save)],
   ["Ctrl+z", "undo", undo],
   ["Ctrl+Shift+z", "redo", redo],
-  ["n", "other scenes", () => nextScenes(1)],
-  ["p", "the scenes before", () => nextScenes(-1)],
+  ["n", "next scenes", () => nextScenes(1)],
+  ["p", "previous scenes", () => nextScenes(-1)],
   ["b", "before and after", () => pictures.set({ compare: !pictures.compare })],
   ["l", "labels", () => pictures.set({ labels: !pictures.labels })],
   ["f", "the file", () => trying(showText)],
@@ -528,5 +528,5 @@ await trying(async () => {
   const files = await listFiles();
   const asked = new URLSearchParams(location.search).get("file");
   if (asked || files.length) await open(asked ?? files[0]);
-  else say("no recipe in this folder: choose New recipe, or make one with `petcomp dataset init`");
+  else say("no recipe in this folder: choose New recipe, or create one with `petcomp dataset init`");
 });

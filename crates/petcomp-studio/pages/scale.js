@@ -91,7 +91,7 @@ async function findScreen() {
     if (open !== here) return;
     points.screen = corners;
     setMode("screen");
-    say("the screen was found", "good");
+    say("found the screen", "good");
   });
 }
 
@@ -128,11 +128,11 @@ function facts(scale) {
     const error = 100 * Math.SQRT1_2 / length;
     return [["Pixels per metre", scale.px_per_metre.toFixed(1)], ["Clicked", `${length.toFixed(1)} px`], ["If each end is 0.5 px off", `± ${error.toFixed(2)} %`]];
   }
-  return [["Pixels per metre, in its middle", middleScale(points.screen, scale.screen[0]).toFixed(1)]];
+  return [["Pixels per metre, at its centre", middleScale(points.screen, scale.screen[0]).toFixed(1)]];
 }
 
 const ADVICE = {
-  ruler: "It holds at the height of what was clicked: lay the ruler on something half as high as the object.",
+  ruler: "It is valid at the height of the clicked points: lay the ruler on something half as high as the object.",
   screen: "The object's scale is taken at half its thickness above the screen.",
 };
 
@@ -140,8 +140,8 @@ function showFacts() {
   const scale = open && scaleNow();
   const rows = scale ? facts(scale) : [];
   at("facts").replaceChildren(...rows.flatMap(([term, text]) => [element("dt", {}, term), element("dd", {}, text)]));
-  at("advice").replaceChildren(element("li", {}, scale ? ADVICE[mode] : "Click, type what is known, and the scale is here."));
-  const hint = MODES[mode].hints[points[mode].length] ?? "Drag a point, or choose one and press the arrows.";
+  at("advice").replaceChildren(element("li", {}, scale ? ADVICE[mode] : "Click the points and type the known size to see the scale."));
+  const hint = MODES[mode].hints[points[mode].length] ?? "Drag a point, or choose one and press the arrow keys.";
   at("hint").textContent = open ? hint : "Choose another photo.";
   at("save").disabled = !scale;
   view.draw();
@@ -193,7 +193,7 @@ at("panel").addEventListener("submit", (event) => {
 });
 
 shortcuts([
-  ["Enter", "save, and on to the next photo", save],
+  ["Enter", "save and go to the next photo", save],
   ["l", "a length", () => setMode("ruler")],
   ["c", "the corners of the screen", () => setMode("screen")],
   ["m", "find the screen", findScreen],
@@ -201,7 +201,7 @@ shortcuts([
   ["Delete", "remove the point", removePoint],
   ["Backspace", "", removePoint],
   ["n", "next photo", () => list.step(1)],
-  ["p", "photo before", () => list.step(-1)],
+  ["p", "previous photo", () => list.step(-1)],
   ...viewKeys(view),
 ]);
 

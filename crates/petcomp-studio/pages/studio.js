@@ -187,7 +187,7 @@ export function lengths(select, changed) {
       const text = field.value.trim().replace(",", ".");
       const value = text === "" ? null : Number((Number(text) * unit()).toPrecision(9));
       const wrong = value !== null && !(value >= 0);
-      field.setCustomValidity(wrong ? "expected a length, a number" : "");
+      field.setCustomValidity(wrong ? "expected a length (a number)" : "");
       return wrong ? undefined : value;
     },
   };
@@ -218,7 +218,7 @@ export async function saveOrAsk(version, { save, now, load }) {
     return await save(version);
   } catch (error) {
     if (!error.stale) throw error;
-    const whose = await choice("Whose shall it be?", error.message, ["Load theirs", "Save mine"]);
+    const whose = await choice("Which version do you want to keep?", error.message, ["Load theirs", "Save mine"]);
     if (whose === "Save mine") return save(await now());
     if (whose !== "Load theirs") throw error;
     await load();
@@ -237,10 +237,10 @@ export function frame(current) {
   document.querySelector("body > header").replaceChildren(
     ...links,
     element("span", { class: "grow" }),
-    element("button", { onclick: showKeys, title: "keys of this page" }, "Keys ", element("kbd", {}, "?")));
+    element("button", { onclick: showKeys, title: "keyboard shortcuts" }, "Keys ", element("kbd", {}, "?")));
   shortcuts([
-    ["?", "these keys", showKeys],
-    ...PAGES.map(([path, title], i) => [`Alt+${i + 1}`, i ? `to ${title.toLowerCase()}` : "to the overview", () => location.assign(path || "./")]),
+    ["?", "show these keys", showKeys],
+    ...PAGES.map(([path, title], i) => [`Alt+${i + 1}`, i ? `go to ${title.toLowerCase()}` : "go to the overview", () => location.assign(path || "./")]),
   ]);
   addEventListener("keydown", pressed);
   // A button that the mouse has pressed does not take the next Enter.

@@ -294,7 +294,7 @@ fn a_recipe_that_leads_out_of_the_folder_is_refused() {
     let answer = studio.post("api/recipe/picture", asked);
     assert!(answer.starts_with("HTTP/1.1 422"), "{answer}");
     assert!(
-        answer.contains("is not in this studio's folder"),
+        answer.contains("is outside this studio's folder"),
         "{answer}"
     );
 }

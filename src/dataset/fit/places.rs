@@ -390,7 +390,7 @@ fn label_moments(falls: &[Fall]) -> Option<[f64; 2]> {
 fn describe_lever(lever: &Lever, candidates: &[Candidate], fitted: &FittedLever) -> String {
     let named = |value: Option<f64>| match value {
         Some(value) => (lever.text)(Range::fixed(value)),
-        None => "as it was".into(),
+        None => "original".into(),
     };
     let pairs = candidates.iter().zip(&fitted.distances);
     let distances: Vec<String> = pairs

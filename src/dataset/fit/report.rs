@@ -64,7 +64,7 @@ fn begin(title: &str, keys: &[FittedKey]) -> Page {
 fn key_table(keys: &[FittedKey]) -> Table {
     let mut table = Table::new(["key", "recipe", "fitted", "why"]);
     for key in keys {
-        let fitted = key.fitted.as_deref().unwrap_or("as it was");
+        let fitted = key.fitted.as_deref().unwrap_or("unchanged");
         table.push([&key.key, &key.before, fitted, &key.why]);
     }
     table
@@ -73,7 +73,7 @@ fn key_table(keys: &[FittedKey]) -> Table {
 /// The fitted weights of numbers of objects.
 fn add_counts(page: &mut Page, weights: &[f64]) {
     let histogram = Histogram {
-        title: "objects in a picture, fitted, of 1000".into(),
+        title: "objects per picture, fitted, of 1000".into(),
         ends: ["0".into(), (weights.len() - 1).to_string()],
         counts: weights
             .iter()

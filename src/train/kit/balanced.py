@@ -147,7 +147,7 @@ def ultralytics_trainer(batch_size, seed, real_share=None):
                 return batch
             sources = {REAL if path in real else SYNTHETIC for path in batch["im_file"]}
             if len(sources) != 1:
-                raise ValueError("a batch of both sources")
+                raise ValueError("a batch mixes real and synthetic images")
             self.factor = factors[sources.pop()]
             return batch
 
