@@ -265,7 +265,7 @@ fn insert(item: &mut Item, steps: &[Step], value: Value) -> std::result::Result<
 fn insert_key(item: &mut Item, key: &str, value: Value) -> std::result::Result<(), String> {
     let table = item
         .as_table_like_mut()
-        .ok_or("its parent is not a table")?;
+        .ok_or("leads through a value that is not a table")?;
     table.insert(key, Item::Value(value));
     if let Some(inline) = item.as_inline_table_mut() {
         inline.fmt();
@@ -281,7 +281,7 @@ fn entry<'i>(
 ) -> std::result::Result<&'i mut Item, &'static str> {
     let table = item
         .as_table_like_mut()
-        .ok_or("its parent is not a table")?;
+        .ok_or("leads through a value that is not a table")?;
     if !table.contains_key(key) {
         table.insert(key, empty_for(rest));
     }

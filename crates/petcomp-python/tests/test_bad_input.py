@@ -396,7 +396,7 @@ def test_classes_are_names_of_their_own(tmp_path, classes):
         ({"a=b": 1}, "set: key 'a=b'"),
         ({"scene.objects": None}, "set.scene.objects: None"),
         ({"scene.image[7]": 1}, "no such entry in the list"),
-        ({"scene.image.x": 1}, "its parent is not a table"),
+        ({"scene.image.x": 1}, "leads through a value that is not a table"),
         ({"assets": "/nowhere/\U0001f600"}, "/nowhere/\U0001f600/assets.toml: no such file"),
         ([1], "set: list, expected a dict"),
     ],

@@ -156,7 +156,8 @@ fn refuse_credentials(url: &Url) -> Result<()> {
     if is_bare && url.query().is_none() && url.fragment().is_none() && url.port().is_none() {
         return Ok(());
     }
-    let what = "a URL with more than a bucket and a prefix, expected credentials and endpoints only in the environment (AWS_ACCESS_KEY_ID, AWS_ENDPOINT_URL, ..)";
+    let what = "a URL with more than a bucket and a prefix, expected credentials and endpoints only in the \
+        environment (AWS_ACCESS_KEY_ID, AWS_ENDPOINT_URL, ..)";
     Err(Error::value("output", what))
 }
 

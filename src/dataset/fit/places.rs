@@ -361,7 +361,8 @@ fn describe_objects(
     let [low, middle, high] = counts::deciles(&own.weights);
     let likelier = gain.interval();
     format!(
-        "{} pictures suggest {:.1} objects on average ({:.1} to {:.1}), percentiles 10, 50 and 90: {low}, {middle} and {high}; a held-out picture is likelier than with the recipe by a factor of {:.2} ({:.2} to {:.2})",
+        "{} pictures suggest {:.1} objects on average ({:.1} to {:.1}), percentiles 10, 50 and 90 at {low}, {middle} \
+         and {high}; a held-out picture is likelier than with the recipe by a factor of {:.2} ({:.2} to {:.2})",
         counts.len(),
         interval.value,
         interval.low,
@@ -374,7 +375,9 @@ fn describe_objects(
 
 fn unexplained(labels: f64) -> String {
     format!(
-        "; but even these have {labels:.1} labels per picture, unlike the real ones: objects fall differently there (see scene.walls, scene.friction, scene.collider and the assets' thickness), so their number cannot be fitted"
+        "; but even these have {labels:.1} labels per picture, unlike the real ones: objects fall differently there \
+         (see scene.walls, scene.friction, scene.collider and the assets' thickness), so their number cannot be \
+         fitted"
     )
 }
 

@@ -15,7 +15,8 @@ const STYLE: &str = "<style>.pairs{display:grid;grid-template-columns:repeat(aut
     .pairs div{white-space:nowrap}</style>\n";
 
 /// What no picture with labels tells.
-const UNKNOWN: &str = "Labels and pixels do not show the walls' height and slope, the objects' thickness, the lights, or how colours vary between objects: those keys are unchanged.";
+const UNKNOWN: &str = "Labels and pixels do not show the walls' height and slope, the objects' thickness, the \
+    lights, or how colours vary between objects: those keys are unchanged.";
 
 /// Real pictures, and the recipe's before and after fitting.
 pub(super) struct Compared {
@@ -25,7 +26,9 @@ pub(super) struct Compared {
 }
 
 /// What is missing without pictures.
-const PLATES_ALONE: &str = "Without labelled pictures of the place, the number, positions and apparent size of the objects are unknown, as are the noise, blur and exposure of the camera that will see them: give 5 to 50 pictures.";
+const PLATES_ALONE: &str = "Without labelled pictures of the place, the number, positions and apparent size of the \
+    objects are unknown, as are the noise, blur and exposure of the camera that will see them: give 5 to 50 \
+    pictures.";
 
 pub(super) fn of_plates(keys: &[FittedKey], plates: &[MeasuredPlate]) -> Page {
     let mut page = begin("Recipe fitted to its plates", keys);
@@ -114,7 +117,10 @@ impl Compared {
 fn introduction(sets: &Compared) -> String {
     let [real, before, after] = sets.each().map(|set| set.set.pictures.len());
     format!(
-        "{real} real pictures (orange) beside {before} of the original recipe (blue, left) and {after} of the fitted one (blue, right). The distance is the Kolmogorov-Smirnov distance, 0 for identical distributions; by chance it stays below the last column in 95 of 100 cases. Noise, blur, light and its colour are measured around the labels."
+        "{real} real pictures (orange) beside {before} of the original recipe (blue, left) and {after} of the fitted \
+         one (blue, right). The distance is the Kolmogorov-Smirnov distance, 0 for identical distributions; by \
+         chance it stays below the last column in 95 of 100 cases. Noise, blur, light and its colour are measured \
+         around the labels."
     )
 }
 

@@ -73,7 +73,8 @@ fn add_figures(page: &mut Page, theirs: &LabelledSet, max_figures: usize) {
 fn add_heading(page: &mut Page, ours: &LabelledSet, theirs: &LabelledSet) {
     let without = describe_unlabelled(theirs);
     page.heading("Compared with your own pictures").text(&format!(
-        "{} pictures of the dataset (blue) and {} of yours (orange){without}. The distance is the Kolmogorov-Smirnov distance: 0 for identical distributions, 1 for disjoint ones; the largest differences come first.",
+        "{} pictures of the dataset (blue) and {} of yours (orange){without}. The distance is the Kolmogorov-Smirnov \
+         distance: 0 for identical distributions, 1 for disjoint ones; the largest differences come first.",
         ours.pictures.len(),
         theirs.pictures.len()
     ));

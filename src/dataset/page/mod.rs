@@ -223,11 +223,11 @@ fn obstruction_note(identity: &serde_json::Value) -> String {
     let policy = identity["obstructed"].as_str().unwrap_or("drop");
     let obstructed = match &identity["recipe"]["label"]["min_visible"] {
         serde_json::Value::Number(share) => {
-            format!(
-                "objects whose outline is covered by others except for less than min_visible = {share} of it"
-            )
+            format!("objects with less than min_visible = {share} of their outline uncovered")
         }
-        _ => "objects that others lie on, by the topmost rule, however little is hidden".to_owned(),
+        _ => {
+            "objects covered by others under the topmost rule, however little is hidden".to_owned()
+        }
     };
     format!(
         "The recipe's obstructed = \"{policy}\" applies to {obstructed}; \"keep\" labels them too."

@@ -75,7 +75,8 @@ fn describe_selection(selected: &[SelectedSample], all: usize) -> String {
     let outliers = selected.iter().filter(|sample| sample.why.is_some());
     let (count, outliers) = (selected.len(), outliers.count());
     format!(
-        "{count} of {all} pictures: first {outliers} outliers, with what sets them apart, then others evenly spread. Click one to enlarge it; Escape and the arrow keys work too."
+        "{count} of {all} pictures: first {outliers} outliers, with what sets them apart, then others evenly spread. \
+         Click one to enlarge it; Escape and the arrow keys work too."
     )
 }
 

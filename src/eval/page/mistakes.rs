@@ -84,7 +84,8 @@ fn describe_mistakes(mistakes: &[Mistake], options: &EvalReportOptions) -> Strin
     .map(|kind| mistakes.iter().filter(|m| m.kind == kind).count());
     let ConfusionOptions { confidence, iou } = options.confusion;
     format!(
-        "{alarms} false alarms, {wrong} of another class than their box, {missed} boxes missed; detections with a confidence above {confidence} and an IoU above {iou}. All of them, worst first, are in mistakes.csv."
+        "{alarms} false alarms, {wrong} of another class than their box, {missed} boxes missed; detections with a \
+         confidence above {confidence} and an IoU above {iou}. All of them, worst first, are in mistakes.csv."
     )
 }
 

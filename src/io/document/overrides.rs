@@ -100,8 +100,8 @@ impl PathStep<'_> {
             (Value::Array(list), Self::Index(i)) => {
                 list.get_mut(i).ok_or("no such entry in the list")
             }
-            (_, Self::Key(_)) => Err("its parent is not a table"),
-            (_, Self::Index(_)) => Err("its parent is not a list"),
+            (_, Self::Key(_)) => Err("leads through a value that is not a table"),
+            (_, Self::Index(_)) => Err("leads through a value that is not a list"),
         }
     }
 }

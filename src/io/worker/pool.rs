@@ -57,7 +57,7 @@ pub(crate) fn ask(
     request: Request,
 ) -> std::result::Result<Response, Refusal> {
     let program = find_program().ok_or_else(|| {
-        format!("needs OpenImageIO, but {PROGRAM} is not next to this program (or set {PROGRAM_VARIABLE} to its path)")
+        format!("needs OpenImageIO, but {PROGRAM} is not next to this program (set {PROGRAM_VARIABLE} to its path)")
     })?;
     IDLE.ask(&program, source, limits, strict, request)
 }

@@ -102,7 +102,8 @@ fn check_names(paths: &[PathBuf], files: &[CameraFile]) -> anyhow::Result<()> {
         );
         if let Some(other) = named.insert(name, path) {
             anyhow::bail!(
-                "{shown}: image.file: \"{name}\", which {} also has; COLMAP needs a different name for each picture: export these cameras to separate folders",
+                "{shown}: image.file: \"{name}\", which {} also has; COLMAP needs a different name for each picture: \
+                 export these cameras to separate folders",
                 other.display()
             );
         }
