@@ -156,11 +156,14 @@ def ultralytics_trainer(batch_size, seed, real_share=None):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--data", default=COMBINED, help="which images, a file of this folder; default: %(default)s, balanced")
-    parser.add_argument("--model", default="yolov5su.pt", help="default: %(default)s, learned from COCO; the paper's from ImageNet")
+    parser.add_argument("--data", default=COMBINED, help="data file in this folder; default: %(default)s, balanced")
+    parser.add_argument("--model", default="yolov5su.pt", help="default: %(default)s, pretrained on COCO; the paper's on ImageNet")
     parser.add_argument("--epochs", type=int, default=300)
     parser.add_argument("--batch", type=int, default=32)
-    parser.add_argument("--real-share", type=float, help="of each batch, between 0 and 1; default: batches of one source, weighted")
+    parser.add_argument(
+        "--real-share", type=float,
+        help="share of real images per batch, between 0 and 1; default: batches of one source, weighted",
+    )
     parser.add_argument("--img", type=int, default=640)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=8)

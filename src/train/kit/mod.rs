@@ -279,10 +279,10 @@ fn commands_head(options: &KitOptions, [real, synthetic]: [u64; 2]) -> String {
         .map(|images| combined.epochs_of(batches_per_epoch(images, options.batch)));
     let Updates { batches, total, .. } = combined;
     format!(
-        "#!/bin/sh\n# Start in this folder, with Ultralytics in Python: one detector for all, so that they can be compared;\n\
+        "#!/bin/sh\n# Run in this folder with Ultralytics installed: one detector for all variants, so that they are comparable;\n\
          # combined weights its loss by equation 2.\n\
          # YOLOv5's own train.py takes the same files, and hyp.yaml; its results are not comparable with these.\n\
-         # One epoch over both sources: {batches} batches; {total} updates in all. Equally many updates take {synthetic:.1} epochs of the\n\
+         # One epoch over both sources: {batches} batches; {total} updates in all. The same number of updates takes {synthetic:.1} epochs of the\n\
          # synthetic images alone and {real:.1} of the real ones.\nset -eu\n"
     )
 }
@@ -294,7 +294,7 @@ fn without_validation(left_out: &[&Variant]) -> String {
     }
     let names: Vec<_> = left_out.iter().map(|variant| variant.name).collect();
     let names = names.join(", ");
-    format!("# Left out, since no synthetic image is for validation: {names}.\n")
+    format!("# Omitted, as no synthetic image is for validation: {names}.\n")
 }
 
 fn yaml_list(names: &[&str]) -> String {
