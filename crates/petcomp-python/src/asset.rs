@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-/// Cuts out all photos of a list, or those that are not there yet; returns what became of them.
+/// Cuts out all photos of a list, or only the missing ones; returns the results as JSON.
 #[pyfunction]
 #[pyo3(signature = (list, folder, progress, resume))]
 pub(crate) fn build_assets(

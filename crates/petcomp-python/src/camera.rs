@@ -128,7 +128,7 @@ impl Camera {
         })
     }
 
-    /// Direction of the ray through each pixel (n x 2), whose depth along the optical axis is 1.
+    /// Direction of the ray through each pixel (n x 2), with depth 1 along the optical axis.
     fn rays<'py>(
         &self,
         py: Python<'py>,
@@ -159,7 +159,7 @@ fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
 }
 
-/// The camera of a label, and what `NAME.camera.json` would say of it.
+/// Solves the camera of a label; also returns the record of the solution as JSON.
 #[pyfunction]
 pub(crate) fn solve_camera(py: Python<'_>, label: &str, force: bool) -> PyResult<(Camera, String)> {
     let label: Label = parse("label", label).map_err(to_python)?;

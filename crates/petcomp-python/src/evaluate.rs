@@ -31,7 +31,7 @@ fn options_of((classes, rounds, seed): Question) -> Result<EvalReportOptions> {
     })
 }
 
-/// The scores of predictions in files, as `metrics.json` has them; with a folder, the whole report.
+/// Scores predictions in files, as in `metrics.json`; writes the full report if given a folder.
 #[pyfunction]
 pub(crate) fn evaluate_files(
     py: Python<'_>,
@@ -90,7 +90,7 @@ fn metrics_json(metrics: &Metrics, options: &EvalReportOptions) -> Result<String
 /// ignored, or how sure it is.
 type Sheet = (Vec<(u32, [f64; 4], bool)>, Vec<(u32, [f64; 4], f64)>);
 
-/// The scores of predictions in memory.
+/// Scores predictions in memory.
 #[pyfunction]
 pub(crate) fn evaluate_boxes(
     py: Python<'_>,

@@ -73,7 +73,7 @@ fn range_of(only: Option<u64>, shard: Option<[u64; 2]>) -> Result<SampleRange> {
     }
 }
 
-/// Makes a dataset of a pipeline's pictures.
+/// Generates a dataset from a pipeline.
 #[pyfunction]
 pub(crate) fn generate_from(
     py: Python<'_>,
@@ -142,7 +142,7 @@ impl DatasetLayout {
     }
 }
 
-/// Makes a dataset of the samples that a function of Python's returns for their numbers.
+/// Generates a dataset from a Python function that returns the sample of a number.
 #[pyfunction]
 pub(crate) fn generate_with(
     py: Python<'_>,

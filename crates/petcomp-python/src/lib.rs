@@ -23,7 +23,7 @@ mod scene;
 mod shot;
 mod work;
 
-/// The native half of the package petcomp; its functions have their documentation there.
+/// The native module of the package petcomp, which documents its functions.
 #[pyo3::pymodule]
 mod _petcomp {
     #[pymodule_export]

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 
 type FloatArray<'py> = Bound<'py, PyArrayDyn<f32>>;
 
-/// Matte and cut-out of a photo before a screen, and what the robust profile changed.
+/// Keys a photo of a screen: matte, cut-out and the deviations of the robust profile.
 #[pyfunction]
 pub(crate) fn key<'py>(
     py: Python<'py>,
@@ -122,7 +122,7 @@ fn deviations_json(deviations: &Deviations) -> String {
     .to_string()
 }
 
-/// The one object of a photo without its screen, and what is known of it.
+/// Cuts out the single object of a photo; also returns its record as JSON.
 #[pyfunction]
 pub(crate) fn cut_out<'py>(
     py: Python<'py>,
@@ -165,7 +165,7 @@ fn cut_out_record(cut: &CutOut) -> serde_json::Value {
     })
 }
 
-/// A picture file as float32, scene-linear.
+/// Reads an image file as float32, scene-linear.
 #[pyfunction]
 pub(crate) fn read_picture<'py>(
     py: Python<'py>,
@@ -180,7 +180,7 @@ pub(crate) fn read_picture<'py>(
     to_array(py, image)
 }
 
-/// A picture to a file, its format by the extension; of 32-bit floats where it is one of floats.
+/// Writes an image in the format of the file extension; OpenEXR gets 32-bit floats.
 #[pyfunction]
 pub(crate) fn write_picture(
     py: Python<'_>,

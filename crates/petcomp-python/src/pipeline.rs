@@ -14,7 +14,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-/// Everything that pictures are made from, opened once.
+/// An opened recipe, from which samples are generated.
 #[pyclass(frozen, module = "petcomp._petcomp")]
 pub(crate) struct Pipeline {
     /// None once it is closed.
@@ -118,7 +118,7 @@ impl Pipeline {
         text(self.opened()?.pipeline.config()).map_err(to_python)
     }
 
-    /// The folder that environment maps are named from.
+    /// The folder that paths of environment maps are relative to.
     fn folder(&self) -> PyResult<OsString> {
         let folder = self.opened()?.pipeline.config().folder.clone();
         Ok(folder.into_os_string())
@@ -132,7 +132,7 @@ impl Pipeline {
         Ok(Sample::of_file(sample, opened.policy, file))
     }
 
-    /// Finds out what is unknown in a scene, renders it and labels it.
+    /// Resolves the unknowns of a scene, renders it and labels it.
     fn take(&self, py: Python<'_>, scene: &str) -> PyResult<Sample> {
         let (opened, scene) = (self.opened()?, scene_of(scene).map_err(to_python)?);
         let sample = opened.run(py, move |pipeline| pipeline.take(scene))?;

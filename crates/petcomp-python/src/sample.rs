@@ -46,7 +46,7 @@ impl PictureFile {
     }
 }
 
-/// A picture and its labels.
+/// An image and its labels.
 #[pyclass(frozen, module = "petcomp._petcomp")]
 pub(crate) struct Sample {
     facts: Arc<Facts>,
@@ -193,7 +193,7 @@ impl Facts {
 
 #[pymethods]
 impl Sample {
-    /// A picture from anywhere, with the masks of its objects.
+    /// Creates a sample from any image and the masks of its objects.
     #[staticmethod]
     fn from_masks(
         py: Python<'_>,
@@ -268,7 +268,7 @@ impl Sample {
         to_array(py, work::run(py, move || Ok(facts.ids()))?)
     }
 
-    /// One row an object: x0, y0, x1, y1.
+    /// One row per object: x0, y0, x1, y1.
     fn boxes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let labelled = self.facts.labelled();
         let boxes = labelled
@@ -282,7 +282,7 @@ impl Sample {
         ))
     }
 
-    /// Number, class, and whether to be ignored, of each labelled object.
+    /// Id, class and ignore flag of each labelled object.
     fn labelled(&self) -> Vec<(u32, u32, bool)> {
         let labelled = self.facts.labelled();
         labelled
@@ -295,7 +295,7 @@ impl Sample {
         self.facts.policy.classes.clone()
     }
 
-    /// COCO's compressed run lengths of a labelled object, as JSON.
+    /// COCO's compressed RLE of a labelled object, as JSON.
     fn mask_json(&self, place: usize) -> PyResult<String> {
         text(self.facts.mask(place)?).map_err(to_python)
     }
@@ -319,7 +319,7 @@ impl Sample {
         scene.transpose().map_err(to_python)
     }
 
-    /// Every draw by its path.
+    /// Every drawn value by its path.
     fn draws(&self) -> Vec<(String, f64)> {
         let draws = self.facts.provenance.iter().flat_map(|p| &p.draws);
         draws.map(|draw| (draw.path.clone(), draw.value)).collect()

@@ -8,7 +8,7 @@ use petcomp::{Camera, Result, Scene, io};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
-/// A scene as it is read, every default told that is not left out in files.
+/// Checks a scene and fills in the defaults that scene files write.
 #[pyfunction]
 pub(crate) fn check_scene(json: &str) -> PyResult<String> {
     scene_of(json)
@@ -16,7 +16,7 @@ pub(crate) fn check_scene(json: &str) -> PyResult<String> {
         .map_err(to_python)
 }
 
-/// A scene of a file, TOML or JSON.
+/// Reads a scene file, TOML or JSON.
 #[pyfunction]
 pub(crate) fn read_scene(py: Python<'_>, path: PathBuf) -> PyResult<String> {
     work::run(py, move || {
@@ -26,7 +26,7 @@ pub(crate) fn read_scene(py: Python<'_>, path: PathBuf) -> PyResult<String> {
     })
 }
 
-/// A scene to a file, TOML or JSON by its name.
+/// Writes a scene file, TOML or JSON depending on its name.
 #[pyfunction]
 pub(crate) fn write_scene(py: Python<'_>, path: PathBuf, json: &str) -> PyResult<()> {
     let scene = scene_of(json).map_err(to_python)?;

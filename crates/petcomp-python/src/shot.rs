@@ -32,7 +32,7 @@ struct Settings {
     classes: Vec<String>,
 }
 
-/// Renders cards over a plate, and labels them.
+/// Renders cards over a plate and labels them.
 #[pyfunction]
 pub(crate) fn render_shot(
     py: Python<'_>,

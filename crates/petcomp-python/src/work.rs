@@ -34,7 +34,7 @@ struct IdlePool {
     pool: ThreadPool,
 }
 
-/// Sets how many threads a job has; 0 is one per core.
+/// Sets the number of threads of a job; 0 is one per core.
 #[pyfunction]
 pub(crate) fn set_threads(count: usize) -> PyResult<()> {
     if count > MAX_THREADS {
@@ -45,7 +45,7 @@ pub(crate) fn set_threads(count: usize) -> PyResult<()> {
     Ok(())
 }
 
-/// Lets this process keep its share of cut-outs and photos in memory, where so many do the same.
+/// Limits this process to its share of the memory for cut-outs and photos among `processes`.
 #[pyfunction]
 pub(crate) fn share_memory(processes: usize) {
     petcomp::share_memory(processes);
@@ -95,8 +95,8 @@ impl Drop for Stop {
     }
 }
 
-/// Stops all jobs that call Python and waits for them: a thread that is in Python when the
-/// interpreter ends is ended in the middle, and the process with it.
+/// Stops all jobs that call Python and waits for them: a thread still in Python when the
+/// interpreter exits is killed midway, and the process with it.
 #[pyfunction]
 pub(crate) fn end_callers(py: Python<'_>) -> PyResult<()> {
     while stop_callers() {

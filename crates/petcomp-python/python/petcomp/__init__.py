@@ -1,14 +1,14 @@
-"""petcomp turns a handful of photographs into labelled training images.
+"""Turn a handful of photographs into labelled training images.
 
     import petcomp
 
     sample = petcomp.Pipeline("recipe.toml")[0]
     sample.image, sample.boxes, sample.classes
 
-The words are those of the Rust library; pictures are arrays of NumPy, height x width x channels. float32
-is scene-linear light with Rec. 709 primaries, alpha premultiplied; uint8 is sRGB, alpha straight. Lengths
-are metres, angles radians, places in pictures pixels from the top-left corner. Work releases the
-interpreter lock, and Ctrl-C ends it within a second.
+Names follow the Rust library. Images are NumPy arrays, height x width x channels: float32 is scene-linear
+light with Rec. 709 primaries and premultiplied alpha, uint8 is sRGB with straight alpha. Lengths are metres,
+angles radians, image positions pixels from the top left corner. petcomp releases the GIL while it works, and
+Ctrl-C ends any call within a second.
 """
 
 from __future__ import annotations
@@ -50,5 +50,5 @@ __all__ = [
 
 
 def set_threads(count: int) -> None:
-    """Sets how many threads work: 0 to 1024, where 0 is one for each core."""
+    """Set the number of threads: 0 to 1024, where 0 is one per core."""
     _petcomp.set_threads(_number("threads", count))

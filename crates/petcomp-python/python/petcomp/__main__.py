@@ -1,4 +1,4 @@
-"""``python -m petcomp``: the program."""
+"""``python -m petcomp`` runs the program."""
 
 from ._program import main
 

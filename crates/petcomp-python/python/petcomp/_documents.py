@@ -1,4 +1,4 @@
-"""Plain data as JSON, which is how documents cross the border to the native half."""
+"""Plain data as JSON, the form in which documents reach the native module."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .errors import ArgumentTypeError, InvalidValueError
 __all__ = ["check_array", "class_names", "dumped", "folder_of", "loaded", "overrides", "path_of", "plain"]
 
 _MOST_LEVELS = 60
-#: An array that only says that it is large must not be written out.
+#: An array that only claims to be large, as by broadcasting, must not be written out.
 _MOST_NUMBERS = 10_000_000
 
 
 def check_array(name: str, value: Any, most: int = _MOST_NUMBERS) -> None:
-    """Refuses arrays with a mask or more numbers than a document may have, before any is looked at."""
+    """Reject masked arrays and those with more than ``most`` numbers, before reading any."""
     if isinstance(value, np.ma.MaskedArray):
         raise ArgumentTypeError(f"{name}: a masked array, expected a plain one")
     size = getattr(value, "size", 0)
@@ -29,17 +29,17 @@ def check_array(name: str, value: Any, most: int = _MOST_NUMBERS) -> None:
 
 
 def loaded(text: str) -> Any:
-    """The data of a document of the native half."""
+    """Parse a document from the native module."""
     return json.loads(text)
 
 
 def dumped(name: str, value: Any) -> str:
-    """The document of plain data; numbers of NumPy, tuples and whatever has ``to_dict`` may be in it."""
+    """Serialize plain data, which may contain NumPy numbers, tuples and objects with ``to_dict``."""
     return json.dumps(plain(name, value))
 
 
 def plain(name: str, value: Any) -> Any:
-    """The same data in Python's own types, none of it the caller's."""
+    """Copy the data into Python's own types."""
     return _plain(name, value, 0)
 
 
@@ -79,7 +79,7 @@ def _plain_scalar(at: str, value: Any, level: int) -> Any:
 
 
 def overrides(values: Any) -> list[str]:
-    """Values of a recipe to be changed (plain data), as ``--set`` has them."""
+    """Convert changes to a recipe (plain data) to the form of ``--set``."""
     if not isinstance(values, dict):
         raise ArgumentTypeError(f"set: {type(values).__name__}, expected a dict")
     return [_override(key, value) for key, value in values.items()]
@@ -99,12 +99,12 @@ def _toml(at: str, value: Any) -> str:
         return f"{{ {items} }}"
     if isinstance(value, list):
         return f"[{', '.join(_toml(at, item) for item in value)}]"
-    # TOML knows no pairs of surrogates, and no bare delete.
+    # TOML allows neither surrogate pairs nor an unescaped DEL.
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def class_names(value: Any) -> list[str]:
-    """Names of classes, each once."""
+    """Check a list of class names, which must be unique."""
     if isinstance(value, str) or not isinstance(value, Iterable):
         raise ArgumentTypeError(f"classes: {value!r}, expected a list of names")
     names = list(value)
@@ -117,7 +117,7 @@ def class_names(value: Any) -> list[str]:
 
 
 def path_of(name: str, value: Any) -> str:
-    """A path of an argument."""
+    """Convert a path argument to text."""
     try:
         path = os.fspath(value)
     except TypeError:
@@ -129,7 +129,7 @@ def path_of(name: str, value: Any) -> str:
 
 
 def folder_of(name: str, value: Any) -> str:
-    """A folder to write into, which is on this machine."""
+    """Convert the path of a local folder to write into."""
     path = path_of(name, value)
     if "://" in path:
         raise InvalidValueError(f"{name}: {path} is a URL, expected a folder")

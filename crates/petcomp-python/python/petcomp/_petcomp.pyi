@@ -1,4 +1,4 @@
-"""The native half of the package petcomp; its functions have their documentation there."""
+"""The native module of the package petcomp, which documents its functions."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, final

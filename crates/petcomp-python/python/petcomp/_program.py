@@ -1,4 +1,4 @@
-"""The program ``petcomp``, which is inside the native half."""
+"""The program ``petcomp``, part of the native module."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ __all__ = ["main"]
 
 
 def main() -> None:
-    """Runs the command line and ends the process with its status."""
+    """Run the command line and exit with its status."""
     sys.exit(_petcomp.run_program(["petcomp", *sys.argv[1:]]))

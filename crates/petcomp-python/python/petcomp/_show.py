@@ -1,4 +1,4 @@
-"""Pictures and tables for notebooks."""
+"""Images and tables for notebooks."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ import numpy.typing as npt
 
 __all__ = ["image_tag", "png", "shown", "table"]
 
-#: Longer sides are shown smaller.
+#: Larger images are shown reduced.
 _LONGEST_SIDE = 1024
 
 
 def png(codes: npt.NDArray[np.uint8]) -> bytes:
-    """An 8-bit picture (height x width, or with 3 or 4 channels) as a PNG file."""
+    """Encode an 8-bit image (height x width, or with 3 or 4 channels) as PNG."""
     codes = np.ascontiguousarray(codes)
     height, width = codes.shape[:2]
     kind = {1: 0, 3: 2, 4: 6}[1 if codes.ndim == 2 else codes.shape[2]]
@@ -35,7 +35,7 @@ def _chunk(name: bytes, data: bytes) -> bytes:
 
 
 def shown(image: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
-    """A scene-linear picture (premultiplied) as a display shows it, on black."""
+    """Encode a scene-linear, premultiplied image for display, over black."""
     if image.dtype == np.uint8:
         return image
     if image.ndim == 2:
@@ -51,14 +51,14 @@ def _codes(values: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
 
 
 def image_tag(codes: npt.NDArray[np.uint8]) -> str:
-    """A picture inside of a page."""
+    """Return an HTML tag that embeds the image."""
     step = max(1, -(-max(codes.shape[:2]) // _LONGEST_SIDE))
     data = base64.b64encode(png(codes[::step, ::step])).decode()
     return f'<img src="data:image/png;base64,{data}">'
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table of text."""
+    """Return an HTML table."""
     lines = [_row("th", head), *(_row("td", row) for row in rows)]
     return f"<table>{''.join(lines)}</table>"
 

@@ -1,4 +1,4 @@
-"""Cut-outs with real size and class, kept in a folder."""
+"""Folders of cut-outs with real size and class."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ __all__ = ["Built", "build", "list_folder"]
 
 @dataclass(frozen=True)
 class Built:
-    """What became of the photos of a list."""
+    """Result of building the photos of a list."""
 
-    #: Photos that are cut out.
+    #: Number of photos that have been cut out.
     photos: int
-    #: How many of these cut-outs were there before.
+    #: How many of these cut-outs were kept from an earlier run.
     kept: int
-    #: Lengths of the objects that lie wholly in their photos and their standard errors, metres, in the
-    #: order of the list.
+    #: Length and standard error, metres, of each object that lies wholly in its photo, in the order of the
+    #: list.
     lengths: list[tuple[float, float]]
-    #: Photos that gave no cut-out, and why.
+    #: Photos without a cut-out, with the reason.
     refused: list[str]
-    #: How many of these a person rejected.
+    #: How many of these were rejected in a review.
     rejected: int
-    #: Cut-outs that the folder has of photos that are not in the list.
+    #: Cut-outs in the folder whose photos are not in the list.
     unlisted: list[str]
     #: Records of cut-outs that a person should review.
     needs_review: list[dict[str, Any]]
@@ -45,12 +45,12 @@ def build(
     *,
     resume: bool = False,
 ) -> Built:
-    """Cuts out all photos of a list (TOML or CSV, or a folder with one) into an asset folder.
+    """Cut out all photos of a list (TOML or CSV, or a folder with one) into an asset folder.
 
-    ``resume`` keeps the cut-outs that are there already of the same photo, entry, options and version of
-    petcomp. A contact sheet that the program drew of other cut-outs goes. ``progress`` is called with the
-    photos done and their number, in the calling thread. What it raises ends the run, as Ctrl-C does: the
-    photos in hand may still be written, and the manifest with them, but no others.
+    ``resume`` keeps existing cut-outs of the same photo, entry, options and petcomp version. A contact sheet
+    that shows other cut-outs is deleted. ``progress`` is called in the calling thread with the number of
+    finished photos and the total. An exception in it ends the run like Ctrl-C: the photos in progress may
+    still be finished and added to the manifest, but no others.
     """
     paths = path_of("list", list), folder_of("folder", folder)
     report = _petcomp.build_assets(*paths, progress, resume)
@@ -60,6 +60,6 @@ def build(
 
 
 def list_folder(folder: str | os.PathLike[str]) -> dict[str, Any]:
-    """What an asset folder holds: its manifest as plain data."""
+    """Return the manifest of an asset folder as plain data."""
     manifest: dict[str, Any] = loaded(_petcomp.list_assets(path_of("folder", folder)))
     return manifest

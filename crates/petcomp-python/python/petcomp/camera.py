@@ -1,4 +1,4 @@
-"""Where a picture is seen from: a pinhole camera, and the camera that sees a rectangle of known size."""
+"""The pinhole camera, and solving it from a rectangle of known size."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ _log = logging.getLogger("petcomp")
 Numbers = Sequence[float] | npt.NDArray[np.floating[Any]]
 
 
-#: A number for each coordinate of each pixel of the largest picture.
+#: Three coordinates for each pixel of the largest image.
 _MOST_COORDINATES = 3 * 2**27
-#: Pixels of a picture's side.
+#: Longest side of an image, pixels.
 _MOST_PIXELS = 2**31
 
 
 def _floats(name: str, value: Any, shape: tuple[int, ...]) -> list[Any]:
-    """Finite numbers of a shape, -1 being any length."""
+    """Convert to finite numbers of the given shape, where -1 is any length."""
     check_array(name, value)
     result: list[Any] = _array(name, value, shape).tolist()
     return result
 
 
 def _array(name: str, value: Any, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
-    """The same as an array whose rows follow each other."""
+    """The same, as a C-contiguous array."""
     check_array(name, value, _MOST_COORDINATES)
     try:
         given = np.asarray(value)
-        # NumPy reads numbers out of texts and dates, and leaves out imaginary parts.
+        # NumPy would parse strings, convert dates and drop imaginary parts.
         texts = given.dtype == object and any(isinstance(one, (str, bytes)) for one in given.flat)
         if texts or given.dtype.kind not in "biufO":
             raise TypeError
@@ -56,7 +56,7 @@ def _array(name: str, value: Any, shape: tuple[int, ...]) -> npt.NDArray[np.floa
 
 
 def _pixels(name: str, value: Any) -> list[int]:
-    """Width and height of a picture."""
+    """Check the width and height of an image."""
     numbers = _floats(name, value, (2,))
     if all(1 <= n <= _MOST_PIXELS and n == int(n) for n in numbers):
         return [int(n) for n in numbers]
@@ -64,10 +64,10 @@ def _pixels(name: str, value: Any) -> list[int]:
 
 
 class Camera:
-    """A pinhole camera without distortion: where it stands and how it maps the world to pixels.
+    """A pinhole camera without distortion: its pose and intrinsics.
 
-    Axes are those of OpenCV (x right, y down, z forward); the world is in metres, its z axis up. Pixel
-    ``(i, j)`` has its centre at ``+0.5``.
+    The axes are OpenCV's (x right, y down, z forward). The world is in metres with z up. The centre of a pixel
+    is at ``+0.5``.
     """
 
     __slots__ = ("_native",)
@@ -85,15 +85,14 @@ class Camera:
         image: Sequence[int],
         focal_px: float | None = None,
     ) -> Camera:
-        """The camera that sees a rectangle of known size at four corners.
+        """Solve the camera from the four corners of a rectangle of known size.
 
-        ``corners`` are pixels, clockwise from the rectangle's top left; ``size`` is its width and height
-        in metres; ``image`` is width and height of the picture in pixels. The rectangle becomes the
-        world's plane ``z = 0``, centred, ``+x`` along its width. What a person should look at is logged
-        as warnings (``logging``, logger ``petcomp``).
+        ``corners`` are pixels, clockwise from the rectangle's top left; ``size`` is its width and height in
+        metres; ``image`` is the width and height of the image in pixels. The rectangle becomes the world plane
+        ``z = 0``, centred, with ``+x`` along its width. Warnings go to the logger ``petcomp`` of ``logging``.
 
-        Raises ``CameraError`` where no camera can have seen it, ``InvalidValueError`` for a size that is
-        not in metres.
+        Raises ``CameraError`` if no camera can have seen the rectangle, and ``InvalidValueError`` if its size
+        is not in metres.
         """
         label: dict[str, Any] = {
             "format": "plane-label",
@@ -114,28 +113,28 @@ class Camera:
 
     @classmethod
     def looking_down(cls, height: float, focal_px: float, image: Sequence[int]) -> Camera:
-        """Straight above the origin, ``height`` in metres and above 0, the picture's top towards ``+y``."""
+        """A camera straight above the origin, ``height`` > 0 in metres, the top of the image towards ``+y``."""
         return cls(_petcomp.Camera.looking_down(height, focal_px, _pixels("image", image)))
 
     @classmethod
     def look_at(cls, eye: Numbers, target: Numbers, focal_px: float, image: Sequence[int]) -> Camera:
-        """At ``eye``, looking at ``target`` (both metres), upright."""
+        """An upright camera at ``eye`` that looks at ``target`` (both metres)."""
         eye, target = _floats("eye", eye, (3,)), _floats("target", target, (3,))
         return cls(_petcomp.Camera.look_at(eye, target, focal_px, _pixels("image", image)))
 
     @classmethod
     def from_dict(cls, document: Mapping[str, Any]) -> Camera:
-        """From plain data, as scene files have it."""
+        """Create a camera from plain data in the format of scene files."""
         return cls(_petcomp.Camera.from_json(dumped("camera", document)))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data, as scene files have it."""
+        """Return plain data in the format of scene files."""
         document: dict[str, Any] = loaded(self._native.to_json())
         return document
 
     @property
     def image(self) -> tuple[int, int]:
-        """Width and height of its picture, pixels."""
+        """Width and height of the image, pixels."""
         width, height = self._native.image
         return width, height
 
@@ -147,13 +146,13 @@ class Camera:
 
     @property
     def principal_px(self) -> tuple[float, float]:
-        """Principal point, pixels from the picture's top-left corner."""
+        """Principal point, pixels from the top left corner of the image."""
         x, y = self._native.principal_px
         return x, y
 
     @property
     def center(self) -> npt.NDArray[np.float64]:
-        """Where it is in the world: 3, float64, metres."""
+        """Position in the world: 3, float64, metres."""
         return np.array(self._native.center)
 
     @property
@@ -163,7 +162,7 @@ class Camera:
 
     @property
     def intrinsics(self) -> npt.NDArray[np.float64]:
-        """K: 3 x 3, float64, pixels."""
+        """Intrinsic matrix K: 3 x 3, float64, pixels."""
         return np.array(self._native.intrinsics())
 
     @property
@@ -177,18 +176,18 @@ class Camera:
         return np.array(self._native.pixel_from_surface())
 
     def project(self, points: Any) -> npt.NDArray[np.float64]:
-        """Where points (n x 3, metres) are seen: n x 3, float64: x and y in pixels, depth in metres.
+        """Project points (n x 3, metres): n x 3, float64, with x and y in pixels and depth in metres.
 
-        NaN at or behind the camera.
+        Points at or behind the camera give NaN.
         """
         return self._native.project(_array("points", points, (-1, 3)))
 
     def rays(self, pixels: Any) -> npt.NDArray[np.float64]:
-        """Directions through pixels (n x 2): n x 3, float64, of depth 1 along the optical axis."""
+        """Return directions through pixels (n x 2): n x 3, float64, with depth 1 along the optical axis."""
         return self._native.rays(_array("pixels", pixels, (-1, 2)))
 
     def resized(self, image: Sequence[int]) -> Camera:
-        """The same view at another picture size."""
+        """Return the same view at another image size."""
         return Camera(self._native.resized(_pixels("image", image)))
 
     def __eq__(self, other: object) -> bool:
@@ -220,33 +219,33 @@ class Camera:
 
 @dataclass(frozen=True)
 class Solution:
-    """A solved camera, and how reliable it is."""
+    """A solved camera and its reliability."""
 
     #: The camera; the labelled rectangle is the plane ``z = 0``, centred.
     camera: Camera
     #: Width and height of the rectangle as fitted, metres.
     size: tuple[float, float]
-    #: Root mean square distance of the projected corners from the labelled ones, or of the labelled
-    #: points where no corners are, pixels.
+    #: RMS reprojection error of the labelled corners, or of the labelled points if there are no corners,
+    #: pixels.
     rms_px: float
     #: Probability of a worse fit by chance; None without degrees of freedom.
     p_value: float | None
-    #: Relative standard deviation of the focal length; None where nothing is known.
+    #: Relative standard deviation of the focal length; None if nothing is known about it.
     focal_sigma: float | None
     #: Standard deviation of the tilt, radians.
     tilt_sigma: float | None
-    #: What a person should look at: ``code``, ``severity`` and ``message`` of each.
+    #: Warnings to review: ``code``, ``severity`` and ``message`` of each.
     warnings: list[dict[str, str]]
     #: The camera file that ``petcomp camera solve`` writes.
     file: dict[str, Any]
 
 
 def solve(label: Mapping[str, Any], force: bool = False) -> Solution:
-    """The camera of a label: plain data as ``NAME.label.json`` has it.
+    """Solve the camera of a label, which is plain data in the format of ``NAME.label.json``.
 
-    With ``force`` a camera that does not fit its label, is too far away to see objects, or has a lens that
-    folds the picture's corners over, is returned, too. Raises ``CameraError``, and ``InvalidValueError``
-    for a size that is not in metres and for such a lens.
+    Raises ``CameraError``, or ``InvalidValueError`` for a size that is not in metres and for a lens that folds
+    the corners of the image over. ``force`` returns a camera even if it has such a lens, does not fit its
+    label or is too far away to see objects.
     """
     camera, text = _petcomp.solve_camera(dumped("label", label), force)
     record = loaded(text)

@@ -1,7 +1,7 @@
-"""What can go wrong: a class for each kind, with the same sentence as the program's.
+"""Exceptions: a class for each kind of error, with the program's message.
 
-Every error has ``path`` (which file), ``at`` (which value, as ``objects[3].size``) and ``what`` (the
-offending value and what was expected), as far as they are known.
+Every error has ``path`` (the file), ``at`` (the value, e.g. ``objects[3].size``) and ``what`` (the invalid
+value and what was expected), as far as they are known.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ __all__ = [
 
 
 class Error(Exception):
-    """Something that petcomp could not do."""
+    """Base class of all errors of petcomp."""
 
     path: str | None = None
     at: str | None = None
@@ -30,7 +30,7 @@ class Error(Exception):
 
 
 class FileError(Error, OSError):
-    """A file that cannot be read, understood or written."""
+    """A file that cannot be read, parsed or written."""
 
     # OSError would print its own fields.
     def __str__(self) -> str:
@@ -38,11 +38,11 @@ class FileError(Error, OSError):
 
 
 class FieldError(Error, ValueError):
-    """A value in a document that is well-formed but cannot be right."""
+    """An invalid value in a well-formed document."""
 
 
 class InvalidValueError(Error, ValueError):
-    """An argument, a scene or an option that cannot be right."""
+    """An invalid argument, scene or option."""
 
 
 class ArgumentTypeError(Error, TypeError):
@@ -50,7 +50,7 @@ class ArgumentTypeError(Error, TypeError):
 
 
 class PhotoError(Error):
-    """A photo in which no usable object was found."""
+    """A photo without a usable object."""
 
 
 class CameraError(Error):
@@ -58,15 +58,15 @@ class CameraError(Error):
 
 
 class UnsettledError(Error):
-    """Dropped objects that would not come to rest."""
+    """Dropped objects that did not come to rest."""
 
 
 class InterruptedError(Error):
-    """The work was stopped before its end; the same call goes on."""
+    """Work that was stopped early; repeat a call of ``generate`` to resume it."""
 
 
 class ClosedError(Error, ValueError):
-    """The use of something that was closed."""
+    """Use of a closed object."""
 
 
 class InternalError(Error, RuntimeError):

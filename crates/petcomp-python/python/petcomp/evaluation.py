@@ -1,4 +1,4 @@
-"""How well the boxes of a detector match the truth."""
+"""Evaluation of a detector's boxes against ground truth."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ __all__ = ["Metrics", "evaluate"]
 
 
 class Metrics:
-    """Scores of a detector: what ``petcomp eval`` writes as ``metrics.json``."""
+    """Scores of a detector, as ``petcomp eval`` writes them to ``metrics.json``."""
 
     def __init__(self, document: dict[str, Any], classes: list[str]) -> None:
         self._document = document
-        #: Names of the classes, in order; empty where they are not known.
+        #: Names of the classes, in order; empty if unknown.
         self.classes = classes
 
     @property
     def map(self) -> float:
-        """mAP@0.5:0.95 by the definition of YOLOv5."""
+        """mAP@0.5:0.95 as defined by YOLOv5."""
         return float(self._document["map"]["value"])
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """Range of ``map`` by bootstrap over images, or over the sequences that they are of.
+        """Bootstrap interval of ``map``, over images or over the sequences that they belong to.
 
-        None of fewer than 40 rounds, and of fewer than two images, or sequences, that show something to be found.
+        None with fewer than 40 rounds, or with fewer than two images or sequences that contain objects to find.
         """
         record = self._document["map"]
         if "low" not in record:
@@ -45,12 +45,12 @@ class Metrics:
 
     @property
     def by_class(self) -> dict[int, float]:
-        """AP@0.5:0.95 of each class with something to find."""
+        """AP@0.5:0.95 of each class that has objects to find."""
         scores = self._document["yolov5"]["classes"]
         return {score["class"]: float(np.mean(score["ap"])) for score in scores}
 
     def to_dict(self) -> dict[str, Any]:
-        """The same as plain data."""
+        """Return the scores as plain data."""
         return self._document
 
     def __repr__(self) -> str:
@@ -75,15 +75,18 @@ def evaluate(
     rounds: int = 200,
     seed: int = 0,
 ) -> Metrics:
-    """Scores of predictions against the truth, as ``petcomp eval`` gives them.
+    """Score predictions against ground truth, like ``petcomp eval``.
 
-    Both are folders of YOLO labels or COCO JSON files; the truth may also be a list of images (``.txt``), or a folder
-    with a ``data.yaml`` and no labels, for its images of validation. ``size`` (width and height, pixels) is for YOLO
-    labels alone, which need it without images beside them, ``output`` is a folder for the whole report. Or both are
-    lists, one mapping for each image: ``boxes`` (n x 4: left, top, right, bottom, pixels) and ``classes``
-    (n), of predictions ``scores`` (n, 0 to 1), and of the truth, where some are neither to be found nor missed,
-    ``ignored`` (n, as of a ``Sample``). ``rounds`` of the bootstrap: 0 to 100000; fewer than
-    40 give no interval.
+    Files: both are folders of YOLO labels or COCO JSON files. The truth may also be a list of images (``.txt``), or
+    a folder with a ``data.yaml`` and no labels, which stands for its validation images. ``size`` (width and height,
+    pixels) applies to YOLO labels only, which need it if their images are missing. ``output`` is a folder for the
+    full report.
+
+    Boxes in memory: both are lists with one mapping per image: ``boxes`` (n x 4: left, top, right, bottom, pixels)
+    and ``classes`` (n); for predictions ``scores`` (n, 0 to 1); for the truth optionally ``ignored`` (n, as of a
+    ``Sample``), objects that count neither as found nor as missed.
+
+    ``rounds`` is the number of bootstrap rounds, 0 to 100000; fewer than 40 give no interval.
     """
     question = class_names(classes), _number("rounds", rounds), _number("seed", seed)
     if isinstance(predictions, (str, os.PathLike)) and isinstance(truth, (str, os.PathLike)):
@@ -111,14 +114,14 @@ def _sheets(predictions: Any, truth: Any) -> list[Any]:
 
 
 def _truth(at: str, labels: Any) -> list[tuple[Any, ...]]:
-    """Class and box of each object of an image, and whether it is to be ignored."""
+    """Class, box and ignore flag of each object in an image."""
     boxes = _boxes(at, labels, "ignored")
     ignored = _whole(f"{at}.ignored", labels.get("ignored", [False] * len(boxes)), len(boxes), 2)
     return list(zip(_classes(at, labels, len(boxes)), boxes, map(bool, ignored)))
 
 
 def _found(at: str, labels: Any) -> list[tuple[Any, ...]]:
-    """Class and box of each detection in an image, and how sure it is."""
+    """Class, box and confidence of each detection in an image."""
     boxes = _boxes(at, labels, "scores")
     scores = _column(f"{at}.scores", labels.get("scores"), len(boxes))
     return list(zip(_classes(at, labels, len(boxes)), boxes, scores.tolist()))
@@ -160,7 +163,7 @@ def _column(at: str, value: Any, count: int) -> npt.NDArray[np.float64]:
 
 
 def _whole(at: str, value: Any, count: int, end: int) -> list[int]:
-    """The same, whole and from 0 below an end."""
+    """One whole number for each box, from 0 to below ``end``."""
     column = _column(at, value, count)
     for number in column:
         if not (0 <= number < end and number == int(number)):

@@ -1,4 +1,4 @@
-"""Pictures from files and to files, as petcomp reads and writes them."""
+"""Reading and writing image files."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ __all__ = ["read", "write"]
 
 
 def read(path: str | os.PathLike[str], alpha: bool = False) -> npt.NDArray[np.float32]:
-    """A picture: height x width x 3, float32, scene-linear (Rec. 709 primaries), values above 1 kept.
+    """Read an image: height x width x 3, float32, scene-linear (Rec. 709 primaries), values above 1 kept.
 
-    With ``alpha``: height x width x 4, premultiplied. PNG, JPEG, TIFF, Radiance HDR and OpenEXR, by
-    content; profiles and the orientation of the camera are applied.
+    With ``alpha``: height x width x 4, premultiplied. The format (PNG, JPEG, TIFF, Radiance HDR or OpenEXR) is
+    detected from the content. Colour profiles and the camera's orientation are applied.
     """
     return _petcomp.read_picture(path_of("path", path), alpha)
 
 
 def write(path: str | os.PathLike[str], image: npt.NDArray[Any]) -> None:
-    """A picture to a file whose extension names the format: exr, png, jpg or tif.
+    """Write an image to a file whose extension sets the format: exr, png, jpg or tif.
 
     ``image`` is height x width x 3 or 4: float32 (scene-linear, premultiplied) or uint8 (sRGB, straight
-    alpha). An exr holds it scene-linear as 32-bit floats, so that nothing is lost; png and jpg hold sRGB codes
-    of 8 bits, tif of 16, clipped to 0 to 1.
+    alpha). exr stores scene-linear 32-bit floats, without loss; png and jpg store 8-bit sRGB codes, tif 16-bit
+    ones, clipped to 0 to 1.
     """
     _petcomp.write_picture(path_of("path", path), image)

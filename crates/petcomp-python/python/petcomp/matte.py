@@ -1,4 +1,4 @@
-"""A photo on a screen becomes a cut-out."""
+"""Keying and cutting out photos taken on a screen."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["CutOut", "Keyed", "cut_out", "key"]
 
 @dataclass(frozen=True, eq=False)
 class Keyed:
-    """What a keyer makes of a photo."""
+    """Result of keying a photo."""
 
-    #: How much of each pixel is foreground: height x width, float32, 0 to 1.
+    #: Share of foreground in each pixel: height x width, float32, 0 to 1.
     matte: npt.NDArray[np.float32]
-    #: The photo through its matte: height x width x 4, float32, scene-linear, premultiplied.
+    #: The keyed foreground: height x width x 4, float32, scene-linear, premultiplied.
     cutout: npt.NDArray[np.float32]
-    #: How often the profile ``robust`` departed from Blender's.
+    #: How often the profile ``robust`` deviated from Blender's.
     deviations: dict[str, int]
 
     def _repr_png_(self) -> bytes:
@@ -43,14 +43,16 @@ def key(
     core: npt.NDArray[Any] | None = None,
     **options: Any,
 ) -> Keyed:
-    """Keys a photo as Blender's Keying node does, to the bit.
+    """Key a photo exactly like Blender's Keying node, bit for bit.
 
-    ``image``: height x width x 3 or 4, float32 (scene-linear, alpha premultiplied; read where it is,
-    without a copy, if its rows are contiguous) or uint8 (sRGB, straight alpha). ``screen``: three
-    scene-linear numbers, a pixel (3, float32 or uint8 as ``image``), or a picture of the empty screen of
-    the same size. ``garbage`` and ``core``: height x width, float32 (0 to 1) or bool: what is surely not,
-    or surely, foreground. ``profile``: ``blender-3.4``, ``blender-4.2``, ``blender-4.5`` or ``robust``.
-    ``options``: Blender's settings, as ``clip_black=0.1``, ``blur_pre=2``, ``despill_factor=0.5``.
+    * ``image``: height x width x 3 or 4, float32 (scene-linear, alpha premultiplied; used without a copy if its
+      rows are contiguous) or uint8 (sRGB, straight alpha)
+    * ``screen``: three scene-linear numbers, a pixel (3, float32 or uint8 like ``image``), or a photo of the
+      empty screen of the same size
+    * ``profile``: ``blender-3.4``, ``blender-4.2``, ``blender-4.5`` or ``robust``
+    * ``garbage``, ``core``: garbage and core matte (certainly not, or certainly, foreground): height x width,
+      float32 (0 to 1) or bool
+    * ``options``: Blender's settings, e.g. ``clip_black=0.1``, ``blur_pre=2``, ``despill_factor=0.5``
     """
     settings = dumped("options", {"profile": profile, **options})
     matte, cutout, deviations = _petcomp.key(image, screen, garbage, core, settings)
@@ -63,17 +65,17 @@ class CutOut:
 
     #: Height x width x 4, float32, scene-linear, premultiplied; trimmed to the object.
     rgba: npt.NDArray[np.float32]
-    #: What each channel lets through, as measured: height x width x 3, float32, 0 to 1.
+    #: Measured transmittance of each channel: height x width x 3, float32, 0 to 1.
     transmittance: npt.NDArray[np.float32]
     #: Convex hull, n x 2, float64, pixels of ``rgba``, clockwise as seen.
     hull: npt.NDArray[np.float64]
-    #: The part of the photo that it shows: x, y, width, height, pixels.
+    #: Region of the photo that ``rgba`` shows: x, y, width, height, pixels.
     roi: tuple[int, int, int, int]
-    #: Pixels of ``rgba`` for one pixel of the photo.
+    #: Pixels of ``rgba`` per pixel of the photo.
     scale: float
     #: Mean colour of the screen, scene-linear.
     screen: tuple[float, float, float]
-    #: Where the matte came from: ``physical``, ``key`` or ``outline``.
+    #: Source of the matte: ``physical``, ``key`` or ``outline``.
     method: str
     #: Mean matte on the screen, where it should be 0.
     residual_matte: float
@@ -85,11 +87,11 @@ class CutOut:
 
 
 def cut_out(image: npt.NDArray[Any], *, empty: npt.NDArray[Any] | None = None, **options: Any) -> CutOut:
-    """Cuts the one object out of a photo on a uniform screen.
+    """Cut out the single object of a photo on a uniform screen.
 
-    ``image`` and ``empty`` (a photo of the empty screen): height x width x 3, float32 (scene-linear) or
-    uint8 (sRGB). ``options`` are those of the list of photos (``method="key"``, ``soften_px=0.6``,
-    ``segment={...}``). Raises ``PhotoError`` where there is no usable object.
+    ``image`` and ``empty`` (a photo of the empty screen) are height x width x 3, float32 (scene-linear) or uint8
+    (sRGB). ``options`` are the keys of ``[cut_out]`` in a list of photos, e.g. ``method="key"``,
+    ``soften_px=0.6``, ``segment={...}``. Raises ``PhotoError`` if there is no usable object.
     """
     rgba, transmittance, text = _petcomp.cut_out(image, empty, dumped("options", options))
     record = loaded(text)

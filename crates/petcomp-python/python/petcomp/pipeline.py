@@ -1,4 +1,4 @@
-"""The pipeline: recipe and number in, labelled picture out."""
+"""The pipeline turns a recipe and a sample number into a labelled image."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MOST = 2**64
 
 
 def _number(name: str, value: Any) -> int:
-    """A whole number that the native half can hold."""
+    """Check a whole number that fits into 64 bits."""
     try:
         number = operator.index(value)
     except TypeError:
@@ -30,13 +30,14 @@ def _number(name: str, value: Any) -> int:
 
 
 class Pipeline:
-    """Everything that pictures are made from, opened once: ``Pipeline("recipe.toml")[k]``.
+    """An opened recipe, from which samples are generated: ``Pipeline("recipe.toml")[k]``.
 
-    ``recipe`` is a recipe file, or the same as plain data (its paths then relative to the working
-    folder). ``set`` changes values of it: ``{"scene.objects": 3}``. ``quality`` is ``draft``, ``normal``
-    or ``reference``. Picture ``k`` depends on nothing but the recipe, ``seed`` and ``k``, and is that of
-    ``petcomp dataset generate``. May be used from any thread, sent to other processes (which open the
-    same recipe anew, as it was read here), and is a context manager.
+    ``recipe`` is a recipe file, or plain data in its format (paths are then relative to the working folder).
+    ``set`` changes its values: ``{"scene.objects": 3}``. ``quality`` is ``draft``, ``normal`` or ``reference``.
+
+    Image ``k`` depends only on the recipe, ``seed`` and ``k``, and equals that of ``petcomp dataset generate``.
+    A pipeline may be used from any thread and sent to other processes, which reopen the recipe as it was read
+    here. It is a context manager.
     """
 
     def __init__(
@@ -49,7 +50,7 @@ class Pipeline:
     ) -> None:
         self._seed = _number("seed", seed)
         is_data = isinstance(recipe, Mapping)
-        # Data is named from the working folder.
+        # Paths in plain data are relative to the working folder.
         path = "" if is_data else path_of("recipe", recipe)
         self._name = "recipe" if is_data else os.path.abspath(path)
         self._native = _petcomp.Pipeline(
@@ -61,17 +62,17 @@ class Pipeline:
 
     @property
     def seed(self) -> int:
-        """Seed of its pictures."""
+        """Seed of the samples."""
         return self._seed
 
     @property
     def classes(self) -> list[str]:
-        """Names of the classes of its labels, in order."""
+        """Names of the classes, in order."""
         return self._native.class_names()
 
     @property
     def config(self) -> dict[str, Any]:
-        """The recipe with every default, as plain data."""
+        """The recipe including all defaults, as plain data."""
         config: dict[str, Any] = loaded(self._native.config_json())
         return config
 
@@ -79,30 +80,30 @@ class Pipeline:
         return self.sample(k)
 
     def sample(self, k: SupportsIndex, seed: int | None = None) -> Sample:
-        """Sample ``k``; of another seed where one is given."""
+        """Generate sample ``k``, optionally with another seed."""
         seed = self._seed if seed is None else _number("seed", seed)
         return Sample(self._native.sample(seed, _number("k", k)))
 
     def draw(self, k: SupportsIndex, seed: int | None = None) -> Scene:
-        """Scene ``k`` as the recipe draws it: objects not settled yet, exposure still open."""
+        """Draw scene ``k`` of the recipe, with objects not yet settled and exposure not yet set."""
         seed = self._seed if seed is None else _number("seed", seed)
         return Scene.from_dict(loaded(self._native.draw(seed, _number("k", k))))
 
     def take(self, scene: Scene | Mapping[str, Any]) -> Sample:
-        """Finds out what is unknown in a scene, renders it and labels it."""
+        """Resolve the unknowns of a scene, render it and label it."""
         return Sample(self._native.take(dumped("scene", scene)))
 
     def resolve(self, scene: Scene | Mapping[str, Any]) -> Scene:
-        """The scene with nothing left open: camera, resting poses, exposure."""
+        """Resolve all unknowns of a scene: camera, resting poses, exposure."""
         return Scene.from_dict(loaded(self._native.resolve(dumped("scene", scene))))
 
     def close(self) -> None:
-        """Lets go of assets and photos; what is asked of it after that raises ``ClosedError``."""
+        """Release assets and photos; any later use raises ``ClosedError``."""
         self._native.close()
 
     @property
     def closed(self) -> bool:
-        """Whether it is closed."""
+        """Whether the pipeline is closed."""
         return self._native.is_closed()
 
     def __enter__(self) -> Pipeline:
@@ -115,7 +116,7 @@ class Pipeline:
     __iter__ = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # What was read, whatever became of the file.
+        # The recipe as it was read, even if the file has changed since.
         return _opened_anew, (self._name, self._native.folder(), self._native.config_json(), self._seed)
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""A picture and its labels."""
+"""Samples: images with labels."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _COLORS = [(255, 80, 80), (80, 200, 255), (255, 210, 60), (120, 255, 120), (230,
 
 
 class Sample:
-    """A picture and its labels: what ``Pipeline`` and ``render`` make.
+    """An image and its labels, made by ``Pipeline`` or ``render``.
 
-    Everything is computed when it is first asked for. The labels are those that the recipe gives: an
-    object that gets none (``labels.obstructed``) is in ``labels`` only.
+    Everything is computed on first access. Labels follow the recipe: an object without one
+    (``labels.obstructed``) appears only in ``labels``.
     """
 
     def __init__(self, native: _petcomp.Sample) -> None:
@@ -39,12 +39,12 @@ class Sample:
         object_classes: Sequence[int],
         classes: Sequence[str],
     ) -> Sample:
-        """A picture from anywhere, to be written as a dataset.
+        """Create a sample from any image, to write it as part of a dataset.
 
-        ``image``: height x width x 3 or 4, float32 (scene-linear, premultiplied, alpha 0 to 1) or uint8 (sRGB).
-        ``masks``: one for each object, height x width, bool or float32 (a pixel belongs to the object where
-        it is above 0.5); where masks overlap, the last is in front. ``object_classes``: its class, a place
-        in ``classes``.
+        * ``image``: height x width x 3 or 4, float32 (scene-linear, premultiplied, alpha 0 to 1) or uint8 (sRGB)
+        * ``masks``: one per object, height x width, bool or float32 (above 0.5 is inside); where masks overlap,
+          the last is in front
+        * ``object_classes``: the class of each object, an index into ``classes``
         """
         numbers = [_class_number(number) for number in object_classes]
         return cls(_petcomp.Sample.from_masks(image, list(masks), numbers, class_names(classes)))
@@ -57,52 +57,51 @@ class Sample:
 
     @cached_property
     def image(self) -> npt.NDArray[np.uint8]:
-        """As a display shows it, on black: height x width x 3, uint8, sRGB.
+        """The image for display, over black: height x width x 3, uint8, sRGB.
 
-        Of ``Pipeline[k]`` as the program's file of it is read: with what a JPEG loses, where the recipe
-        writes those.
+        For ``Pipeline[k]`` it equals the program's decoded file, with JPEG's losses if the recipe writes JPEG.
         """
         return self._native.image()
 
     @cached_property
     def image_linear(self) -> npt.NDArray[np.float32]:
-        """Height x width x 4, float32, scene-linear (Rec. 709 primaries), premultiplied.
+        """The image: height x width x 4, float32, scene-linear (Rec. 709 primaries), premultiplied.
 
-        The sample's own pixels, moved: whoever changes them changes what ``generate`` writes.
+        This is the sample's own memory: changes to it also change what ``generate`` writes.
         """
         return self._native.image_linear()
 
     @cached_property
     def depth(self) -> npt.NDArray[np.float32]:
-        """Distance of the object in front along the optical axis: height x width, float32, metres.
+        """Depth of the front object along the optical axis: height x width, float32, metres.
 
-        Infinite where there is none, and everywhere in a sample ``from_masks``, whose distances nobody tells.
+        Infinite where there is no object, and everywhere in a sample ``from_masks``, whose depth is unknown.
         """
         return self._native.depth()
 
     @cached_property
     def ids(self) -> npt.NDArray[np.uint32]:
-        """Number of the object in front: height x width, uint32; 0 where there is none."""
+        """Id of the front object: height x width, uint32; 0 where there is none."""
         return self._native.ids()
 
     @cached_property
     def boxes(self) -> npt.NDArray[np.float64]:
-        """Left, top, right and bottom edge of each labelled object: n x 4, float64, pixels."""
+        """Bounding box of each labelled object: n x 4 (left, top, right, bottom), float64, pixels."""
         return self._native.boxes()
 
     @cached_property
     def object_ids(self) -> npt.NDArray[np.int64]:
-        """Number of each labelled object: n, int64."""
+        """Id of each labelled object: n, int64."""
         return np.array([id for id, _, _ in self._native.labelled()], dtype=np.int64)
 
     @cached_property
     def classes(self) -> npt.NDArray[np.int64]:
-        """Class of each labelled object, a place in ``class_names``: n, int64."""
+        """Class of each labelled object, an index into ``class_names``: n, int64."""
         return np.array([number for _, number, _ in self._native.labelled()], dtype=np.int64)
 
     @cached_property
     def ignored(self) -> npt.NDArray[np.bool_]:
-        """Whether finding it is neither right nor wrong (COCO's ``iscrowd``): n, bool."""
+        """Whether finding the object counts neither as right nor as wrong (COCO's ``iscrowd``): n, bool."""
         return np.array([ignored for _, _, ignored in self._native.labelled()], dtype=np.bool_)
 
     @cached_property
@@ -112,33 +111,33 @@ class Sample:
 
     @cached_property
     def masks(self) -> list[dict[str, Any]]:
-        """Which pixels belong to each labelled object, as COCO's compressed run lengths.
+        """Mask of each labelled object as COCO's compressed RLE.
 
         ``{"size": [height, width], "counts": "..."}``, which pycocotools decodes.
         """
         return [loaded(self._native.mask_json(i)) for i in range(len(self.classes))]
 
     def mask_arrays(self) -> npt.NDArray[np.bool_]:
-        """The same as arrays: n x height x width, bool."""
+        """Return the masks as arrays: n x height x width, bool."""
         width, height = self.size
         masks = [self._native.mask(i) for i in range(len(self.classes))]
         return np.stack(masks) if masks else np.zeros((0, height, width), dtype=np.bool_)
 
     @cached_property
     def labels(self) -> dict[str, Any]:
-        """Everything that is known of every object, labelled or not, as plain data."""
+        """Everything known about every object, labelled or not, as plain data."""
         document: dict[str, Any] = loaded(self._native.labels_json())
         return document
 
     @cached_property
     def scene(self) -> Scene | None:
-        """The scene that it is a picture of, with nothing left open; None where there is none."""
+        """The resolved scene that the image shows; None if there is none."""
         text = self._native.scene_json()
         return None if text is None else Scene.from_dict(loaded(text))
 
     @cached_property
     def draws(self) -> dict[str, float]:
-        """Every value that was drawn for it, by its path."""
+        """Every value drawn for the sample, by its path."""
         return dict(self._native.draws())
 
     def __len__(self) -> int:
@@ -149,7 +148,7 @@ class Sample:
         return f"Sample({width} x {height}, {len(self)} labels)"
 
     def _with_boxes(self) -> npt.NDArray[np.uint8]:
-        """The picture with its boxes drawn on it."""
+        """Return the image with its boxes drawn on it."""
         shown = self.image.copy()
         for box, number in zip(self.boxes, self.classes):
             _draw_box(shown, box, _COLORS[number % len(_COLORS)])

@@ -1,4 +1,4 @@
-"""Scenes: everything that is known of one picture, unknowns included."""
+"""Scenes: the description of one image, including its unknowns."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ __all__ = ["Scene"]
 
 
 class Scene:
-    """One picture to make: what is in it, where, seen by which camera, under which light.
+    """Description of one image to make: objects, poses, camera and lights.
 
-    Plain data under the names of scene files (``docs/formats.md``): ``image`` (width and height, pixels),
-    ``surface`` (``{"size": [metres, metres]}``), ``camera`` (a ``Camera``, or ``{"rectangle": {...}}``),
-    ``objects``, ``lights``, ``plate``, ``ambient``, ``exposure`` and more. Checked when it is made; an
-    impossible value is named by its path. A scene is never changed: ``replace`` gives another.
+    A scene is plain data with the keys of scene files (``docs/formats.md``): ``image`` (width and height,
+    pixels), ``surface`` (``{"size": [metres, metres]}``), ``camera`` (a ``Camera``, or ``{"rectangle": {...}}``),
+    ``objects``, ``lights``, ``plate``, ``ambient``, ``exposure`` and more. It is validated on creation; errors
+    name an invalid value by its path. Scenes are immutable: ``replace`` returns a new one.
     """
 
     __slots__ = ("_fields",)
@@ -39,29 +39,29 @@ class Scene:
 
     @classmethod
     def from_dict(cls, document: Mapping[str, Any]) -> Scene:
-        """From plain data, as scene files have it."""
+        """Create a scene from plain data in the format of scene files."""
         scene = cls.__new__(cls)
         scene._fields = loaded(_petcomp.check_scene(dumped("scene", document)))
         return scene
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Scene:
-        """From a scene file, TOML or JSON."""
+        """Read a scene file, TOML or JSON."""
         scene = cls.__new__(cls)
         scene._fields = loaded(_petcomp.read_scene(path_of("path", path)))
         return scene
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """To a scene file, TOML or JSON by its name."""
+        """Write a scene file, TOML or JSON depending on its name."""
         _petcomp.write_scene(path_of("path", path), dumped("scene", self._fields))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data, as scene files have it; the caller's to change."""
+        """Return a copy as plain data in the format of scene files."""
         document: dict[str, Any] = json.loads(json.dumps(self._fields))
         return document
 
     def replace(self, **fields: Any) -> Scene:
-        """The same scene with other fields."""
+        """Return the same scene with other values of these fields."""
         camera = fields.get("camera")
         if isinstance(camera, Camera):
             fields["camera"] = {"known": camera.to_dict()}

@@ -1,4 +1,4 @@
-"""A picture from what is in memory: cards over a plate."""
+"""Rendering from data in memory: cards over a plate."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ __all__ = ["Card", "Shot", "render"]
 class Card:
     """A textured, see-through rectangle in space."""
 
-    #: Its name in labels; not 0, and no other card's.
+    #: Unique id in labels, not 0.
     id: int
     #: Height x width x 4, float32 (scene-linear, premultiplied) or uint8 (sRGB, straight alpha).
     texture: npt.NDArray[Any]
     #: Width and height, metres.
     size: tuple[float, float]
-    #: Its centre in the world, metres.
+    #: Centre in the world, metres.
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    #: 3 x 3 rotation of the card in the world, or turns about x, then y, then z, radians.
+    #: 3 x 3 rotation of the card in the world, or angles about x, then y, then z, radians.
     rotation: Any = (0.0, 0.0, 0.0)
-    #: Its class; None for a distractor, which is drawn like any other but has no label.
+    #: Class; None for a distractor, which is drawn like any other card but not labelled.
     class_: int | None = 0
 
     def _place(self) -> tuple[Any, ...]:
@@ -49,7 +49,7 @@ def _id(name: str, value: Any) -> int:
 
 
 def _rotation(value: Any) -> list[Any]:
-    """Rows of a matrix, from one or from three turns."""
+    """Rows of a rotation matrix, from a matrix or three angles."""
     if np.shape(value) != (3,):
         return _floats("rotation", value, (3, 3))
     x, y, z = _floats("rotation", value, (3,))
@@ -63,18 +63,18 @@ def _rotation(value: Any) -> list[Any]:
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """Everything a picture is made of, in memory and known.
+    """Everything needed to render an image, in memory and without unknowns.
 
     ``Shot(camera).with_plate(plate).with_card(card).with_light(light).with_ambient(1.0)``
     """
 
-    #: The camera; its ``image`` is the size of the picture.
+    #: The camera; its ``image`` sets the image size.
     camera: Camera
-    #: Background: height x width x 3, float32 (scene-linear) or uint8 (sRGB); None is transparent.
+    #: Background: height x width x 3, float32 (scene-linear) or uint8 (sRGB); None for a transparent one.
     plate: npt.NDArray[Any] | None = None
     #: Cards, in any order.
     cards: tuple[Card, ...] = ()
-    #: Area lights as scene files have them: ``position``, ``size`` (metres), ``power`` (watts), ...
+    #: Area lights in the format of scene files: ``position``, ``size`` (metres), ``power`` (watts), ...
     lights: tuple[Mapping[str, Any], ...] = ()
     #: Radiance of a constant environment, scene-linear.
     ambient: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -82,32 +82,32 @@ class Shot:
     exposure: float = 1.0
     #: Names of the classes, in order.
     classes: tuple[str, ...] = ("object",)
-    #: How finely it is sampled: the table ``[render]`` of a recipe.
+    #: Sampling settings: the table ``[render]`` of a recipe.
     options: Mapping[str, Any] = field(default_factory=dict)
-    #: How labels are made: the table ``[labels]`` of a recipe.
+    #: Label settings: the table ``[labels]`` of a recipe.
     labels: Mapping[str, Any] = field(default_factory=dict)
 
     def with_plate(self, plate: npt.NDArray[Any]) -> Shot:
-        """With a background of the camera's size."""
+        """Return the shot with a background of the camera's image size."""
         return replace(self, plate=plate)
 
     def with_card(self, card: Card) -> Shot:
-        """With one more card."""
+        """Return the shot with another card."""
         return replace(self, cards=(*self.cards, card))
 
     def with_light(self, light: Mapping[str, Any]) -> Shot:
-        """With one more light."""
+        """Return the shot with another light."""
         return replace(self, lights=(*self.lights, light))
 
     def with_ambient(self, ambient: float | Sequence[float]) -> Shot:
-        """With a constant environment of this radiance."""
+        """Return the shot with a constant environment of this radiance."""
         color = (ambient,) * 3 if isinstance(ambient, (int, float)) else ambient
         red, green, blue = _floats("ambient", color, (3,))
         return replace(self, ambient=(red, green, blue))
 
 
 def render(shot: Shot) -> Sample:
-    """Renders a shot and labels it: the picture and its labels come from the same samples."""
+    """Render and label a shot; the image and its labels come from the same render samples."""
     if not isinstance(shot, Shot):
         raise ArgumentTypeError(f"shot: {type(shot).__name__}, expected a Shot")
     if not isinstance(shot.camera, Camera):

@@ -1,4 +1,4 @@
-"""Pictures made while a detector learns: a data set for PyTorch, which only this module imports."""
+"""A PyTorch dataset of images generated during training; only this module imports PyTorch."""
 
 from __future__ import annotations
 
@@ -19,12 +19,13 @@ __all__ = ["Dataset", "collate", "to_tensors"]
 
 
 def to_tensors(sample: Sample) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-    """A sample as torchvision's detectors take it.
+    """Convert a sample to the input of torchvision's detectors.
 
-    The picture: 3 x height x width, float32, 0 to 1, sRGB. The target: ``boxes`` (n x 4, float32: left,
-    top, right, bottom, pixels), ``labels`` (n, int64: class + 1, for 0 is the background), ``area``
-    (n, float32) and ``iscrowd`` (n, int64, all 0: these detectors would learn a crowd as an object, so what is
-    to be ignored is left out). ``Dataset`` adds ``image_id``, which a sample alone does not know.
+    Image: 3 x height x width, float32, 0 to 1, sRGB.
+
+    Target: ``boxes`` (n x 4, float32: left, top, right, bottom, pixels), ``labels`` (n, int64: class + 1, since 0
+    is the background), ``area`` (n, float32) and ``iscrowd`` (n, int64, all 0). Ignored objects are left out,
+    since these detectors would learn a crowd as an object. ``Dataset`` adds ``image_id``.
     """
     picture = torch.from_numpy(sample.image).permute(2, 0, 1).to(torch.float32) / 255
     keep = ~sample.ignored
@@ -40,13 +41,13 @@ def to_tensors(sample: Sample) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
 
 
 class Dataset(_Dataset[Any]):
-    """Samples ``0`` to ``count - 1`` of a recipe, made when they are asked for.
+    """Samples ``0`` to ``count - 1`` of a recipe, generated on access.
 
-    Sample ``k`` is that of ``petcomp dataset generate``, whichever worker makes it, forked or spawned.
-    Each worker opens the recipe once and computes with ``threads`` threads (1 where there are workers,
-    which share the processors already, and the memory for cut-outs and photos). ``transform`` gets the
-    ``Sample``; by default ``to_tensors``, whose target then has ``k`` as its ``image_id``. What leaves a worker
-    must hold no ``Sample``, which stays in the process that made it.
+    Sample ``k`` equals that of ``petcomp dataset generate``, whichever worker makes it, forked or spawned. Each
+    worker opens the recipe once and computes with ``threads`` threads (default 1, because workers already share
+    the processors, and the memory for cut-outs and photos). ``transform`` receives the ``Sample``; the default is
+    ``to_tensors``, whose target then has ``k`` as its ``image_id``. A worker must not return a ``Sample``, which
+    cannot leave the process that made it.
     """
 
     def __init__(
@@ -63,7 +64,7 @@ class Dataset(_Dataset[Any]):
         self._count = _number("count", count)
         self._transform = transform
         self._threads = _number("threads", threads)
-        # Opened here, so that what is wrong with the recipe is said at once; and shared by forks.
+        # Open it here to report errors in the recipe at once, and to share it with forks.
         self._pipeline = Pipeline(recipe, seed=seed, set=set, quality=quality)
         self._worker_process: int | None = None
 
@@ -86,7 +87,7 @@ class Dataset(_Dataset[Any]):
         return made
 
     def _settle_in(self) -> None:
-        """In a worker, once."""
+        """Set up a worker, once."""
         from . import set_threads
 
         process, worker = os.getpid(), torch.utils.data.get_worker_info()
@@ -98,7 +99,7 @@ class Dataset(_Dataset[Any]):
 
 
 def _stays(sample: Sample) -> tuple[Any, ...]:
-    """A sample on its way out of a worker: an error here would be lost, and the loader wait for ever."""
+    """Pickle a sample that leaves a worker; raising here would lose the error and hang the loader."""
     return _refuse_sample, ()
 
 
@@ -107,6 +108,6 @@ def _refuse_sample() -> None:
 
 
 def collate(batch: list[tuple[Any, Any]]) -> tuple[list[Any], list[Any]]:
-    """Pictures and targets of a batch as lists: each picture has its own number of boxes."""
+    """Return images and targets of a batch as lists, since each image has its own number of boxes."""
     pictures, targets = zip(*batch)
     return list(pictures), list(targets)
