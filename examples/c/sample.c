@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Ends the program where a call did not go well. */
+/* Exits if a call failed. */
 static void check(petcomp_status status)
 {
     if (status != PETCOMP_STATUS_OK) {
@@ -31,7 +31,7 @@ static void write_file(const char *path, const char *head, const void *bytes, si
         exit(3);
 }
 
-/* Grey film of 30 % over a green screen. */
+/* 30 % grey film over a green screen. */
 static void key_a_pixel(void)
 {
     const float pixel[4] = {0.22f, 0.71f, 0.22f, 1.0f}, screen[3] = {0.1f, 0.8f, 0.1f};
@@ -40,7 +40,7 @@ static void key_a_pixel(void)
     printf("matte %.6f\n", matte);
 }
 
-/* A tray of 0.56 x 0.37 m in a photo of 1280 x 853 pixels. */
+/* A 0.56 x 0.37 m tray in a 1280 x 853 pixel photo. */
 static void solve_a_camera(void)
 {
     const double corners[8] = {236, 239, 1020, 216, 1009, 701, 276, 739}, size[2] = {0.56, 0.37};
@@ -62,7 +62,7 @@ static void write_picture(petcomp_sample sample, const char *path)
     free(rgb);
 }
 
-/* The first call only asks how long the text is. */
+/* The first call only queries the length of the text. */
 static void write_labels(petcomp_sample sample, const char *path)
 {
     size_t length = 0;

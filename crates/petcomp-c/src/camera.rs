@@ -1,4 +1,4 @@
-//! The camera that sees a rectangle of known size at four corners.
+//! Solves the camera from the four corners of a rectangle of known size.
 #![expect(unsafe_code, reason = "called from C")]
 
 use crate::memory::{array, put, store_text};
@@ -14,8 +14,7 @@ use std::ffi::c_char;
 pub struct CameraModel {
     /// Focal lengths along x and y, pixels.
     pub focal_px: [f64; 2],
-    /// Where the optical axis meets the picture, pixels; (0, 0) is the upper left corner of the
-    /// upper left pixel.
+    /// Principal point, pixels; (0, 0) is the top left corner of the top left pixel.
     pub principal_px: [f64; 2],
     /// Three rows of rotation and translation (metres): camera point = matrix * (world point, 1).
     pub camera_from_world: [[f64; 4]; 3],
@@ -32,19 +31,23 @@ impl From<&Camera> for CameraModel {
     }
 }
 
-/// Solves the camera that sees a rectangle of known size at four corners.
+/// Solves the camera from the four corners of a rectangle of known size.
 ///
-/// `corners_px`: eight numbers, x and y of top left, top right, bottom right and bottom left, pixels.
-/// `size_m`: width and height of the rectangle, metres. `image`: width and height of the picture,
-/// pixels. `focal_px`: the focal length where it is known, otherwise 0. The rectangle becomes the
-/// world's plane z = 0, centred, +x along its width, +z towards the camera.
-///
-/// `report`, where it is not null, gets the text of petcomp's NAME.camera.json: the camera, standard
-/// deviations of all that was solved, warnings. `report_length`, where it is not null, gets the bytes
-/// that the text takes with its NUL. With too small a buffer for it `camera` is still written.
+/// * `corners_px`: eight numbers, x and y of top left, top right, bottom right and bottom left,
+///   pixels
+/// * `size_m`: width and height of the rectangle, metres
+/// * `image`: width and height of the image, pixels
+/// * `focal_px`: focal length, or 0 if unknown
+/// * `camera`: receives the camera. The rectangle becomes the world plane z = 0, centred, +x along
+///   its width, +z towards the camera
+/// * `report`: if not null, receives the text of petcomp's NAME.camera.json: the camera, standard
+///   deviations of everything solved, warnings. If the buffer is too small, `camera` is still
+///   written
+/// * `report_length`: if not null, receives the size of that text in bytes, including its NUL
 ///
 /// # Safety
-/// Each pointer is null or points to what is said here; `report` has room for `report_capacity` bytes.
+/// Each pointer is null or points to memory as described; `report` has room for `report_capacity`
+/// bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn petcomp_camera_solve(
     corners_px: *const f64,

@@ -1,14 +1,14 @@
-//! What C holds: numbers that are never used twice, so that what was closed is known to be.
+//! Handles for C: numbers that are never reused, so that use of a closed handle is detected.
 
 use crate::status::{Failure, Status};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Of all tables together: a sample's number is no pipeline's.
+/// Shared by all tables: a sample and a pipeline never have the same number.
 static NEXT: AtomicU64 = AtomicU64::new(1);
 
-/// Everything of one kind that is open.
+/// All open values of one kind.
 pub(crate) struct Handles<T> {
     kind: &'static str,
     open: Mutex<BTreeMap<u64, Arc<T>>>,
@@ -33,7 +33,7 @@ impl<T> Handles<T> {
         value.ok_or_else(|| self.closed(id))
     }
 
-    /// Who still works with it may finish.
+    /// Calls that still use the value may finish.
     pub(crate) fn close(&self, id: u64) -> Result<(), Failure> {
         let value = self.locked().remove(&id);
         value.map(drop).ok_or_else(|| self.closed(id))

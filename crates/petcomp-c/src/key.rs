@@ -9,19 +9,19 @@ use std::ffi::c_char;
 
 const CHANNELS: usize = 4;
 
-/// Keys a picture as Blender's Keying node does, to the bit.
+/// Keys an image exactly like Blender's Keying node, bit for bit.
 ///
-/// `rgba`: `height` rows of `width` pixels of four floats, scene-linear (Rec. 709 primaries), alpha
-/// premultiplied; from row to row it is `row_stride` floats, at least 4 * `width`. Rows without a gap
-/// are read where they are. `screen`: the colour of the screen, three scene-linear floats.
-/// `options`: a JSON object with Blender's settings, as {"profile": "blender-4.5", "clip_black":
-/// 0.1}, or null for the defaults.
-///
-/// `matte` gets `width` * `height` floats, 0 to 1; `cutout` four times as many, scene-linear,
-/// premultiplied, its rows without gaps. Each of them may be null.
+/// * `rgba`: `height` rows of `width` pixels of four floats, scene-linear (Rec. 709 primaries),
+///   alpha premultiplied; rows without gaps are read in place
+/// * `row_stride`: distance between rows in floats, at least 4 * `width`
+/// * `screen`: colour of the screen, three scene-linear floats
+/// * `options`: JSON object with Blender's settings, e.g. {"profile": "blender-4.5", "clip_black":
+///   0.1}, or null for the defaults
+/// * `matte`: null, or receives `width` * `height` floats, 0 to 1
+/// * `cutout`: null, or receives four times as many, scene-linear, premultiplied, rows without gaps
 ///
 /// # Safety
-/// Each pointer is null or points to what is said here.
+/// Each pointer is null or points to memory as described.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn petcomp_key(
     rgba: *const f32,
@@ -60,7 +60,7 @@ fn check_size(size: [usize; 2], row_stride: usize) -> Result<(), Failure> {
         .check_size(size)
         .map_err(|what| Failure::argument("width, height", what))?;
     let least = width * CHANNELS;
-    // What memory can hold at all.
+    // The most that memory can hold.
     let most = isize::MAX.unsigned_abs() / size_of::<f32>() / height;
     let expected = match row_stride {
         stride if stride < least => format!("at least {least}"),
@@ -106,7 +106,7 @@ unsafe fn options_of(options: *const c_char) -> Result<KeyOptions, Failure> {
     }
     // SAFETY: promised.
     let json = unsafe { text("options", options) }?;
-    // A list would be read as the settings in their order.
+    // A list would be parsed as the settings in order.
     if !json.trim_start().starts_with('{') {
         let what = r#"not a JSON object, expected one such as {"clip_black": 0.1}"#;
         return Err(Error::value("options", what).into());

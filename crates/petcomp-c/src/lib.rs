@@ -1,12 +1,12 @@
-//! petcomp for C: key a picture, solve a camera, make labelled samples of a recipe.
+//! petcomp for C: key an image, solve a camera, make labelled samples of a recipe.
 //!
-//! `include/petcomp.h` is made from this crate; `docs/c.md` has an example. Every function returns a
-//! [`Status`]; what went wrong is said by [`petcomp_error_message`]. No panic and no exception leaves
-//! a function. All of them may be called from any thread at any time; a pipeline may be closed while
-//! another thread still makes a sample of it, which then ends as usual.
+//! `include/petcomp.h` is generated from this crate; `docs/c.md` has an example. Every function
+//! returns a [`Status`]; [`petcomp_error_message`] describes the error. No panic and no exception
+//! leaves a function. You may call any function from any thread at any time. A pipeline closed
+//! while another thread makes a sample of it stays open until that sample is finished.
 //!
-//! Pointers must be null or point to as many values as the function says. Null, misaligned pointers,
-//! sizes that cannot be, text that is not UTF-8 and what was closed are refused, not followed.
+//! Pointers must be null or point to as many values as the function requires. Null and misaligned
+//! pointers, impossible sizes, text that is not UTF-8 and closed handles are rejected.
 
 mod camera;
 mod handles;

@@ -1,21 +1,21 @@
-//! The caller's memory: checked as far as a pointer can be, read in place, written by copying.
+//! The caller's memory: pointers checked as far as possible, read in place, written by copying.
 #![expect(unsafe_code, reason = "C owns the memory")]
 
 use crate::status::{Failure, Status};
 use bytemuck::Pod;
 use std::ffi::{CStr, c_char};
 
-/// Values of the caller, where they are.
+/// Values of the caller, read in place.
 ///
 /// # Safety
-/// `pointer` is null or points to `count` values that nobody writes to while they are used.
+/// `pointer` is null or points to `count` values that are not written to while in use.
 pub(crate) unsafe fn slice<'a, T: Pod>(
     name: &str,
     pointer: *const T,
     count: usize,
 ) -> Result<&'a [T], Failure> {
     check(name, pointer, count)?;
-    // SAFETY: checked as far as can be; the rest is promised.
+    // SAFETY: checked as far as possible; the rest is promised.
     Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
 }
 
@@ -46,7 +46,7 @@ pub(crate) unsafe fn store<T: Pod>(
         return Err(too_small(name, capacity, values.len()));
     }
     check(name, buffer, values.len())?;
-    // SAFETY: there is room; our values cannot lie in the caller's memory.
+    // SAFETY: there is room; our values do not overlap the caller's memory.
     unsafe { std::ptr::copy_nonoverlapping(values.as_ptr(), buffer, values.len()) };
     Ok(())
 }
@@ -60,10 +60,10 @@ pub(crate) unsafe fn put<T: Pod>(name: &str, value: T, place: *mut T) -> Result<
     unsafe { store(name, &[value], place, 1) }
 }
 
-/// A text of the caller.
+/// Text of the caller.
 ///
 /// # Safety
-/// `pointer` is null or points to a text that ends with a NUL.
+/// `pointer` is null or points to text that ends with a NUL.
 pub(crate) unsafe fn text<'a>(name: &str, pointer: *const c_char) -> Result<&'a str, Failure> {
     check(name, pointer, 1)?;
     // SAFETY: promised.
@@ -74,7 +74,7 @@ pub(crate) unsafe fn text<'a>(name: &str, pointer: *const c_char) -> Result<&'a 
 /// Texts of the caller.
 ///
 /// # Safety
-/// `pointer` is null, where `count` is 0, or points to so many [`text`]s.
+/// `pointer` is null (if `count` is 0) or points to `count` [`text`]s.
 pub(crate) unsafe fn texts<'a>(
     name: &str,
     pointer: *const *const c_char,
@@ -91,8 +91,8 @@ pub(crate) unsafe fn texts<'a>(
     texts.collect()
 }
 
-/// Writes a text with its NUL into a buffer of the caller, and how many bytes that takes to `length`,
-/// where it is not null: first of all, so that a caller with too small a buffer learns it.
+/// Writes text with its NUL into a buffer of the caller, and its size in bytes to `length`, if that
+/// is not null. The size comes first, so that it is known even if the buffer is too small.
 ///
 /// # Safety
 /// As [`store`].

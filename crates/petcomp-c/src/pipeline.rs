@@ -1,4 +1,4 @@
-//! A recipe, opened.
+//! Open recipes.
 #![expect(unsafe_code, reason = "called from C")]
 
 use crate::handles::Handles;
@@ -11,11 +11,11 @@ use petcomp::io::Override;
 use std::ffi::c_char;
 use std::sync::Arc;
 
-/// A recipe with its assets and photos, opened once. 0 is none.
+/// An open recipe with its assets and photos. 0 is no pipeline.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct PipelineHandle {
-    /// Never used twice.
+    /// Never reused.
     pub id: u64,
 }
 
@@ -33,13 +33,14 @@ pub(crate) fn opened(
     PIPELINES.get(pipeline.id)
 }
 
-/// Opens a recipe file, the assets and the photos that it names.
+/// Opens a recipe file and the assets and photos that it names.
 ///
-/// `overrides`: `override_count` texts as `scene.objects=[5,15]`, which change values of the recipe;
-/// null where there are none. `pipeline` gets the handle, to be closed by petcomp_pipeline_close().
+/// * `overrides`: `override_count` strings that change values of the recipe, e.g.
+///   `scene.objects=[5,15]`; may be null if there are none
+/// * `pipeline`: receives the handle; close it with petcomp_pipeline_close()
 ///
 /// # Safety
-/// Each pointer is null or points to what is said here; texts end with a NUL.
+/// Each pointer is null or points to memory as described; strings end with a NUL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn petcomp_pipeline_open(
     recipe: *const c_char,
@@ -71,7 +72,7 @@ fn open(recipe: &str, overrides: &[&str]) -> Result<OpenedPipeline> {
     })
 }
 
-/// Closes a pipeline. Its samples stay.
+/// Closes a pipeline. Its samples remain valid.
 #[unsafe(no_mangle)]
 pub extern "C" fn petcomp_pipeline_close(pipeline: PipelineHandle) -> Status {
     call(|| PIPELINES.close(pipeline.id))

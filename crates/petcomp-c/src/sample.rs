@@ -1,4 +1,4 @@
-//! A labelled picture.
+//! Labelled images.
 #![expect(unsafe_code, reason = "called from C")]
 
 use crate::handles::Handles;
@@ -12,15 +12,15 @@ use petcomp::{Error, Image, Srgb8};
 use serde::Serialize;
 use std::ffi::c_char;
 
-/// A picture and its labels. 0 is none.
+/// An image and its labels. 0 is no sample.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct SampleHandle {
-    /// Never used twice.
+    /// Never reused.
     pub id: u64,
 }
 
-/// A sample, its labels as JSON, and the file that a dataset has of it.
+/// A sample, its labels as JSON, and how a dataset would write its file.
 struct Made {
     sample: Sample,
     labels: String,
@@ -30,7 +30,7 @@ struct Made {
 }
 
 impl Made {
-    /// What whoever reads its file sees.
+    /// The image as decoded from its file.
     fn shown(&self) -> Result<Image<Srgb8>, Error> {
         self.pictures.shown(&self.sample.frame, self.seed, self.k)
     }
@@ -38,7 +38,7 @@ impl Made {
 
 static SAMPLES: Handles<Made> = Handles::new("sample");
 
-/// What `petcomp_sample_labels` says.
+/// The document of `petcomp_sample_labels`.
 #[derive(Serialize)]
 struct LabelDocument<'a> {
     width: usize,
@@ -58,14 +58,14 @@ struct LabelEntry<'a> {
     mask: &'a RleMask,
 }
 
-/// Makes sample `k` of a pipeline: the picture that `petcomp dataset generate --seed SEED` writes
-/// under that number, whatever was made before.
+/// Makes sample `k` of a pipeline: the image that `petcomp dataset generate --seed SEED` writes
+/// under that number, regardless of other samples made before.
 ///
-/// `sample` gets the handle, to be given back by petcomp_sample_free(). Several threads may make
-/// samples at once; each call also works on all cores by itself (RAYON_NUM_THREADS).
+/// `sample` receives the handle; free it with petcomp_sample_free(). Several threads may make
+/// samples at once; each call uses all cores (RAYON_NUM_THREADS sets how many).
 ///
 /// # Safety
-/// Each pointer is null or points to what is said here.
+/// Each pointer is null or points to memory as described.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn petcomp_sample_make(
     pipeline: PipelineHandle,
@@ -123,7 +123,7 @@ fn entry<'a>(label: &LabelledObject<'a>, extent: Extent) -> LabelEntry<'a> {
 /// Width and height of a sample, pixels.
 ///
 /// # Safety
-/// `width` and `height` are null or can be written to.
+/// `width` and `height` are null or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn petcomp_sample_size(
     sample: SampleHandle,
@@ -140,8 +140,8 @@ pub unsafe extern "C" fn petcomp_sample_size(
     })
 }
 
-/// The picture as a display shows it, with what a JPEG loses where the recipe writes those: rows
-/// without gaps, three bytes a pixel, sRGB. `capacity` is in bytes, at least 3 * width * height.
+/// Copies the image for display, with JPEG's losses if the recipe writes JPEG: rows without gaps,
+/// three bytes per pixel, sRGB. `capacity` is in bytes, at least 3 * width * height.
 ///
 /// # Safety
 /// `rgb` is null or has room for `capacity` bytes.
@@ -158,8 +158,8 @@ pub unsafe extern "C" fn petcomp_sample_srgb8(
     })
 }
 
-/// The picture in scene-linear light (Rec. 709 primaries): rows without gaps, four floats a pixel,
-/// alpha premultiplied. `capacity` is in floats, at least 4 * width * height.
+/// Copies the image in scene-linear light (Rec. 709 primaries): rows without gaps, four floats per
+/// pixel, alpha premultiplied. `capacity` is in floats, at least 4 * width * height.
 ///
 /// # Safety
 /// `rgba` is null or has room for `capacity` floats.
@@ -177,12 +177,13 @@ pub unsafe extern "C" fn petcomp_sample_linear(
     })
 }
 
-/// The labels as JSON: {"width", "height", "classes": names, "objects": [{"id", "class": place in
-/// the names, "ignored", "box": [left, top, right, bottom] in pixels, "visible_fraction": share that is
-/// seen, "mask": COCO's compressed run lengths}]}, as the recipe's [labels] want them.
+/// Copies the labels as JSON, made according to the recipe's table `labels`: {"width", "height",
+/// "classes": names, "objects": [{"id", "class": index into the names, "ignored", "box": [left,
+/// top, right, bottom] in pixels, "visible_fraction": visible share, "mask": COCO's compressed
+/// RLE}]}.
 ///
-/// `length`, where it is not null, gets the bytes that the text takes with its NUL; with too small a
-/// buffer nothing else is written.
+/// `length`, if not null, receives the size of the text in bytes, including its NUL. If the buffer
+/// is too small, nothing else is written.
 ///
 /// # Safety
 /// `json` is null or has room for `capacity` bytes.
@@ -200,7 +201,7 @@ pub unsafe extern "C" fn petcomp_sample_labels(
     })
 }
 
-/// Gives a sample's memory back.
+/// Frees a sample.
 #[unsafe(no_mangle)]
 pub extern "C" fn petcomp_sample_free(sample: SampleHandle) -> Status {
     call(|| SAMPLES.close(sample.id))

@@ -1,4 +1,4 @@
-//! What a call came to, and what went wrong in words.
+//! Status codes and error messages.
 #![expect(unsafe_code, reason = "names that C links")]
 
 use petcomp::Error;
@@ -7,29 +7,29 @@ use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What a call came to. petcomp_error_message() says the rest.
+/// Result of a call. petcomp_error_message() describes an error.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// It is done.
+    /// Success.
     Ok = 0,
-    /// A pointer, size or text that cannot be right.
+    /// An invalid pointer, size or text.
     BadArgument = 1,
-    /// A buffer that is too small; nothing was written to it.
+    /// A buffer is too small; nothing was written to it.
     BufferTooSmall = 2,
-    /// A pipeline or sample that was closed, or never was one.
+    /// A pipeline or sample that was closed or never existed.
     Closed = 3,
-    /// A file that cannot be read or understood.
+    /// A file that cannot be read or parsed.
     File = 4,
-    /// A value in a document that cannot be right.
+    /// An invalid value in a document.
     Field = 5,
-    /// A value of an option that cannot be right.
+    /// An invalid value of an option.
     Value = 6,
-    /// A photo in which no usable object was found.
+    /// A photo without a usable object.
     Photo = 7,
     /// Corners that no camera can have seen.
     Camera = 8,
-    /// Objects that would not come to rest.
+    /// Objects that did not come to rest.
     Unsettled = 9,
     /// A bug in petcomp: please report it.
     Internal = 10,
@@ -46,7 +46,7 @@ impl Failure {
         Self { status, message }
     }
 
-    /// An argument that cannot be right: its name, its value and what was expected.
+    /// An invalid argument: its name, its value and what was expected.
     pub(crate) fn argument(name: &str, what: impl std::fmt::Display) -> Self {
         Self::new(Status::BadArgument, format!("{name}: {what}"))
     }
@@ -74,7 +74,7 @@ thread_local! {
     static MESSAGE: RefCell<CString> = RefCell::default();
 }
 
-/// Does the work of a call; no panic gets past it.
+/// Does the work of a call; no panic leaves it.
 pub(crate) fn call(work: impl FnOnce() -> Result<(), Failure>) -> Status {
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(())) => ended(Status::Ok, ""),
@@ -84,7 +84,7 @@ pub(crate) fn call(work: impl FnOnce() -> Result<(), Failure>) -> Status {
 }
 
 fn ended(status: Status, message: &str) -> Status {
-    // A NUL would end it; a thread that ends has no messages any more.
+    // A NUL would truncate the message; an ending thread has no messages any more.
     let message = CString::new(message.replace('\0', " ")).unwrap_or_default();
     let _ = MESSAGE.try_with(|last| last.replace(message));
     status
@@ -99,15 +99,15 @@ fn panic_message(panic: &(dyn Any + Send)) -> String {
     )
 }
 
-/// What went wrong in this thread's last call, one line of UTF-8: the place, the value, what was
-/// expected. Empty after a call that went well. It stays until the thread's next call.
+/// The error of this thread's last call, one line of UTF-8: the place, the value, what was
+/// expected. Empty after success. The text is valid until the thread's next call.
 #[unsafe(no_mangle)]
 pub extern "C" fn petcomp_error_message() -> *const c_char {
     let message = MESSAGE.try_with(|last| last.borrow().as_ptr());
     message.unwrap_or(c"".as_ptr())
 }
 
-/// The version of the library, as "0.1.0". It stays as long as the process.
+/// The version of the library, e.g. "0.1.0". The text is valid as long as the process.
 #[unsafe(no_mangle)]
 pub extern "C" fn petcomp_version() -> *const c_char {
     const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "\0");
