@@ -1,4 +1,4 @@
-//! A photo on a green or blue screen becomes a cut-out with its transparency.
+//! Cuts an object and its transparency out of a photo on a green or blue screen.
 //!
 //! `cargo run --release --example cut_out [PHOTO [CUT_OUT]]`
 

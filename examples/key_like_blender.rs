@@ -1,5 +1,5 @@
-//! Blender's Keying node on a picture made here: the colour of a half-transparent pixel, by
-//! version.
+//! Blender's Keying node on a synthetic image: a semi-transparent pixel as keyed by several
+//! versions.
 //!
 //! `cargo run --release --example key_like_blender`
 
@@ -8,7 +8,7 @@ use petcomp::{Image, LinearRgb, PremulRgba, Result};
 
 fn main() -> Result<()> {
     let screen = LinearRgb::new(0.1, 0.8, 0.1);
-    // Grey film of 30 % over the screen.
+    // 30 % grey film over the screen.
     let seen = PremulRgba::new(0.22, 0.71, 0.22, 1.0);
     let photo = Image::filled(8, 8, seen);
     for profile in [Profile::Blender34, Profile::Blender42, Profile::Blender45] {

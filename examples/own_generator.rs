@@ -1,5 +1,5 @@
-//! Pictures of a generator of your own, written as a dataset that trainers read: here, one leaning
-//! card each.
+//! Writes the images of your own generator as a dataset that trainers read; here, each shows one
+//! leaning card.
 //!
 //! `cargo run --release --example own_generator [FOLDER]`
 
@@ -28,7 +28,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Picture `k` and its labels: they depend on nothing but `k`.
+/// Image `k` and its labels, which depend only on `k`.
 fn sample(k: u64) -> Result<Sample> {
     let shot = shot(k);
     let deep = render(&shot, &RenderOptions::default());
@@ -52,7 +52,7 @@ fn shot(k: u64) -> Shot {
         .with_ambient(LinearRgb::WHITE)
 }
 
-/// A card that leans more with every picture.
+/// A card that leans more with every image.
 fn leaning(step: f64) -> Quad {
     let rotation = UnitQuaternion::from_euler_angles(0.1 * step, 0.0, 0.3 * step);
     Quad {

@@ -1,4 +1,4 @@
-//! Two cards over a plate, one picture: no files but the one that is written.
+//! Renders two cards over a plate, without any input files.
 //!
 //! `cargo run --release --example render_shot [PICTURE]`
 
@@ -23,12 +23,12 @@ fn main() -> Result<()> {
     io::write(picture.as_deref().unwrap_or("shot.png"), &shown)
 }
 
-/// 1 and 0 by turns, in squares of 40 pixels.
+/// A checkerboard of 0 and 1 with 40 pixel squares.
 fn checker(x: usize, y: usize) -> f32 {
     ((x / 40 + y / 40) % 2) as f32
 }
 
-/// Level at this height, turned about the vertical.
+/// A level card at this height, rotated about the vertical.
 fn lying(height: f64, turn: f64) -> Quad {
     let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
     Quad {

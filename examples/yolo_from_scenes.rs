@@ -1,9 +1,8 @@
-//! Scene files become labelled pictures in YOLO's layout, as they are: no recipe, nothing drawn by
-//! chance.
+//! Renders scene files as a labelled dataset in YOLO's layout, without a recipe or random draws.
 //!
-//! `petcomp scene draw` writes such files: their table `[files]` names the folders of assets and
-//! photos, their tables `[settings.labels]` say how labels are made and written. All must have the
-//! classes and the label settings of the first.
+//! `petcomp scene draw` writes such files. Their table `[files]` names the folders of assets and
+//! photos; `[settings.labels]` sets how labels are made and written. All scenes must have the
+//! classes and label settings of the first.
 //!
 //! `cargo run --release --example yolo_from_scenes FOLDER SCENE..`
 
@@ -30,7 +29,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// A dataset as the first scene has its labels.
+/// A dataset with the label settings of the first scene.
 fn plan(first: &Pipeline, folder: &str, count: u64) -> Result<Plan> {
     let DatasetConfig {
         labels, pictures, ..
@@ -45,7 +44,7 @@ fn plan(first: &Pipeline, folder: &str, count: u64) -> Result<Plan> {
     })
 }
 
-/// A scene, and the assets and the photo that it names.
+/// Opens a scene with the assets and the photo that it names.
 fn open(path: &str) -> Result<(Pipeline, Scene)> {
     let scene: Scene = io::read_document(path)?;
     let config = DatasetConfig::for_scene(&scene, path, &[])?;
@@ -59,7 +58,7 @@ fn sample(path: &str, first: &Pipeline) -> Result<Sample> {
         .map_err(|e| e.in_file(path))
 }
 
-/// Fails where a scene's labels would mean something else than the first one's.
+/// Fails if a scene has other classes or label settings than the first one.
 fn check_alike(pipeline: &Pipeline, first: &Pipeline) -> Result<()> {
     let [own, expected] = [pipeline, first].map(|opened| &opened.library().classes);
     if own != expected {
@@ -67,7 +66,7 @@ fn check_alike(pipeline: &Pipeline, first: &Pipeline) -> Result<()> {
         return Err(Error::value("classes", what));
     }
     if pipeline.config().labels != first.config().labels {
-        let what = "others than the first scene's, expected the same";
+        let what = "differ from those of the first scene, expected the same";
         return Err(Error::value("settings.labels", what));
     }
     Ok(())

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A photo on a green screen becomes a cut-out, in two ways.
+"""Make a cut-out of a photo on a green screen, in two ways.
 
 key_photo.py PHOTO FOLDER
 """
@@ -16,12 +16,12 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     image = petcomp.io.read(photo)
 
-    # As Blender's Keying node does it: the colour of the screen is that of the picture's rim.
+    # Blender's Keying node, with the median colour of the image border as the screen colour.
     rim = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
     keyed = petcomp.matte.key(image, screen=np.median(rim, axis=0), profile="blender-4.5", clip_black=0.1)
     petcomp.io.write(folder / "keyed.exr", keyed.cutout)
 
-    # The whole way: the object is found, the screen fitted, and see-through plastic solved for.
+    # The whole process: find the object, fit the screen and solve for see-through plastic.
     cut = petcomp.matte.cut_out(image)
     petcomp.io.write(folder / "cut_out.exr", cut.rgba)
     (folder / "cut_out.png").write_bytes(cut._repr_png_())

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Pictures of a generator of your own, written as a dataset that trainers read: here, one leaning card each.
+"""Write the images of your own generator as a dataset that trainers read; here, each shows one leaning card.
 
 own_generator.py FOLDER
 """
@@ -11,7 +11,7 @@ import petcomp
 
 
 def sample(k):
-    """Picture k and its labels: they depend on nothing but k."""
+    """Make image k and its labels, which depend only on k."""
     camera = petcomp.Camera.look_at([0.0, -0.8, 0.8], [0.0, 0.0, 0.0], 500.0, [320, 240])
     green = np.full((8, 8, 4), [0.05, 0.3, 0.1, 0.6], np.float32)
     card = petcomp.Card(

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""A dataset by a cluster: each shard is a task of Ray, one worker is killed on the way, and the bytes are the same.
+"""Generate a dataset on a cluster, each shard as a Ray task. One worker is killed on the way; the bytes stay the same.
 
     ray_generate.py RECIPE COUNT FOLDER
 
-Without Ray nothing is done.
+Without Ray the script does nothing.
 """
 
 import os
@@ -28,11 +28,11 @@ def main():
 
     @ray.remote(max_retries=3)
     def make(i):
-        """Shard i; where it was begun before, what is missing of it."""
+        """Generate shard i, or what is still missing from it."""
         struck = folder / f"struck-{i}"
 
         def strike(progress):
-            # As if the machine went away, once, in the middle of the second shard.
+            # Simulate the loss of a machine, once, in the middle of the second shard.
             if i == 2 and progress.made == 1 and not struck.exists():
                 struck.touch()
                 os.kill(os.getpid(), signal.SIGKILL)
@@ -46,7 +46,7 @@ def main():
     program = [sys.executable, "-m", "petcomp"]
     subprocess.run([*program, "dataset", "merge", *shards, "-o", folder / "dataset", "-q"], check=True)
     print(
-        f"{folder / 'dataset'}: {count} pictures by {SHARDS} tasks, one of which was killed; the last runs made {made}"
+        f"{folder / 'dataset'}: {count} images by {SHARDS} tasks, one of which was killed; the last runs made {made}"
     )
 
 

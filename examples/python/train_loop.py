@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""A training loop whose pictures are made while it learns: no dataset on the disk.
+"""A training loop that generates its images on the fly, without a dataset on disk.
 
     train_loop.py RECIPE [STEPS]
 
-The net only counts objects: the loop is the point. Without PyTorch nothing is done.
+The network only counts objects: the point is the loop. Without PyTorch the script does nothing.
 """
 
 import sys

@@ -1,8 +1,8 @@
-//! Train: what a detector's training needs beside images: equation numbers are those of the paper.
+//! Train: what training a detector needs besides images. Equation numbers are those of the paper.
 //!
 //! Plain functions for any trainer: the balance of two sources of images ([`Balance`], equation 2),
-//! batches of one source each (`batches`), anchors that fit a dataset ([`anchors()`]), how many
-//! epochs make equally many updates ([`Updates`]), and a [`kit`] of files for PyTorch.
+//! batches from one source each (`batches`), anchors that fit a dataset ([`anchors()`]), epochs for
+//! an equal number of updates ([`Updates`]), and a [`kit`] of files for PyTorch.
 
 mod anchors;
 mod balance;

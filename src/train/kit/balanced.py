@@ -1,14 +1,15 @@
-"""Equation 2 of the paper in a PyTorch training: batches of one source each, their loss weighted.
+"""Equation 2 of the paper for PyTorch: batches from one source each, with weighted loss.
 
-As a program it trains an Ultralytics detector on the images that combined.yaml lists:
+Run as a program to train an Ultralytics detector on the images of combined.yaml:
 
     python balanced.py --epochs 300 --batch 32 --seed 1 --name combined/1
 
-or, with `--real-share 0.125`, of batches in which that share is real, unweighted: where real images are few, that keeps
-them from being seen too often. With `--data real.yaml`, or another list of the kit, the same detector is trained with
-the same settings in the ordinary way, to compare with.
+With `--real-share 0.125`, that share of every batch is real and the loss is not weighted. If there are few real images,
+this keeps them from being seen too often. With `--data real.yaml`, or another list of the kit, the same detector is
+trained with the same settings in the ordinary way, for comparison.
 
-As a module it serves any other loop: `SingleSource` and `Shares` are batch samplers, `weights` gives the factor per source.
+Import it as a module for other training loops: `SingleSource` and `Shares` are batch samplers, `weights` returns the
+loss factor of each source.
 """
 
 import argparse
@@ -25,13 +26,13 @@ REAL, SYNTHETIC = 0, 1
 
 
 def weights(real, synthetic, alpha=0.5, normalize=False):
-    """Factors on the loss of a batch of real and of synthetic images; `real`, `synthetic` are the sets' sizes."""
+    """Loss factors for batches of real and of synthetic images; `real` and `synthetic` are the sizes of the sets."""
     scale = (real + synthetic) * (1.0 if normalize else 0.5)
     return scale / real * alpha, scale / synthetic * (1 - alpha)
 
 
 class SingleSource(torch.utils.data.Sampler):
-    """Lists of indices into [real images..., synthetic images...], each list from one source; new order every epoch."""
+    """Batches of indices into [real images..., synthetic images...], each from one source; reshuffled every epoch."""
 
     def __init__(self, real, synthetic, batch, seed=0):
         self.parts, self.batch, self.seed, self.epoch = (range(real), range(real, real + synthetic)), batch, seed, 0
@@ -51,9 +52,9 @@ class SingleSource(torch.utils.data.Sampler):
 
 
 class Shares(torch.utils.data.Sampler):
-    """The same, each list with a share of real images, which are shuffled anew whenever all were seen; an epoch is one
-    pass over the synthetic ones. `epoch` gives its number, where a trainer counts them: some ask for more lists than they
-    use."""
+    """Batches with a fixed share of real images, which are reshuffled whenever all have been seen. An epoch is one pass
+    over the synthetic images. `epoch` returns its number; pass it if the trainer counts epochs, since some trainers
+    request more batches than they use."""
 
     def __init__(self, real, synthetic, batch, share, seed=0, epoch=None):
         self.real, self.synthetic, self.batch, self.seed = real, synthetic, batch, seed
@@ -65,7 +66,7 @@ class Shares(torch.utils.data.Sampler):
     def __iter__(self):
         epoch = self.epoch()
         rng = random.Random(self.seed * 1_000_003 + epoch)
-        # A pass over the real images goes on in the next epoch, so that all are seen equally often.
+        # A pass over the real images continues in the next epoch, so that all are seen equally often.
         real = self.passes(epoch * len(self) * self.of_real)
         order = rng.sample(range(self.real, self.real + self.synthetic), self.synthetic)
         size = self.batch - self.of_real
@@ -76,14 +77,14 @@ class Shares(torch.utils.data.Sampler):
         return -(-self.synthetic // (self.batch - self.of_real))
 
     def passes(self, first):
-        """Real images without end, from the one on that is `first` of all passes."""
+        """Yield real images endlessly, starting at position `first` of all passes."""
         for number in itertools.count(first // self.real):
             order = random.Random(f"{self.seed} {number}").sample(range(self.real), self.real)
             yield from order[max(0, first - number * self.real) :]
 
 
 class Both(torch.utils.data.ConcatDataset):
-    """Each source keeps its own mosaic, so that no picture mixes the two."""
+    """Both sources, each with its own mosaics, so that no image mixes the two."""
 
     @property
     def labels(self):
@@ -95,19 +96,19 @@ class Both(torch.utils.data.ConcatDataset):
 
 
 class Loader(torch.utils.data.DataLoader):
-    """What Ultralytics' trainer asks of a loader whose sampler gives whole batches."""
+    """A loader for Ultralytics' trainer whose sampler yields whole batches."""
 
-    # Torch says None where batches come from a sampler of batches; the trainer divides by it.
+    # PyTorch sets None if a sampler yields batches, but the trainer divides by it.
     batch_size = property(lambda self: self.batch_sampler.batch, lambda self, value: None)
 
     def reset(self):
-        """Workers start anew with every epoch: nothing to do."""
+        """Do nothing: workers restart every epoch anyway."""
 
 
 class WeightedLoss:
-    """For a trainer: the loss of each batch times the `factor` that `preprocess_batch` sets."""
+    """Mix-in for a trainer: multiplies the loss of each batch by the `factor` that `preprocess_batch` sets."""
 
-    # The training loop assigns the batch's loss here before it goes backward; the model stays Ultralytics' own.
+    # The training loop assigns the loss of the batch here before the backward pass; the model stays Ultralytics' own.
     loss = property(lambda self: self.weighted, lambda self, value: self.weigh(value))
 
     def weigh(self, value):
@@ -116,7 +117,7 @@ class WeightedLoss:
 
 
 def ultralytics_trainer(batch_size, seed, real_share=None):
-    """An Ultralytics trainer class that follows equation 2, or has a share of real images in each batch."""
+    """Return an Ultralytics trainer class that follows equation 2 or has a share of real images in each batch."""
     from ultralytics.data.dataset import YOLODataset
     from ultralytics.models.yolo.detect import DetectionTrainer
 

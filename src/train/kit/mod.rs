@@ -1,4 +1,4 @@
-//! Files with which the paper's experiments run in YOLOv5 and Ultralytics.
+//! Files to run the paper's experiments in YOLOv5 and Ultralytics.
 
 use super::{Balance, Updates, batches_per_epoch};
 use crate::dataset::{YoloSet, yaml_names};
@@ -12,12 +12,12 @@ const BALANCED_PY: &str = include_str!("balanced.py");
 /// The paper's settings where it states them, YOLOv5's defaults elsewhere.
 const HYP_YAML: &str = include_str!("hyp.yaml");
 
-/// What the kit is for.
+/// Options of the kit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KitOptions {
     /// Folder of the YOLO dataset of photographs.
     pub real: PathBuf,
-    /// Folder of the YOLO dataset that petcomp made.
+    /// Folder of the YOLO dataset that petcomp generated.
     pub synthetic: PathBuf,
     /// Weights of the two in the combined training.
     pub balance: Balance,
@@ -25,12 +25,12 @@ pub struct KitOptions {
     pub seeds: u64,
     /// Epochs. Default: 300, the paper's.
     pub epochs: u64,
-    /// Images in a batch. Default: 32, the paper's.
+    /// Images per batch. Default: 32, the paper's.
     pub batch: u64,
 }
 
 impl KitOptions {
-    /// The paper's numbers for two datasets.
+    /// Options for two datasets with the paper's numbers.
     pub fn new(real: impl Into<PathBuf>, synthetic: impl Into<PathBuf>) -> Self {
         let (real, synthetic) = (real.into(), synthetic.into());
         Self {
@@ -44,15 +44,14 @@ impl KitOptions {
     }
 }
 
-/// A way to train that the paper compares: which images to learn from and to choose the best epoch
-/// by.
+/// A training that the paper compares: the images to train on and those that select the best epoch.
 struct Variant {
     name: &'static str,
     train: &'static [&'static str],
     val: &'static [&'static str],
 }
 
-/// Concatenation comes in the paper's two forms; `balanced.py` trains `combined` by equation 2.
+/// The paper has two forms of concatenation; `balanced.py` trains `combined` by equation 2.
 const VARIANTS: [Variant; 5] = [
     Variant {
         name: "real",
@@ -81,16 +80,17 @@ const VARIANTS: [Variant; 5] = [
     },
 ];
 
-/// Writes the kit: lists of images, one `VARIANT.yaml` each, `hyp.yaml`, `balance.json`,
+/// Writes the kit: lists of images, a `VARIANT.yaml` for each variant, `hyp.yaml`, `balance.json`,
 /// `balanced.py`, `commands.sh`.
 ///
-/// Lists and `path:` are whole paths, since YOLOv5 takes others from the folder of its clone: the
-/// kit may be written anywhere, but then neither it nor the datasets may move. Where no synthetic
-/// image is for validation, the variants that need some are left out, which `commands.sh` says.
+/// Lists and `path:` contain absolute paths, since YOLOv5 resolves relative ones from the folder of
+/// its clone. So the kit may be written anywhere, but afterwards neither it nor the datasets may
+/// move. Without synthetic images for validation, the variants that need some are left out, and
+/// `commands.sh` lists them.
 ///
 /// # Errors
-/// Those of [`YoloSet::open`] and [`Balance::weights`]; [`Error::Value`] when the two datasets name
-/// other classes or share an image to learn from; [`Error::File`] for an image, or a folder for the
+/// Those of [`YoloSet::open`] and [`Balance::weights`]; [`Error::Value`] if the two datasets have
+/// different classes or share a training image; [`Error::File`] for an image, or a folder for the
 /// kit, whose name is not UTF-8.
 pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     let [real, synthetic] = open_sets(options)?;
@@ -105,7 +105,7 @@ pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     write_scripts(folder, &(commands + &training_commands(options, &variants)))
 }
 
-/// The real and the synthetic images, which fit together.
+/// Opens the real and the synthetic dataset and checks that they fit together.
 fn open_sets(options: &KitOptions) -> Result<[YoloSet; 2]> {
     let real = YoloSet::open(&whole_folder(&options.real)?)?;
     let synthetic = open_for_training(&whole_folder(&options.synthetic)?)?;
@@ -114,7 +114,7 @@ fn open_sets(options: &KitOptions) -> Result<[YoloSet; 2]> {
     Ok([real, synthetic])
 }
 
-/// The lists of images, and what each variant is trained on, into a folder that is made for them.
+/// Creates the folder and writes the lists of images and the file of each variant.
 fn write_data(
     folder: &Path,
     [real, synthetic]: [&YoloSet; 2],
@@ -147,7 +147,7 @@ fn balance_document(balance: &Balance, [real, synthetic]: [u64; 2]) -> Result<se
     }))
 }
 
-/// A list of the images of each part of both datasets, with its name.
+/// The lists of images of each part of both datasets, with their names.
 fn lists_of(real: &YoloSet, synthetic: &YoloSet) -> Result<Vec<(&'static str, String)>> {
     let parts = [
         ("real_train", &real.train),
@@ -161,11 +161,11 @@ fn lists_of(real: &YoloSet, synthetic: &YoloSet) -> Result<Vec<(&'static str, St
         .collect()
 }
 
-/// Fails where two datasets in these folders cannot be trained on together: they name other
-/// classes, or share an image to learn from.
+/// Fails if the datasets in two folders cannot be used together: they have different classes or share
+/// a training image.
 ///
 /// # Errors
-/// [`Error::Value`] that tells both lists of classes, or the image.
+/// [`Error::Value`] with both lists of classes, or with the image.
 #[doc(hidden)]
 pub fn check_sets(sets: [&YoloSet; 2], folders: [&Path; 2]) -> Result<()> {
     check_classes(sets, folders)?;
@@ -189,7 +189,7 @@ fn check_classes([real, synthetic]: [&YoloSet; 2], folders: [&Path; 2]) -> Resul
     Err(Error::value("classes", what))
 }
 
-/// Warns of real images that the best epoch is chosen by although some variant is trained on them.
+/// Warns of real images that select the best epoch although some variant is trained on them.
 fn warn_of_known_validation([real, synthetic]: [&YoloSet; 2], folder: &Path) {
     let trained = [&real.train[..], &synthetic.train[..]].concat();
     let known = shared_images(&trained, &real.val).count();
@@ -202,7 +202,7 @@ fn warn_of_known_validation([real, synthetic]: [&YoloSet; 2], folder: &Path) {
     }
 }
 
-/// The images of a list that are in another one too, under whatever names.
+/// The images of a list that are also in another one, even under different names.
 fn shared_images<'a>(
     others: &[PathBuf],
     images: &'a [PathBuf],
@@ -224,10 +224,10 @@ fn whole_folder(folder: &Path) -> Result<PathBuf> {
     std::fs::canonicalize(folder).map_err(|e| Error::file(folder, e))
 }
 
-/// A set to learn from, which may have no images for validation.
+/// Opens a training set, which may have no images for validation.
 ///
 /// # Errors
-/// Those of [`YoloSet::read`], and [`Error::File`] where no images are for training.
+/// Those of [`YoloSet::read`], and [`Error::File`] if there are no training images.
 #[doc(hidden)]
 pub fn open_for_training(folder: &Path) -> Result<YoloSet> {
     let set = YoloSet::read(folder)?;
@@ -239,12 +239,12 @@ pub fn open_for_training(folder: &Path) -> Result<YoloSet> {
 }
 
 impl Variant {
-    /// Whether there are images to choose the best epoch by; a synthetic dataset may have none.
+    /// Whether there are images to select the best epoch; a synthetic dataset may have none.
     fn has_validation(&self, synthetic: &YoloSet) -> bool {
         !synthetic.val.is_empty() || !self.val.contains(&"synthetic_val")
     }
 
-    /// With a string of JSON for the kit's folder, which is one of YAML too.
+    /// Writes the kit's folder as a JSON string, which is also a YAML string.
     fn to_yaml(&self, folder: &str, classes: &[String]) -> String {
         let path = serde_json::json!(folder);
         let (count, train, val) = (classes.len(), yaml_list(self.train), yaml_list(self.val));
@@ -272,22 +272,22 @@ fn training_commands(options: &KitOptions, variants: &[&Variant]) -> String {
     trainings.collect()
 }
 
-/// What the trainings need, and how long each source alone takes for equally many updates.
+/// What the trainings need, and how many epochs of each source alone make as many updates.
 fn commands_head(options: &KitOptions, [real, synthetic]: [u64; 2]) -> String {
     let combined = Updates::new(real + synthetic, options.batch, options.epochs);
     let [real, synthetic] = [real, synthetic]
         .map(|images| combined.epochs_of(batches_per_epoch(images, options.batch)));
     let Updates { batches, total, .. } = combined;
     format!(
-        "#!/bin/sh\n# Run in this folder with Ultralytics installed: one detector for all variants, so that they are comparable;\n\
-         # combined weights its loss by equation 2.\n\
-         # YOLOv5's own train.py takes the same files, and hyp.yaml; its results are not comparable with these.\n\
-         # One epoch over both sources: {batches} batches; {total} updates in all. The same number of updates takes {synthetic:.1} epochs of the\n\
-         # synthetic images alone and {real:.1} of the real ones.\nset -eu\n"
+        "#!/bin/sh\n# Run in this folder, with Ultralytics installed for Python. All variants train the same detector, so that they\n\
+         # can be compared; combined weights its loss by equation 2.\n\
+         # YOLOv5's own train.py accepts the same files and hyp.yaml, but its results are not comparable with these.\n\
+         # One epoch over both sources: {batches} batches; {total} updates in all. The same number of updates takes {synthetic:.1} epochs\n\
+         # of the synthetic images alone and {real:.1} of the real ones.\nset -eu\n"
     )
 }
 
-/// Which variants there are no images for.
+/// The variants that lack images.
 fn without_validation(left_out: &[&Variant]) -> String {
     if left_out.is_empty() {
         return String::new();
@@ -326,7 +326,7 @@ mod tests {
         folder
     }
 
-    /// A kit of two real images and six synthetic ones.
+    /// A kit with two real images and six synthetic ones.
     fn written(root: &Path, name: &str) -> PathBuf {
         let [real, synthetic] =
             [("real", 2), ("made", 6)].map(|(name, n)| dataset(root, name, [n, 1], "[cap]"));
@@ -354,7 +354,7 @@ mod tests {
         );
         let commands = io::read_text(kit.join("commands.sh")).unwrap();
         assert_eq!(commands.matches("seq 1 6").count(), VARIANTS.len());
-        // One program, and so one detector, for all: they are compared with each other.
+        // One program, and so one detector, trains all variants, which are compared with each other.
         let trained = |name| commands.contains(&format!("python balanced.py --data {name}.yaml "));
         assert!(
             VARIANTS.iter().all(|variant| trained(variant.name)),
