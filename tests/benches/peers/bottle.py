@@ -1,11 +1,11 @@
-"""A photo of film on a screen of which all is known, and how wrong a matte of it is.
+"""A photo of film on a screen with full ground truth, and the errors of its mattes.
 
     photo = F + T K + noise
 
-F is the light that the object adds, K the empty screen and T what reaches the camera of it in each channel, all
-scene-linear. The object lies on its screen: light comes through it before it is looked through, so T is less than V, what
-it lets through of a new background that is lit by itself. A film is a pair like F, V; a matte with one alpha is the film
-(its premultiplied colour, 1 - alpha).
+F is the light that the object adds, K the empty screen and T the share of K that reaches the camera in each channel, all
+scene-linear. The object lies on its screen, so light passes through it twice: on its way to the screen and on its way
+back. T is therefore less than V, the share that it lets through of a new background with its own light. A film is a pair
+like F, V; a matte with a single alpha is the film (its premultiplied colour, 1 - alpha).
 """
 
 import functools
@@ -38,7 +38,7 @@ def photographed(name, light, passes, screen, cover, rng):
 
 
 def drawn(width=640, height=480, seed=1):
-    """A crushed bottle of tinted film with folds and highlights, an opaque cap and a label, on an uneven green screen."""
+    """A synthetic crushed bottle: tinted film with folds and highlights, opaque cap and label, on an uneven green screen."""
     rng = np.random.default_rng(seed)
     y, x = np.mgrid[:height, :width] + 0.5
     u, v = (x - width / 2) / width, (y - height / 2) / height
@@ -68,7 +68,7 @@ def drawn(width=640, height=480, seed=1):
 
 
 def known(folder, most):
-    """Photos of a folder with truth: NAME.png, NAME_fg.exr (F), NAME_view.png (V, linear codes), NAME_plate.exr (K)."""
+    """Photos of a folder with ground truth: NAME.png, NAME_fg.exr (F), NAME_view.png (V, linear codes), NAME_plate.exr (K)."""
     for path in sorted(pathlib.Path(folder).glob("*_plate.exr"))[:most]:
         part = lambda ending: path.with_name(path.name.replace("_plate.exr", ending))
         cover = linear.read_codes(part("_mask.png"))
@@ -78,7 +78,7 @@ def known(folder, most):
 
 @functools.cache
 def backgrounds(shape):
-    """Pictures that nobody has seen: patches of random colours and sizes."""
+    """New backgrounds: patches of random colours and sizes."""
     rng, pictures = np.random.default_rng(7), []
     for _ in range(BACKGROUNDS):
         picture = np.full(shape, 0.2)
@@ -91,7 +91,7 @@ def backgrounds(shape):
 
 
 def errors(photo, light, passes):
-    """Mean absolute error of F + V B over new backgrounds B, linear light, all pixels and channels; and that of
+    """Mean absolute error of F + V B over new backgrounds B, in linear light, over all pixels and channels; and that of
     alpha = 1 - mean(V)."""
     passes = np.broadcast_to(passes, photo.passes.shape)
     off = [np.abs(light + passes * b - photo.light - photo.passes * b).mean() for b in backgrounds(photo.light.shape)]

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""The camera of a photo from four corners of a rectangle of known size: petcomp and OpenCV on the same corners.
+"""Solves cameras from four corners of a rectangle of known size: petcomp and OpenCV on the same corners.
 
     make peers
     taskset -c 0 target/peers-python/bin/python tests/benches/peers/camera.py [-o FOLDER] [--views N]
 
-Views are drawn of a tray of 0.56 x 0.37 m by a camera of known focal length, tilted by 5 to 65 degrees; each corner is half
-a pixel off (standard deviation). Error: how far from its true place on the tray a pixel is put, of 25 pixels of each view,
-root of the mean square. Seconds are those of one solution in memory: petcomp's (library.rs) with its standard deviations
-and warnings, OpenCV's called from Python, which costs it some microseconds. `findHomography` knows no focal length.
+Random views show a tray of 0.56 x 0.37 m from a camera of known focal length, tilted by 5 to 65 degrees; corners have
+half a pixel of noise (standard deviation). Error: RMS distance on the tray between the computed and the true position of a
+pixel, over 25 pixels of each view. Seconds are those of one solution in memory: petcomp (library.rs) including standard
+deviations and warnings; OpenCV called from Python, which costs some microseconds. `findHomography` uses no focal length.
 """
 
 import json
@@ -33,7 +33,7 @@ def projected(points, rotation, translation):
 
 
 def draw(rng):
-    """A camera that sees the whole tray: rotation and translation of OpenCV's frame from the world's."""
+    """Draw a camera that sees the whole tray: rotation and translation from the world to OpenCV's frame."""
     while True:
         tilt, turn, roll = np.radians([rng.uniform(5, 65), rng.uniform(0, 360), rng.uniform(-20, 20)])
         away = np.array([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)])

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Reading and writing pictures: petcomp beside OpenImageIO's `oiiotool`, and `petcomp diff` beside its `idiff`.
+"""Reads, writes and compares images: petcomp and OpenImageIO's `oiiotool`, `petcomp diff` and its `idiff`.
 
     make peers
     taskset -c 0 target/peers-python/bin/python tests/benches/peers/convert.py [-o FOLDER] [--size W H]
 
-Writes convert.json and diff.json. Whole processes on both sides; petcomp has no command that only converts, so its library
-does it in a program of its own (library.rs), as the stages do when they read and write. EXR is scene-linear, PNG and JPEG
-are sRGB: both programs convert. Both keep their own level of compression; `bytes` says what came out. Error of a conversion:
-root of the mean square of what OpenEXR or OpenCV read back from the file, made linear, less the source. `petcomp diff` also
-measures SSIM and FLIP, which `idiff` does not; error of a comparison: of the mean difference it tells, relative.
+Writes convert.json and diff.json. Both sides are timed as whole processes. petcomp has no command that only converts, so a
+separate program (library.rs) calls its library as the stages do when they read and write. EXR is scene-linear, PNG and
+JPEG are sRGB; both programs convert. Both use their default compression level; `bytes` is the resulting size. Error of a
+conversion: RMSE to the source in linear light, as OpenEXR or OpenCV reads the file back. `petcomp diff` also computes SSIM
+and FLIP, unlike `idiff`. Error of a comparison: relative error of the mean difference that it reports.
 """
 
 import re
@@ -34,7 +34,7 @@ DIFFERENT = (0, 1, 2)
 
 
 def write(folder, seen):
-    """The same picture in every format, and another that differs by a little grain."""
+    """Write the same image in every format, and another that differs by a little grain."""
     codes = lambda picture, most: np.round(most * linear.to_srgb(picture))
     grain = np.random.default_rng(3).normal(scale=0.01, size=seen.shape)
     for prefix, picture in (("", seen), ("other_", np.clip(seen + grain, 0, 1))):
@@ -46,7 +46,7 @@ def write(folder, seen):
 
 
 def stored(path):
-    """Values as a file has them: floats, or codes as shares of full scale."""
+    """Values as stored in the file: floats, or codes as fractions of full scale."""
     return linear.read_exr(path) if path.suffix == ".exr" else linear.read_codes(path)
 
 

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Average precision of the same detections: `petcomp eval` beside pycocotools, and YOLOv5's own code where it is.
+"""Average precision of the same detections: `petcomp eval`, pycocotools and, if installed, YOLOv5's own code.
 
     make peers
     taskset -c 0 target/peers-python/bin/python tests/benches/peers/eval.py [-o FOLDER] [--images N]
 
-Truth and detections of 2000 images are drawn and written as COCO JSON. eval.json times what is done in memory: reading
-both files, evaluating, summing up (petcomp by library.rs, the COCO definition; pycocotools called from Python).
-eval_commands.json times whole processes: petcomp with both definitions, its tables and pictures; Python with its imports.
-Error: the greatest difference of mean AP, AP at 0.5 and AP at 0.75 to those of pycocotools; YOLOv5 defines AP otherwise, and
-is held against its own definition in petcomp. Its package needs PyTorch: where it is not, it is named as absent.
+Ground truth and detections of 2000 images are random and written as COCO JSON. eval.json times the work in memory: reading
+both files, evaluating, summarizing (petcomp by library.rs, the COCO definition; pycocotools called from Python).
+eval_commands.json times whole processes: petcomp with both definitions, its tables and images; Python with its imports.
+Error: the greatest difference of mean AP, AP at 0.5 and AP at 0.75 from those of pycocotools. YOLOv5 defines AP differently
+and is compared with its own definition in petcomp. Its package needs PyTorch; if missing, it is listed as absent.
 """
 
 import contextlib
@@ -62,7 +62,7 @@ def petcomp_stats(out, definition="coco"):
 
 
 def yolov5_stats(truth, found):
-    """What the validation of YOLOv5 does after its detector: match boxes image by image, then its average precision."""
+    """YOLOv5's validation without the detector: match boxes image by image, then compute its average precision."""
     import torch
     np.trapz = np.trapezoid  # the name that YOLOv5 7.0 knows it by
     from yolov5.utils.metrics import ap_per_class
@@ -142,7 +142,7 @@ def commands(args, files, described):
 def main():
     parser = arguments(__doc__)
     parser.add_argument("--images", type=int, default=2000)
-    parser.add_argument("--alone", type=pathlib.Path, nargs=2, help="only pycocotools' numbers for TRUTH FOUND, as JSON")
+    parser.add_argument("--alone", type=pathlib.Path, nargs=2, help="only print pycocotools' numbers for TRUTH FOUND, as JSON")
     args = parser.parse_args()
     if args.alone:
         return print(json.dumps(pycocotools_stats(*args.alone)))

@@ -1,4 +1,4 @@
-"""Scene-linear pictures in files, as arrays of rows from the top; read and written by OpenEXR and OpenCV."""
+"""Reads and writes scene-linear images by OpenEXR and OpenCV, as arrays of rows from the top."""
 
 import cv2
 import numpy as np
@@ -6,7 +6,7 @@ import OpenEXR
 
 
 def to_srgb(linear):
-    """Display values 0 to 1 (IEC 61966-2-1)."""
+    """Encode display values 0 to 1 (IEC 61966-2-1)."""
     c = np.clip(linear, 0, 1)
     return np.where(c <= 0.0031308, 12.92 * c, 1.055 * np.maximum(c, 1e-9) ** (1 / 2.4) - 0.055)
 
@@ -16,13 +16,13 @@ def from_srgb(display):
 
 
 def write_codes(path, codes):
-    """8 or 16 bit codes, R G B or grey, as PNG or JPEG."""
+    """Write 8 or 16 bit codes, R G B or grey, as PNG or JPEG."""
     if not cv2.imwrite(str(path), codes[..., ::-1] if codes.ndim == 3 else codes):
         raise OSError(f"{path}: not written")
 
 
 def read_codes(path):
-    """Codes as shares of full scale: R G B, R G B A or grey."""
+    """Read codes as fractions of full scale: R G B, R G B A or grey."""
     codes = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     if codes is None:
         raise OSError(f"{path}: not a picture")
@@ -36,6 +36,6 @@ def write_exr(path, rgb, dtype=np.float32, compression=OpenEXR.ZIP_COMPRESSION):
 
 
 def read_exr(path, names="RGB"):
-    """Some channels of the first part, one behind the other."""
+    """Read channels of the first part, stacked along the last axis."""
     planes = OpenEXR.File(str(path), separate_channels=True).channels()
     return np.stack([planes[name].pixels.astype(np.float64) for name in names], axis=-1)

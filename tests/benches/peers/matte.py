@@ -4,17 +4,19 @@
     make peers
     taskset -c 0 target/peers-python/bin/python tests/benches/peers/matte.py [-o FOLDER] [--truth FOLDER]
 
-The photo is drawn with all that is known of it (bottle.py), or comes from a folder with truth; times and errors are means
-over the photos. Every method gets the same 8-bit photo, made linear, and the mean colour of the screen; some get more:
+The photo is synthetic with full ground truth (bottle.py), or comes from a folder with ground truth; times and errors are
+means over the photos. Every method gets the same 8-bit photo, converted to linear, and the mean colour of the screen; some
+get more:
 
     petcomp film, mask given    the true coverage of the object
-    PyMatting                   a trimap of the truth: opaque, no object, and the rest unknown
-    ffmpeg                      the similarity and blend of 25 that do best against the truth, beside its defaults
-    the Keying node             the clip levels of 25 that do so (petcomp's keyer, the same to the bit, looks for them)
+    PyMatting                   a trimap from the truth: opaque, no object, and the rest unknown
+    ffmpeg                      its defaults, and the best of 25 pairs of similarity and blend by the truth
+    the Keying node             the best of 25 pairs of clip levels (searched by petcomp's keyer, which is bit-exact)
 
-In process: petcomp by library.rs, whose keyer writes into the same pictures each time; Blender renders image -> Keying -> Composite less image -> Composite; ffmpeg repeats the
-frame before its filters, less a run that does not. ffmpeg's display values are made linear before they are put over
-backgrounds. The drawn photo follows the model that `petcomp matte film` solves for; --truth takes photos of a renderer.
+In process: petcomp by library.rs, whose keyer writes into the same images each time; Blender's image -> Keying -> Composite
+minus image -> Composite; for ffmpeg, a run that repeats the frame before the filters minus one that does not. ffmpeg's
+display values are made linear before compositing over backgrounds. The synthetic photo follows the model that `petcomp
+matte film` solves for; --truth takes photos from a renderer.
 """
 
 import itertools
@@ -42,7 +44,7 @@ BLACKS, WHITES = (0.0, 0.1, 0.2, 0.3, 0.5), (0.6, 0.7, 0.8, 0.9, 1.0)
 
 
 class Files:
-    """The photos as files, and what the methods made of them."""
+    """The photos as files, and the results of the methods."""
 
     def __init__(self, folder, photos):
         folder.mkdir(parents=True, exist_ok=True)
@@ -56,23 +58,23 @@ class Files:
         return self.folder / f"{i}_{name}"
 
     def mean(self, action):
-        """Of what an action gives for number and photo."""
+        """Mean over the photos of what `action` returns for number and photo."""
         return statistics.fmean(action(i, photo) for i, photo in self.photos)
 
     def judged(self, read):
-        """The errors as a Peer wants them, of films that are read once a run is done."""
+        """The errors in the form that a Peer needs, from films that are read after a run."""
         return dict(error=lambda: self.mean(lambda i, photo: bottle.errors(photo, *read(i))["error"]),
                     more=lambda: {"alpha_error": self.mean(lambda i, photo: bottle.errors(photo, *read(i))["alpha_error"])})
 
     def film(self, name):
-        """What `petcomp matte film` wrote."""
+        """Errors of a file written by `petcomp matte film`."""
         return self.judged(lambda i: (linear.read_exr(self.at(i, name)), linear.read_exr(self.at(i, name), ["VR", "VG", "VB"])))
 
     def premultiplied(self, name):
         return self.judged(lambda i: (linear.read_exr(self.at(i, name)), 1 - linear.read_exr(self.at(i, name), "A")))
 
     def straight(self, name):
-        """Display-encoded with straight alpha."""
+        """Errors of a display-encoded file with straight alpha."""
         def read(i):
             codes = linear.read_codes(self.at(i, name))
             return linear.from_srgb(codes[..., :3]) * codes[..., 3:], 1 - codes[..., 3:]
@@ -104,7 +106,7 @@ def petcomps(comparison, files, args):
 
 
 def keyed(files, args, settings, name):
-    """petcomp's keyer on all photos; its error."""
+    """Run petcomp's keyer on all photos; return its error."""
     words = [word for key, value in settings.items() for word in ("--set", f"key.{key}={value}")]
     for i, photo in files.photos:
         seconds_of(pinned(args.petcomp, "-q", "matte", "key", files.at(i, "photo.exr"), "--screen", screen(photo), *words,
@@ -155,7 +157,7 @@ def chromakey(args, files, i, photo, similarity, blend, *, frames=0, out=None):
 
 
 def best_chromakey(args, files):
-    """Similarity and blend that suit these photos best: a person would look for them too."""
+    """Find the best similarity and blend for these photos, as a user would do by hand."""
     def error(pair):
         for i, photo in files.photos:
             seconds_of(chromakey(args, files, i, photo, *pair, out=files.at(i, "chromakey.png")))
@@ -217,7 +219,7 @@ def pymattings(comparison, files):
 
 
 def commands(files, args):
-    """What a person types: from a PNG to a file with alpha."""
+    """Time complete commands, from a PNG to a file with alpha."""
     comparison = Comparison("matte commands", args, WHOLE, described(files), ERROR, "the photo's own F and V")
     ours = version([args.petcomp, "--version"])
     def add(setting, words, judged):
@@ -239,10 +241,10 @@ def described(files):
 
 def main():
     parser = arguments(__doc__)
-    parser.add_argument("--truth", type=pathlib.Path, metavar="FOLDER", help="photos with truth instead of the drawn one")
-    parser.add_argument("--most", type=int, default=4, help="photos of that folder to take (default: %(default)s)")
-    parser.add_argument("--size", type=int, nargs=2, default=[640, 480], metavar=("W", "H"), help="of the drawn photo")
-    parser.add_argument("--no-pymatting", action="store_true", help="for large photos: it takes minutes for some megapixels")
+    parser.add_argument("--truth", type=pathlib.Path, metavar="FOLDER", help="photos with ground truth instead of the synthetic one")
+    parser.add_argument("--most", type=int, default=4, help="number of photos to use from that folder (default: %(default)s)")
+    parser.add_argument("--size", type=int, nargs=2, default=[640, 480], metavar=("W", "H"), help="size of the synthetic photo")
+    parser.add_argument("--no-pymatting", action="store_true", help="skip PyMatting, which takes minutes for some megapixels")
     parser.add_argument("--blender", default="blender", metavar="PROGRAM")
     parser.add_argument("--ffmpeg", default="ffmpeg", metavar="PROGRAM")
     args = parser.parse_args()

@@ -3,13 +3,13 @@
 
     make peers
     taskset -c 0 target/peers-python/bin/python tests/benches/peers/render.py [SCENE] [-o FOLDER] [--size W H]
-    target/release/petcomp-report render SCENE --size W H --cycles FOLDER/render    (the same points as a chart of its own)
+    target/release/petcomp-report render SCENE --size W H --cycles FOLDER/render    (the same points as a separate chart)
 
-The scene is a file of golden/render/scene_reference.py: one of golden/render, or one that
-`petcomp scene export SCENE RECIPE --to cycles DIR` wrote. Seconds are those of the rendering alone, without start, files and
-textures' pyramids, as each program tells its own processor time. Error: `petcomp-report render` measures both programs'
-against the picture of the largest count, which has seeds of its own and is kept for the next run. FOLDER/render gets Cycles'
-pictures (spp_00016.exr) and times.json.
+SCENE is a file for golden/render/scene_reference.py: one of golden/render, or one written by
+`petcomp scene export SCENE RECIPE --to cycles DIR`. Seconds are the processor time of the rendering alone as each program
+reports it, without start-up, files and texture pyramids. Error: `petcomp-report render` compares both programs with the
+image of the largest count, which has its own seeds and is kept for the next run. Cycles' images (spp_00016.exr) and
+times.json go to FOLDER/render.
 """
 
 import csv
@@ -33,7 +33,7 @@ PRESETS = ("draft", "normal", "good", "high", "reference")
 
 
 class Cycles:
-    """Cycles' pictures of a scene in a folder."""
+    """Cycles' images of a scene in a folder."""
 
     def __init__(self, args):
         self.args, self.folder = args, args.output / "render"
@@ -46,7 +46,7 @@ class Cycles:
                       "--size", *self.args.size)
 
     def render(self, samples):
-        """Processor seconds of one rendering; its picture is kept."""
+        """Render once, keep the image and return the processor seconds."""
         took = self.render_to(self.folder / self.name(samples), samples)
         self.seconds.setdefault(samples, []).append(took)
         self.tell()
@@ -71,8 +71,8 @@ class Cycles:
         (self.folder / "times.json").write_text(json.dumps({"program": self.program, "pictures": pictures}, indent=1) + "\n")
 
     def reference(self, samples):
-        """The picture that all are held against: the mean of parts with seeds of their own, of which those of an earlier
-        run with the same settings are kept. So a reference of an hour may be broken off."""
+        """Render the reference image: the mean of parts with their own seeds. Parts of an earlier run with the same
+        settings are reused, so that a reference of an hour may be interrupted."""
         kept, asked = self.folder / "reference.json", [str(self.args.scene), self.args.size, self.program, min(PART, samples)]
         told_before = json.loads(kept.read_text()) if kept.exists() else {}
         seconds = told_before["seconds"] if told_before.get("asked") == asked else []
@@ -90,7 +90,7 @@ class Cycles:
 
 
 class Report:
-    """What `petcomp-report render` tells, once a round."""
+    """The report of `petcomp-report render`, once per round."""
 
     def __init__(self, args, cycles):
         self.rounds, self.folder = [], args.output / "render" / "report"
@@ -98,7 +98,7 @@ class Report:
                               *args.size, "--cycles", cycles, "--golden", self.folder / "no_golden", "--repeats", 1)
 
     def rows(self, number):
-        """By program's first word and setting."""
+        """Rows of a round, by first word of the program and setting."""
         while len(self.rounds) <= number:
             spent(self.command)
             with open(self.folder / "render.csv", newline="") as source:
@@ -106,17 +106,17 @@ class Report:
         return self.rounds[number]
 
     def seconds(self, preset):
-        """A function that gives the next round's seconds each time."""
+        """Return a function that returns the seconds of the next round on each call."""
         numbers = iter(range(1 << 30))
         return lambda: float(self.rows(next(numbers))["petcomp", preset]["CPU s"])
 
     def error(self, *key):
-        """Of the last round: Cycles' pictures of it were there before."""
+        """Error in the last round, whose images by Cycles already existed."""
         return float(self.rounds[-1][key]["RMSE to Cycles"])
 
 
 def compare(comparison, args, cycles):
-    """Cycles first: petcomp's report of a round is to find the pictures of that round."""
+    """Add Cycles first, so that petcomp's report of a round finds the images of that round."""
     report, ours = Report(args, cycles.folder), version([args.petcomp, "--version"])
     for samples in args.counts:
         comparison.add("Cycles", cycles.program, f"{samples} spp", told(cycles.command(samples, "OUT")),

@@ -4,12 +4,12 @@
     make peers
     taskset -c 0 target/peers-python/bin/python tests/benches/peers/settle.py [-o FOLDER]
 
-Three heaps each of 20 and of 5 cards (and of 60, `--counts 20 5 60`, which takes minutes a round), which `petcomp-report
-settle --peers` draws and settles. Bullet gets the same boxes, masses, friction, damping, walls and starts, in three
-settings: its own defaults; petcomp's step and the scale that is recommended for small bodies (lengths times ten, gravity
-too); and that with a larger solver effort. It stops as petcomp does: all bodies slower than 1 cm/s and 0.5 rad/s for
-0.1 s, or after 10 s. Seconds are those of one heap in memory: petcomp's (library.rs) with the judgement of its end,
-Bullet's with the calls from Python, two a body and step. Overlap, the deepest of three heaps, is measured for both by the
+`petcomp-report settle --peers` draws and settles three heaps each of 20 and of 5 cards (also of 60 with `--counts 20 5 60`,
+which takes minutes per round). Bullet gets the same boxes, masses, friction, damping, walls and starts, in three settings:
+its own defaults; petcomp's time step with the scale recommended for small bodies (lengths and gravity times ten); and the
+latter with more solver iterations. It stops like petcomp: when all bodies are slower than 1 cm/s and 0.5 rad/s for 0.1 s,
+or after 10 s. Seconds are those of one heap in memory: petcomp (library.rs) including its check of the result, Bullet
+including calls from Python, two per body and step. Overlap, the deepest of three heaps, is measured for both by the
 separating-axis test below, in double precision.
 """
 import json
@@ -65,7 +65,7 @@ def world(p, case, step, iterations, scale):
 
 
 def fall(p, case, step, iterations, scale):
-    """Poses at the end in metres, and whether it came to rest."""
+    """Return the final poses in metres, and whether the heap came to rest."""
     bodies = world(p, case, step, iterations, scale)
     still, steps, rested = 0.0, 0, False
     while steps * step < LIMIT and not rested:
@@ -99,7 +99,7 @@ def depth(a, b):
 
 
 def judge(poses, case):
-    """Deepest overlap with another body, the floor or a wall, metres; number of bodies outside."""
+    """Return the deepest overlap with another body, the floor or a wall, metres, and the number of bodies outside."""
     solids = [(np.array(t), axes(q), np.array(size) / 2) for (t, q), size in zip(poses, case["boxes"])]
     room = np.array(case["scene"]["surface"]["size"]) / 2
     outside = sum(bool(np.any(np.abs(c[:2]) > room) or c[2] < 0) for c, _, _ in solids)
@@ -114,7 +114,7 @@ def judge(poses, case):
 
 
 def judged(cases, ends):
-    """The worst of some heaps."""
+    """Return the worst result of several heaps."""
     overlaps, outside = zip(*(judge(poses, case) for case, (poses, _) in zip(cases, ends)))
     return {"error": 1e3 * max(overlaps), "outside": sum(outside), "at_rest": sum(rested for _, rested in ends)}
 
@@ -153,7 +153,7 @@ def add(comparison, program, tells, setting, command, run, cases, ends, beside):
 
 def main():
     parser = arguments(__doc__)
-    parser.add_argument("--counts", type=int, nargs="+", default=[20, 5], help="cards a heap: 5, 20 or 60")
+    parser.add_argument("--counts", type=int, nargs="+", default=[20, 5], help="cards per heap: 5, 20 or 60")
     args = parser.parse_args()
     (args.output / "settle").mkdir(parents=True, exist_ok=True)
     drawn = args.output / "settle" / "heaps.json"

@@ -1,11 +1,11 @@
-"""Runs petcomp and other programs on the same input and cores, round by round, and writes what came of it.
+"""Runs petcomp and other programs on the same input and cores, round by round, and writes the results.
 
-A script makes a Comparison, adds a Peer for every program and setting, and ends with `finish`. In every round each peer
-runs once, so that whatever else the machine does hits all of them. Seconds are those of the processor, user and system
-together, of all threads and children: on the one core that `taskset` gives they are what a quiet machine's clock shows.
+A script creates a Comparison, adds a Peer for every program and setting, and calls `finish`. Each peer runs once per round,
+so that any other load on the machine affects all of them. Seconds are processor time, user plus system, of all threads and
+children; on the single core that `taskset` gives, they equal wall-clock time on an idle machine.
 
-A comparison counts either WHOLE processes, with their start and their files, or only the work INSIDE them, never both. A
-point is set beside petcomp's default, or beside another setting of petcomp that does the same thing.
+A comparison measures either WHOLE processes, with start-up and files, or only the work INSIDE them, never both. A point is
+compared with petcomp's default, or with another setting of petcomp that does the same thing.
 """
 
 import argparse
@@ -33,8 +33,8 @@ PINNED = ["taskset", "-c", ",".join(map(str, CORES))]
 
 @dataclass
 class Peer:
-    """A program at one setting. `run` does the work once and returns seconds; `error` judges what the last run left, and
-    `more` what else is worth knowing of it."""
+    """A program at one setting. `run` does the work once and returns seconds; `error` and `more` return the error and
+    further measures of the last run's result."""
 
     program: str
     version: str
@@ -53,7 +53,7 @@ class Peer:
 
 
 class Comparison:
-    """What is compared, and the peers that take part or are absent."""
+    """A comparison, with the peers that take part and those that are absent."""
 
     def __init__(self, stage, args, counted, input, error, reference):
         self.stage, self.args = stage, args
@@ -66,7 +66,7 @@ class Comparison:
 
     @contextlib.contextmanager
     def absent_if_it_fails(self, program):
-        """Around what needs another program: if it is not here, or fails, it is named as absent and the rest goes on."""
+        """Wrap work that needs another program: if that is missing or fails, list it as absent and continue."""
         try:
             yield
         except Exception as error:  # whatever another program's failure looks like
@@ -78,7 +78,7 @@ class Comparison:
         print(f"absent: {program}: {why}", file=sys.stderr)
 
     def finish(self):
-        """Runs everybody by turns, judges, writes the JSON and prints the table."""
+        """Run all peers in turn, measure errors, write the JSON and print the table."""
         for _ in range(self.args.runs):
             for peer in list(self.peers):
                 self.attempt(peer, lambda: peer.seconds.append(peer.run()))
@@ -90,7 +90,7 @@ class Comparison:
         print(self.table())
 
     def attempt(self, peer, action):
-        """A peer that fails is absent; if it is petcomp that fails, so does the comparison."""
+        """Mark a peer that fails as absent; if petcomp fails, the comparison fails."""
         if peer.program == "petcomp":
             return action()
         before = len(self.absent)
@@ -116,7 +116,7 @@ class Comparison:
 
 
 def arguments(doc):
-    """The options that all scripts share."""
+    """Return a parser with the options that all scripts share."""
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("target/peers"), metavar="FOLDER")
     parser.add_argument("-n", "--runs", type=int, default=5, help="rounds (default: %(default)s)")
@@ -127,7 +127,7 @@ def arguments(doc):
 
 
 def pinned(*command):
-    """A command as it is run and told: on the cores of this process."""
+    """Return a command that runs on the cores of this process, as it is run and printed."""
     return PINNED + [str(word) for word in command]
 
 
@@ -136,7 +136,7 @@ def told(command):
 
 
 def spent(command, env=None, accept=(0,)):
-    """Runs a command; returns the processor seconds of it and its children, and what it said."""
+    """Run a command; return the processor seconds of it and its children, and its output."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=env)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -150,20 +150,20 @@ def seconds_of(command, accept=(0,)):
 
 
 def here(action):
-    """Processor seconds of an action of this process, and what it gave."""
+    """Run an action in this process; return its processor seconds and its result."""
     start = time.process_time()
     given = action()
     return time.process_time() - start, given
 
 
 def version(command, pattern=r"(\d+\.\d+[^\s,]*)"):
-    """The first thing that looks like a version in what a program says of itself."""
+    """Return the first text in the output of a command that looks like a version."""
     return re.search(pattern, spent(command)[1]).group(1)
 
 
 @functools.cache
 def library():
-    """petcomp's library in a program of its own, tests/benches/peers/library.rs, built if it is not."""
+    """Return the path of tests/benches/peers/library.rs, a program for petcomp's library; build it if needed."""
     build = ["cargo", "build", "--quiet", "--release", "--locked", "--bench", "peers", "--message-format=json"]
     said = subprocess.run(build, stdout=subprocess.PIPE, text=True, check=True).stdout
     built = [json.loads(line) for line in said.splitlines()]
@@ -172,6 +172,6 @@ def library():
 
 
 def library_seconds(program, times, *task):
-    """Processor seconds of one piece of work: those of a process that does it so many times less those of one that only
-    reads, by the number of times."""
+    """Processor seconds of one piece of work: those of a process that does it `times` times, minus those of one that only
+    reads, divided by `times`."""
     return (seconds_of(pinned(program, times, *task)) - seconds_of(pinned(program, 0, *task))) / times

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""A photo turned into a metric top view: `petcomp camera rectify` and OpenCV's warpPerspective on the same photo.
+"""Warps a photo to a metric top view: `petcomp camera rectify` and OpenCV's warpPerspective on the same photo.
 
     make peers
     taskset -c 0 target/peers-python/bin/python tests/benches/peers/warp.py [-o FOLDER]
 
-The surface carries a pattern known in closed form (a zone plate over waves); the photo of it is its mean over each pixel,
-by 8 x 8 samples, as linear floats. Both programs get the photo in memory and the true homography's corners: petcomp solves
-its camera from them before the clock runs. Error: root of the mean square of what a top view differs from the pattern's
-mean over its own pixels, for a map as fine as the photo and for one a quarter as fine, where the photo is made smaller.
+The surface carries a pattern known in closed form (a zone plate over waves). Each pixel of the photo is the pattern's mean
+over 8 x 8 samples, as linear floats. Both programs get the photo in memory and the true homography's corners, from which
+petcomp solves its camera before timing starts. Error: RMSE between a top view and the pattern's mean over its pixels, for a
+map as fine as the photo and one a quarter as fine, for which the photo is downscaled.
 """
 
 import json
@@ -26,13 +26,13 @@ VIEW = 40.0, 1.0  # tilt in degrees, distance in metres
 
 
 def pattern(x, y):
-    """Scene-linear grey of a place on the surface, metres from its middle."""
+    """Scene-linear grey at a point of the surface, metres from its centre."""
     rings = np.cos(RINGS * (x**2 + y**2))
     return 0.5 + 0.2 * rings + 0.2 * np.sin(140 * x) * np.cos(90 * y)
 
 
 def mean_over_pixels(width, height, surface_from_pixel):
-    """The pattern through a homography, each pixel the mean of its samples; nothing beside the tray."""
+    """Render the pattern through a homography, each pixel the mean of its samples."""
     total = np.zeros((height, width))
     y, x = np.mgrid[:height, :width]
     for i in range(SAMPLES):
@@ -43,7 +43,7 @@ def mean_over_pixels(width, height, surface_from_pixel):
 
 
 def view():
-    """Pixels of the photo from metres on the tray (3 x 3), and the tray's corners in the photo."""
+    """Homography from metres on the tray to pixels of the photo (3 x 3), and the tray's corners in the photo."""
     tilt, away = np.radians(VIEW[0]), VIEW[1]
     c, s = np.cos(tilt), np.sin(tilt)
     rotation, translation = np.array([[1, 0, 0], [0, -c, -s], [0, s, -c]]), np.array([0, 0, away])
