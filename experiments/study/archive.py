@@ -1,4 +1,4 @@
-"""What detectors found, beside `results.csv`: results outlive the cache, and join those of other machines."""
+"""Detections stored with `results.csv`, so that results outlive the cache and can be joined with other machines'."""
 
 import csv
 import io
@@ -11,7 +11,7 @@ FILE = "matches.npz"
 
 
 def write(folder, matches):
-    """Whose picture each detection is (surest first), at which IoUs it is right, and how many true boxes there are."""
+    """Write the picture of each detection (surest first), the IoUs at which it is right, and the true box counts."""
     arrays = {}
     for arm, seeds in matches.items():
         for seed, rooms in seeds.items():
@@ -32,7 +32,7 @@ def packed(name, one):
 
 
 def read(folder):
-    """Rows and matches by arm and seed."""
+    """Read rows and matches by arm and seed."""
     known = {}
     if not (folder / FILE).exists():
         return known
@@ -46,7 +46,7 @@ def read(folder):
 
 
 def rows(folder):
-    """Those of `results.csv`, if it is there."""
+    """Rows of `results.csv`, if it exists."""
     path = folder / "results.csv"
     if not path.exists():
         return []
@@ -59,7 +59,7 @@ def numbers(row):
 
 
 def tested(rows):
-    """How many pictures of each room a detector was tested on."""
+    """Number of test pictures per room."""
     return {row["room"]: row["pictures"] for row in rows}
 
 

@@ -1,7 +1,7 @@
-"""Ultralytics' augmentations on the GPU that trains, which would wait for processors that make them.
+"""Ultralytics' augmentations on the training GPU, which would otherwise wait for the CPU.
 
-Its default settings without albumentations: mosaics of four pictures, scaled, shifted and mirrored, their hue, saturation
-and value changed.
+The default settings without albumentations: mosaics of four pictures, scaled, shifted and mirrored, with changes of hue,
+saturation and value.
 """
 
 import cv2
@@ -21,8 +21,8 @@ MOSAIC_CORNERS = np.array([[1, 1], [0, 1], [1, 0], [0, 0]])
 
 
 class Pictures:
-    """All pictures of a source, of one size as those of all sources: red, green and blue on the GPU, and boxes by their
-    corners, in shares of them."""
+    """All pictures of a source, RGB on the GPU, with boxes as corners relative to the picture size. The pictures of all
+    sources have the same size."""
 
     def __init__(self, paths, classes, device):
         self.paths = paths
@@ -41,14 +41,14 @@ def read_rows(label):
 
 
 def corners_of(boxes):
-    """Upper left and lower right corner of boxes by centre and size."""
+    """Convert boxes from centre and size to top left and bottom right corner."""
     centre, half = boxes[:, :2], boxes[:, 2:] / 2
     return np.hstack([centre - half, centre + half])
 
 
 class Loader:
-    """Batches as Ultralytics' trainer asks for them. `sources` keep their own mosaics; `batches` are indices into all of
-    them."""
+    """Batches in the form that Ultralytics' trainer expects. Each of the `sources` has its own mosaics; `batches` are
+    indices into all of them."""
 
     num_workers = 0
     drop_last = True
@@ -68,7 +68,7 @@ class Loader:
             yield self.made(np.random.default_rng([self.seed, number]), self.batches.indices(number))
 
     def reset(self):
-        """No workers are to start anew."""
+        """Do nothing: there are no workers to restart."""
 
     def close_mosaic(self, hyp):
         self.is_mosaic = False
@@ -95,7 +95,7 @@ class Loader:
         }
 
     def chosen(self, rng, index):
-        """The source of a picture, and what is in its mosaic."""
+        """Return the source of a picture and the pictures of its mosaic."""
         for source in self.sources:
             if index < len(source):
                 others = rng.integers(len(source), size=3) if self.is_mosaic else []
@@ -103,7 +103,7 @@ class Loader:
             index -= len(source)
 
     def placed(self, rng, source):
-        """A canvas of pictures, and where it lies in the result."""
+        """Return a canvas of pictures and its position in the result."""
         height, width = source.pixels.shape[2:]
         sides = np.array([width, height]) * self.size / max(width, height)
         if self.is_mosaic:
@@ -123,7 +123,7 @@ class Loader:
 
 
 def composed(pixels, places, size):
-    """[batch, 3, size, size] of [batch, parts, 3, height, width]; bilinear."""
+    """Compose [batch, parts, 3, height, width] to [batch, 3, size, size]; bilinear."""
     result = pixels.new_full((len(places), 3, size, size), GREY)
     for part in range(pixels.shape[1]):
         across, down = (sources(places, part, axis, size, pixels.device) for axis in (0, 1))
@@ -135,7 +135,7 @@ def composed(pixels, places, size):
 
 
 def sources(places, part, axis, size, device):
-    """Where pixels of the result come from in a picture, from -1 to 1 within it; [batch, size]."""
+    """Positions in a picture that pixels of the result come from, -1 to 1 inside it; [batch, size]."""
     pixel = np.arange(size) + 0.5
     rows = []
     for place in places:
@@ -147,7 +147,7 @@ def sources(places, part, axis, size, device):
 
 
 def boxes_of(source, parts, place, size, is_mirrored):
-    """Rows of class, centre and size, in shares of the result, of what is left of boxes."""
+    """Rows of class, centre and size, relative to the result, of the visible parts of boxes."""
     kinds = np.concatenate([source.kinds[part] for part in parts])
     sides = np.tile(place["sides"], 2)
     on_canvas = [source.boxes[part] * sides + np.tile(corner, 2) for part, corner in zip(parts, place["corners"])]
@@ -169,7 +169,7 @@ def is_left(whole, seen):
 
 
 def recoloured(image, gains):
-    """0 to 255; of each picture hue moved by a share of the circle, saturation and value by shares of themselves."""
+    """Shift the hue of each picture by a fraction of the circle and scale saturation and value; 0 to 255."""
     hue_gain, saturation_gain, value_gain = torch.from_numpy(gains).float().to(image.device)[..., None, None].unbind(1)
     red, green, blue = (image / 255).unbind(1)
     value, _ = image.max(1)

@@ -1,4 +1,4 @@
-"""Intervals: by bootstrap over pictures, and by how much chance there is in a training."""
+"""Confidence intervals from the bootstrap over pictures and the random variation of trainings."""
 
 import zlib
 
@@ -16,14 +16,14 @@ TRAINING_DEVIATION = 0.0303
 def samples(arm, rounds=ROUNDS):
     """mAP@0.5:0.95 of an arm, mean over seeds and rooms, in each round.
 
-    `arm[seed][room]` are the matches of the classes. In a round the pictures of a room are the same
-    for every arm, so ratios of two arms are paired.
+    `arm[seed][room]` are the matches of the classes. In each round, every arm has the same pictures of a
+    room, so ratios of two arms are paired.
     """
     return np.array([np.mean([over_rooms(turn, rooms) for rooms in arm.values()]) for turn in range(rounds)])
 
 
 def with_chance(name, samples, trainings):
-    """Samples of an arm, `CHANCES` times as many, with the chance that there is in the mean of so many trainings."""
+    """`CHANCES` times as many samples of an arm, with the random variation of a mean over this many trainings."""
     deviation = TRAINING_DEVIATION / np.sqrt(trainings)
     # Drawn for each arm by itself, unlike the pictures.
     chance = np.random.default_rng(zlib.crc32(name.encode())).normal(0, deviation, (CHANCES, len(samples)))
@@ -41,7 +41,7 @@ def picture_times(turn, room, matches):
 
 
 def map_of(matches, times):
-    """Mean over the classes that are there, as COCO has it."""
+    """Mean over the classes that occur, as in COCO."""
     found = [one.average_precision(times) for one in matches]
     found = [values.mean() for values in found if values is not None]
     return np.mean(found) if found else 0.0

@@ -1,4 +1,4 @@
-"""How much chance there is in a training: how far those of an arm differ in nothing but their seed.
+"""Random variation of trainings: how much those of an arm that differ only in their seed vary.
 
     python -m study.chance results/first_rooms
 """
@@ -25,7 +25,7 @@ def said(name, deviation, freedom):
 
 
 def of_seeds(rows):
-    """mAP@0.5:0.95 of each seed, mean over rooms, by arm; of the arms with several seeds."""
+    """mAP@0.5:0.95 of each seed, mean over rooms, by arm, for arms with several seeds."""
     scores = {}
     for row in rows:
         scores.setdefault(row["arm"], {}).setdefault(row["seed"], []).append(float(row["map50_95"]))

@@ -1,4 +1,4 @@
-"""Things without a label that fall among the bottles, drawn on a green screen: a cap, a ring, a carton and a can."""
+"""Unlabelled things that fall among the bottles, drawn on a green screen: a cap, a ring, a carton and a can."""
 
 import cv2
 import numpy as np
@@ -16,7 +16,7 @@ THINGS = {
 
 
 def entries(folder):
-    """As a list of photos has them."""
+    """Entries of the distractors for a list of photos."""
     return [entry(name, draw(name, folder / f"{name}.png"), THINGS[name][0]) for name in THINGS]
 
 

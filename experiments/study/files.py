@@ -1,4 +1,4 @@
-"""Files that are whole or not there."""
+"""Atomic writing of files."""
 
 import json
 import os
@@ -24,6 +24,6 @@ def write_json(path, value):
 
 
 def label_of(picture):
-    """Where the labels of a picture are: YOLO's rule, `labels` for the last `images`."""
+    """Path of a picture's labels by YOLO's rule: the last `images` becomes `labels`."""
     before, after = str(picture).rsplit("/images/", 1)
     return Path(before, "labels", after).with_suffix(".txt")

@@ -1,11 +1,11 @@
-"""How bottles lie and how trays look in reality and in synthetic pictures.
+"""Compares the positions of bottles and the look of trays in reality and in synthetic pictures.
 
     python -m study.heaps [--rooms 21,22] WORLD SYNTHETIC...
 
-A line each for the piles of a world and for folders of datasets: where their bottles are, as shares of
-half the surface's width and height, how many of them are labelled, and the luma on the tray's floor:
-the share of it that is darker than 0.45 of its median, and its standard deviation over its mean. Of reality
-it takes the pictures for training, of the rooms for choosing.
+Prints a row for the piles of a world and one for each dataset folder: the positions of the bottles relative to
+half the surface's width and height, how many are labelled, and the luma of the tray's floor: the share darker
+than 0.45 of its median, and its standard deviation divided by its mean. Reality means the training pictures of
+the rooms used for choosing.
 """
 
 import argparse
@@ -23,7 +23,7 @@ FLOOR = (160, 110)
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--rooms", default="21,22", help="comma list (default 21,22)")
+    parser.add_argument("--rooms", default="21,22", help="comma-separated list (default 21,22)")
     parser.add_argument("world", type=Path)
     parser.add_argument("datasets", type=Path, nargs="*")
     options = parser.parse_args()
@@ -36,7 +36,7 @@ def main():
 
 
 def real_pile(path):
-    """`(x, y, labelled)` of each bottle, and the floor."""
+    """Return `(x, y, labelled)` of each bottle, and the floor."""
     pile = json.loads(path.read_text())
     half = np.array(pile["tray"]["floor_m"]) / 2
     poses = [np.array(bottle["pose"])[:2, 3] / half for bottle in pile["bottles"]]
@@ -58,7 +58,7 @@ def synthetic_heap(path):
 
 
 def corners_px(camera, half):
-    """Of a surface, in the order of the world's: from the upper left one, clockwise."""
+    """Corners of a surface in the order of the world's: clockwise from the top left."""
     corners = np.array([[-1, 1], [1, 1], [1, -1], [-1, -1]]) * half
     pose = camera["camera_from_world"]
     seen = np.c_[corners, np.zeros(4)] @ rotation(pose["rotation"]).T + pose["translation"]
@@ -72,7 +72,7 @@ def rotation(quaternion):
 
 
 def floor(picture, corners):
-    """Its luma, seen from straight above."""
+    """Luma of the floor, seen from straight above."""
     straight = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32) * np.array(FLOOR, np.float32)
     above = cv2.getPerspectiveTransform(np.array(corners, np.float32), straight)
     codes = cv2.cvtColor(cv2.imread(str(picture)), cv2.COLOR_BGR2GRAY)

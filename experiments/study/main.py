@@ -1,4 +1,4 @@
-"""What `experiments/run` does, once Python has what it needs."""
+"""The work of `experiments/run`, once the Python packages are installed."""
 
 import dataclasses
 import importlib.util
@@ -30,7 +30,7 @@ def run(options, cache, program):
 
 
 def full(options, cache, program):
-    """Other rooms are another study: nothing of it was seen while choosing."""
+    """The full study. Other rooms make another study, of which nothing was seen while choosing."""
     arms = read_arms()
     if options.screening:
         arms["reality"] |= screening.chosen(arms, options.screening).get("reality", {})
@@ -45,7 +45,7 @@ def full(options, cache, program):
 
 
 def train_on_gpu(arms):
-    """Another detector; what is trained longer or shorter than others is so by the same factor."""
+    """Switch to the detector for GPUs and scale the lengths of all trainings by the same factor."""
     training, on_gpu = arms["training"], arms["on_gpu"]
     factor = on_gpu["images"] / training["images"]
     for settings in (training["short"], *arms["arms"].values()):
@@ -59,7 +59,7 @@ def kept(study):
 
 
 def smoke(cache, program):
-    """The same with tiny sizes."""
+    """The study with tiny sizes."""
     arms = read_arms()
     tiny = arms["smoke"]
     for part in ("training", "reality", "synthetic"):
@@ -95,7 +95,7 @@ def chosen(options, arms):
 
 
 def check_planned(study, folder, names, seeds):
-    """Hours of training are not to end in a refusal."""
+    """Check before training, so that hours of it do not end in an error."""
     results.check(study, folder, [(arm, seed) for arm in names for seed in study.seeds(arm, seeds)])
 
 
@@ -105,7 +105,7 @@ def check_parts():
 
 
 def check_archive(study, folder, means):
-    """Results are the same without the trainings that they are from."""
+    """Check that the results stay the same without the trainings that they come from."""
     shutil.rmtree(study.cache / "runs", ignore_errors=True)
     _, archived = results.scored(study, folder)
     if results.means(archived) != means:
@@ -113,7 +113,7 @@ def check_archive(study, folder, means):
 
 
 def check_refusals(study, folder):
-    """Scores of other test pictures are not mixed in, and rows are not lost."""
+    """Check that scores on other test pictures are not mixed in, and that no rows get lost."""
     reality = study.arms["reality"] | {"test_pictures": study.test_pictures - 1}
     check_refused(dataclasses.replace(study, arms=study.arms | {"reality": reality}), folder)
     alone = files.write_text(study.cache / "rows_alone/results.csv", (folder / "results.csv").read_text())
@@ -129,7 +129,7 @@ def check_refused(study, folder):
 
 
 def write(study, folder):
-    """Writes tables and page; returns the mean score of each arm."""
+    """Write tables and page; return the mean score of each arm."""
     results.check(study, folder)
     rows, matches = results.scored(study, folder)
     if not rows:

@@ -1,8 +1,8 @@
-"""Naive cut-and-paste: what petcomp has to beat.
+"""Naive cut-and-paste: the baseline that petcomp has to beat.
 
-The same cut-outs over the same photos of the place, at random places, turns and sizes: no camera, no
-physics, no light. Sizes go from a tenth to four tenths of the picture's width, as where nobody knows
-how large anything is.
+It puts the same cut-outs on the same photos of the place with random positions, rotations and sizes: no
+camera, no physics, no light. Sizes range from a tenth to four tenths of the picture's width, as if no real
+sizes were known.
 """
 
 import os
@@ -33,7 +33,7 @@ def generate(assets, backgrounds, count, seed, folder):
 
 
 def load_cut_outs(assets):
-    """`(class, premultiplied colour and alpha, scene-linear)` of every photo."""
+    """Load `(class, premultiplied scene-linear RGBA)` of every photo."""
     manifest = tomllib.loads((assets / "assets.toml").read_text())
     return [
         (manifest["classes"].index(asset["class"]), load_rgba(assets / photo["file"]))
@@ -81,7 +81,7 @@ def placed(rng, cut_out, size):
 
 
 def label_rows(masks, classes):
-    """YOLO rows of what is seen well enough; later ones lie on top."""
+    """YOLO rows of sufficiently visible objects; later ones lie on top."""
     width, height = reality.SIZE
     covered = np.zeros((height, width), bool)
     rows = []

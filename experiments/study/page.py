@@ -1,4 +1,4 @@
-"""One HTML page of a study: tables, plots, and a look at the pictures."""
+"""The HTML page of a study: tables, plots and sample pictures."""
 
 import base64
 import html
@@ -93,7 +93,7 @@ def arm_rows(summary):
 
 
 def switches(study, effects):
-    """What each switch gives in a design in which each is on in half of the generators."""
+    """Effect of each switch, in a design where each is on in half of the generators."""
     if not effects:
         return []
     tables = [part for name, rows in effects.items() for part in screened(study.arms["screenings"][name], rows)]
@@ -137,7 +137,7 @@ def shares(study, summary):
 
 
 def shares_plot(study, summary, lines):
-    """How far each share of the real pictures gets, alone and with each generator."""
+    """Plot of the score by share of the real pictures, alone and with each generator."""
     figure, axes = pyplot.subplots(figsize=(8, 4))
     for generator, arms in lines.items():
         of_real = [study.arms["arms"][arm].get("real", 0) for arm in arms]
@@ -153,8 +153,8 @@ def shares_plot(study, summary, lines):
 
 
 def by_generator(study, summary):
-    """Arms of one class and length whose batches have a share of each source, by their generator, in the order of their
-    shares of the real pictures."""
+    """Arms of the default classes and length whose batches have a share of each source, by generator, ordered by
+    their share of the real pictures."""
     lines = {}
     for arm in sorted(summary, key=lambda arm: study.arms["arms"][arm].get("real", 0)):
         options = study.arms["arms"][arm]
@@ -187,7 +187,7 @@ def svg(figure):
 
 
 def sheets(study):
-    """A few pictures of reality and of each generator that was used."""
+    """A few pictures of reality and of each generator used."""
     for room in study.rooms:
         yield sheet(f"room {room}", study.world / f"room{room}/real/piles/images")
     for name in study.arms["generators"]:

@@ -1,4 +1,4 @@
-"""The pictures that play reality, and what a user would have of the place: see `world/make.py`."""
+"""The pictures that stand for reality, and what a user would have of the place: see `world/make.py`."""
 
 import json
 import random
@@ -22,7 +22,7 @@ THICKNESS_STEP = 0.005
 
 
 def pictures(world, room, name, count):
-    """The first pictures of a set, whole names."""
+    """Full paths of the first pictures of a set."""
     folder = world / f"room{room}" / name / "piles"
     found = sorted((folder / "images").glob("*.jpg"))[:count]
     if len(found) < count:
@@ -31,7 +31,7 @@ def pictures(world, room, name, count):
 
 
 def truth(world, room, count, classes, folder):
-    """YOLO labels of the test pictures of a room, as they are or all of one class."""
+    """Write YOLO labels of the test pictures of a room, unchanged or all with one class."""
     for picture in pictures(world, room, "test", count):
         label = files.label_of(picture)
         rows = [line.split() for line in label.read_text().splitlines()]
@@ -41,8 +41,8 @@ def truth(world, room, count, classes, folder):
 
 
 def photo_list(world, count, cut_out, has_thickness, others, folder):
-    """What a user writes of the photos of bottles: class, and by a tape measure the length and, if
-    asked for, the thickness. `others` are entries of photos that are none of bottles."""
+    """Write the list of photos of a user: class, and length and optionally thickness by tape measure.
+    `others` are entries of photos that do not show bottles."""
     lines = [f"classes = {json.dumps(files.CLASSES)}\n"]
     if cut_out:
         lines += ["[cut_out]\n", *(f"{key} = {json.dumps(value)}\n" for key, value in cut_out.items())]
@@ -67,7 +67,7 @@ def entry(world, index, photo, has_thickness):
 
 
 def backgrounds(world, rooms, measured, folder):
-    """Photos of the empty trays, with four corners that a person clicked on, and what else was `measured`."""
+    """Write photos of the empty trays, with four corners clicked by hand and what else was `measured`."""
     for room in rooms:
         albedo = measured_albedo(world, room, measured)
         for path in sorted((world / f"room{room}/backgrounds").glob("*.json")):
@@ -100,7 +100,7 @@ def plane_label(photo, name, room, albedo):
 
 
 def measured_albedo(world, room, measured):
-    """Of each place once, in a photo with a sheet of white paper: its luminance, or its colour."""
+    """Albedo of a place, as luminance or colour, measured once in a photo with a sheet of white paper."""
     if not measured:
         return {}
     path = world / f"room{room}/paper/backgrounds/bg0000.json"
@@ -117,7 +117,7 @@ def measured_albedo(world, room, measured):
 
 
 def linear_picture(path):
-    """Scene-linear red, green and blue."""
+    """Read a picture as scene-linear RGB."""
     display = cv2.imread(str(path))[..., ::-1] / 255
     return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4)
 

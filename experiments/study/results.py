@@ -1,4 +1,4 @@
-"""Tables of a study: every score with what is needed to repeat it, and means with intervals."""
+"""Tables of a study: every score with the data needed to reproduce it, and means with intervals."""
 
 import csv
 import io
@@ -16,8 +16,8 @@ SUMMARY_COLUMNS = "arm seeds mean low high against ratio ratio_low ratio_high".s
 
 
 def check(study, folder, planned=()):
-    """Only scores of the same test pictures are compared, and every row of `results.csv` is still known, or of a
-    training that is planned."""
+    """Check that all scores are on the same test pictures, and that every row of `results.csv` is still known or
+    belongs to a planned training."""
     tested = {key: archive.tested(rows) for key, (rows, _) in archive.read(folder).items()}
     tested |= {key: studies.tested(study, *key) for key in study.trained()}
     tested = {(arm, seed): pictures for (arm, seed), pictures in tested.items() if arm in study.arms["arms"]}
@@ -45,8 +45,8 @@ def check_kept(folder, known):
 
 
 def scored(study, folder):
-    """Rows of `results.csv`, and the matches by arm, seed and room, of all that is trained: here, or where the results
-    in the folder come from."""
+    """Rows of `results.csv`, and matches by arm, seed and room, of all finished trainings: those here and those that
+    the results in the folder come from."""
     rows, matches, archived, trained = [], {}, archive.read(folder), study.trained()
     for arm in study.arms["arms"]:
         for seed in sorted(seed for name, seed in archived.keys() | trained if name == arm):
@@ -87,7 +87,7 @@ def over_pictures(matches):
 
 
 def with_chance(drawn, matches):
-    """The same, with the chance that there is in trainings."""
+    """The same with the random variation of trainings."""
     return {arm: bootstrap.with_chance(arm, rounds, len(matches[arm])) for arm, rounds in drawn.items()}
 
 
@@ -97,8 +97,8 @@ def means(matches):
 
 
 def summary(study, matches, means, drawn):
-    """Mean over seeds and rooms of mAP@0.5:0.95 of each arm, its interval, and its ratio to the arm
-    that it is held against."""
+    """Mean of mAP@0.5:0.95 over seeds and rooms of each arm, its interval, and its ratio to the arm that
+    it is compared with."""
     return {
         arm: {
             "seeds": len(matches[arm]),
@@ -111,12 +111,12 @@ def summary(study, matches, means, drawn):
 
 
 def ratios(study, means, drawn):
-    """Those of the headline, as far as their arms are trained."""
+    """Ratios of the headline, as far as their arms are trained."""
     return [one | against(*one["arms"], means, drawn) for one in study.arms["ratios"]]
 
 
 def against(arm, other, means, drawn):
-    """The ratio of two arms, where both are there and the other one has found anything."""
+    """Ratio of two arms, if both exist and the other one found anything."""
     if arm == other or arm not in means or means.get(other, 0) == 0:
         return {}
     rounds = drawn[arm] / np.maximum(drawn[other], np.finfo(float).tiny)

@@ -1,7 +1,7 @@
-"""Average precision of what a detector found, and what its intervals need.
+"""Average precision of a detector, and the data for its intervals.
 
-The scores are those of `petcomp eval`; pycocotools gives them beside it, and who was matched with
-whom. From that the bootstrap knows the score of any other choice of pictures.
+The scores come from `petcomp eval`; pycocotools confirms them and provides the matches. From these the
+bootstrap computes the score of any other selection of pictures.
 """
 
 import contextlib
@@ -23,15 +23,15 @@ TOLERANCE = 1e-6
 
 @dataclass
 class Matches:
-    """Of one class: for each detection, surest first, its picture and at which IoUs it is right; and
-    the number of true boxes of each picture."""
+    """Matches of one class: for each detection, highest confidence first, its picture and the IoUs at
+    which it is right; and the number of true boxes in each picture."""
 
     picture: np.ndarray
     right: np.ndarray
     truths: np.ndarray
 
     def average_precision(self, times):
-        """At each IoU, where picture k is there `times[k]` times."""
+        """Average precision at each IoU if picture k occurs `times[k]` times."""
         total = self.truths @ times
         if total == 0:
             return None
@@ -71,7 +71,7 @@ def check_equal(predictions, name, scores):
 
 
 def mean_precision(metrics):
-    """mAP@0.5 and mAP@0.5:0.95 over the classes that are there."""
+    """mAP@0.5 and mAP@0.5:0.95 over the classes that occur."""
     of_classes = [one["ap"] for one in metrics["classes"] if one["truths"]]
     return np.mean([values[0] for values in of_classes]), np.mean(of_classes)
 
@@ -105,7 +105,7 @@ def coco_evaluation(predictions, truth, size, classes):
 
 
 def rows(path, size):
-    """`(class, [x, y, width, height], confidence)` in pixels of each row."""
+    """Yield `(class, [x, y, width, height], confidence)` of each row, in pixels."""
     lines = [line.split() for line in path.read_text().splitlines()] if path.exists() else []
     for c, x, y, w, h, *confidence in lines:
         w, h = float(w) * size[0], float(h) * size[1]
@@ -114,7 +114,7 @@ def rows(path, size):
 
 
 def class_matches(evaluation, category, count):
-    """pycocotools keeps them by class, area and picture; the first area is all sizes."""
+    """Matches of a class. pycocotools orders them by class, area and picture; the first area is all sizes."""
     areas = len(evaluation.params.areaRng)
     first = category * areas * count
     of_pictures = evaluation.evalImgs[first : first + count]

@@ -1,7 +1,7 @@
-"""Many switches at once, by a Plackett-Burman design: each is on in half of the generators.
+"""Tests many switches at once by a Plackett-Burman design: each is on in half of the generators.
 
-So every switch is judged by all trainings, where comparisons one by one judge it by two of them. As most
-switches give little, the effects of all show what chance alone gives (Lenth 1989).
+All trainings contribute to the effect of every switch, instead of only two as in one-by-one comparisons. Most
+switches have little effect, so the distribution of all effects shows what chance alone does (Lenth 1989).
 """
 
 import numpy as np
@@ -13,14 +13,14 @@ T_QUANTILE = 2.879
 
 
 def design():
-    """Runs by columns: what is on."""
+    """The design matrix: rows are runs, columns are switches that are on or off."""
     first = np.array([sign == "+" for sign in FIRST_ROW])
     rotations = [np.roll(first, k) for k in range(len(first))]
     return np.array([*rotations, np.zeros(len(first), bool)])
 
 
 def add_arms(arms):
-    """The generators and arms of `[screenings]`."""
+    """Add the generators and arms of `[screenings]`."""
     for name, screening in arms["screenings"].items():
         add_runs(arms, name, screening)
 
@@ -55,8 +55,8 @@ def combined(base, switches):
 
 
 def effects(study, means, drawn):
-    """What each switch gives, by screening: the ratio of scores with and without it, and its interval. Of those
-    of which all runs are trained."""
+    """Effect of each switch, by screening: the ratio of scores with and without it, and its interval. Includes only
+    screenings whose runs are all trained."""
     return {
         name: of_switches(screening["switches"], [means[run] for run in runs(name)], [drawn[run] for run in runs(name)])
         for name, screening in study.arms["screenings"].items()
@@ -76,7 +76,7 @@ def of_switches(switches, means, drawn):
 
 
 def standard_error(effects):
-    """Of effects most of which are none: Lenth's pseudo standard error."""
+    """Lenth's pseudo standard error, for effects most of which are zero."""
     sizes = np.abs(effects)
     rough = 1.5 * np.median(sizes)
     return 1.5 * np.median(sizes[sizes < 2.5 * rough])

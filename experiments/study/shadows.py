@@ -1,10 +1,10 @@
-"""How dark the shadows of cut-outs are, beside those that Cycles gives the same bottles.
+"""Compares the darkness of cut-outs' shadows with those that Cycles renders for the same bottles.
 
     cache/python/bin/python -m study.shadows ASSETS SHADOWS -o PICTURE.png
 
-ASSETS is an asset folder made from photographs of the world, SHADOWS what `world.py shadows` has written about
-the bottles of that library. A cut-out takes from the light that passes it what it takes from the line of sight: 1 minus its
-view transmittance. What counts is the light lost, over the area of the shadow's outline.
+ASSETS is an asset folder built from photographs of the world, SHADOWS the output of `world.py shadows` for the bottles of
+that library. A cut-out blocks the same share of light along a light ray as along the line of sight: 1 minus its view
+transmittance. The measure is the lost light divided by the area of the shadow's outline.
 """
 
 import argparse
@@ -50,7 +50,7 @@ def name_of(record):
 
 
 def lost_light(assets):
-    """By asset: square metres of light that its first cut-out stops, per channel."""
+    """Yield, by asset, the light that its first cut-out stops, square metres per channel."""
     for asset in tomllib.loads((assets / "assets.toml").read_text())["assets"]:
         photo = asset["photos"][0]
         channels = OpenEXR.File(str(assets / photo["file"])).channels()

@@ -1,5 +1,5 @@
-"""In the place of `train.py` where there is no PyTorch: boxes near the true ones, for a look at whether
-everything around a training runs.
+"""Replaces `train.py` if PyTorch is missing: writes boxes near the true ones, to test everything around a
+training.
 
     python -m study.stand_in TRAINING.json
 """

@@ -1,9 +1,9 @@
-"""What each switch of the recipe looks like, and what it costs.
+"""Shows the look and the cost of each switch of the recipe.
 
     cache/python/bin/python -m study.strips PROGRAM OUT
 
-Writes OUT/switches.jpg, a row for each switch with the same pictures without and with it, their labels drawn,
-and OUT/switches.csv with milliseconds of one thread a picture. Everything is from the samples in the repository.
+Writes OUT/switches.jpg, with a row for each switch that shows the same pictures without and with it and their
+labels, and OUT/switches.csv with single-thread milliseconds per picture. Inputs are the repository's samples.
 """
 
 import argparse
@@ -30,8 +30,8 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program", type=Path)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--pictures", type=int, default=24, help="that are timed (default 24)")
-    parser.add_argument("--rounds", type=int, default=3, help="of timing, the quickest counts (default 3)")
+    parser.add_argument("--pictures", type=int, default=24, help="pictures to time (default 24)")
+    parser.add_argument("--rounds", type=int, default=3, help="timing rounds, of which the fastest counts (default 3)")
     options = parser.parse_args()
     arms = studies.read_arms()
     recipe = make_recipe(options.program.resolve(), options.out)
@@ -42,18 +42,18 @@ def main():
 
 
 def screening(arms):
-    """That whose switches are shown, and the base of all."""
+    """The screening whose switches are shown; its base is the base of all."""
     return arms["screenings"]["first"]
 
 
 def switches(arms):
-    """`both`, `off` and `on` by name."""
+    """Changes `both`, `off` and `on` of each switch, by name."""
     screened = {name: {"on": switch["set"]} for name, switch in screening(arms)["switches"].items()}
     return screened | arms["strips"]["switches"]
 
 
 def make_recipe(program, out):
-    """Of the samples; some of their bottles are distractors, which fall only where the recipe has some."""
+    """Write a recipe for the samples, with some bottles as distractors, which fall only if the recipe has any."""
     photos = (SAMPLES / "bottles/photos.toml").read_text().replace('file = "', f'file = "{SAMPLES}/bottles/')
     entries = [as_distractor(entry) for entry in photos.split("[[photos]]")]
     listed = files.write_text(out / "photos.toml", "[[photos]]".join(entries))
@@ -68,7 +68,7 @@ def as_distractor(entry):
 
 
 def row(options, arms, recipe, name, switch):
-    """The pictures without and with a switch, and its name with the milliseconds of both."""
+    """Return the pictures without and with a switch, and its name with the milliseconds of both."""
     base = arms["synthetic"]["set"] + synthetic.described(arms["generators"], screening(arms)["base"])["set"]
     changes = {side: base + switch.get("both", []) + switch.get(side, []) for side in ("off", "on")}
     times = {side: [] for side in changes}
@@ -82,7 +82,7 @@ def row(options, arms, recipe, name, switch):
 
 
 def generate(options, recipe, changes, folder):
-    """CPU milliseconds a picture."""
+    """Generate pictures; return CPU milliseconds per picture."""
     words = [word for change in changes for word in ("--set", change)]
     command = [options.program.resolve(), "-q", "-j", "1", "dataset", "generate", recipe, *words]
     shutil.rmtree(folder, ignore_errors=True)

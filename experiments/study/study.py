@@ -1,4 +1,4 @@
-"""One study: the arms, where everything lies, and what is done in which order."""
+"""A study: its arms, its folders and the order of its steps."""
 
 import concurrent.futures
 import json
@@ -16,7 +16,7 @@ HERE = Path(__file__).parents[1]
 
 @dataclass
 class Study:
-    """`cache` holds what can be made again; `world` the reality."""
+    """A study. `cache` holds everything that can be regenerated, `world` the reality."""
 
     arms: dict
     cache: Path
@@ -40,7 +40,7 @@ class Study:
 
     @property
     def test_pictures(self):
-        """Of each room."""
+        """Number of test pictures per room."""
         return self.arms["reality"].get("test_pictures", self.arms["reality"]["pictures"])
 
     def petcomp(self, *words):
@@ -64,24 +64,24 @@ class Study:
         return self.arms["arms"][arm].get("classes", self.arms["training"]["classes"])
 
     def training(self, arm):
-        """How its detectors are trained."""
+        """Training settings of an arm."""
         settings = dict(self.arms["training"])
         short = settings.pop("short", {})
         return settings | (short if self.arms["arms"][arm].get("short") else {})
 
     def seeds(self, arm, count=None):
-        """Those that are asked for, or as many as the arm has."""
+        """Seeds of an arm: `count` of them, or as many as the arm has."""
         return range(count or self.training(arm)["seeds"])
 
     def folder(self, arm, seed):
         return self.cache / "runs" / arm / str(seed)
 
     def weights(self, arm, seed):
-        """The last ones, where `train.py` leaves them."""
+        """Path of the last weights, as written by `train.py`."""
         return self.folder(arm, seed) / "detector/weights/last.pt"
 
     def trained(self):
-        """Arms and seeds of all that is trained here, whoever asked for it."""
+        """Arms and seeds of all trainings finished here."""
         done = (self.cache / "runs").glob("*/*/training.done.json")
         return {(path.parts[-3], int(path.parts[-2])) for path in done}
 
@@ -90,20 +90,20 @@ class Study:
 
 
 def steps(study, names, seeds):
-    """What is to be done: what others start from, then the rest."""
+    """Yield the trainings to do: first those that others start from, then the rest."""
     starts = [study.arms["arms"][name].get("start") for name in names]
     yield trainings(study, [name for name in dict.fromkeys(starts) if name], seeds)
     yield trainings(study, names, seeds)
 
 
 def trainings(study, names, seeds):
-    """What is to be done, seed by seed: the first figures of all arms come before better ones."""
+    """Trainings to do, seed by seed, so that first results of all arms come before more precise ones."""
     all_of_them = [(seed, place, arm) for place, arm in enumerate(names) for seed in study.seeds(arm, seeds)]
     return [(arm, seed) for seed, _, arm in sorted(all_of_them) if not study.is_trained(arm, seed)]
 
 
 def train_all(study, todo, processes):
-    """Trains in `processes` processes of one thread each; more of them than threads of one."""
+    """Train in `processes` processes with one thread each: more throughput than one process with more threads."""
     data = threading.Lock()
     with concurrent.futures.ThreadPoolExecutor(processes) as pool:
         jobs = [pool.submit(train, study, arm, seed, data) for arm, seed in todo]
@@ -126,7 +126,7 @@ def train(study, arm, seed, data):
 
 
 def describe(study, arm, seed):
-    """All that a training depends on."""
+    """Everything that a training depends on."""
     options = study.arms["arms"][arm]
     settings = {key: value for key, value in study.training(arm).items() if key != "seeds"}
     share = round(options.get("real", 0) * study.arms["reality"]["pictures"])
@@ -146,12 +146,12 @@ def describe(study, arm, seed):
 
 
 def real_pictures(study, rooms, count):
-    """The first `count` pictures for training of each room."""
+    """The first `count` training pictures of each room."""
     return [path for room in rooms for path in reality.pictures(study.world, room, "real", count)]
 
 
 def tested(study, arm, seed):
-    """How many pictures of each room a detector was tested on."""
+    """Number of pictures of each room that a detector was tested on."""
     return {int(room): len(pictures) for room, pictures in training_of(study, arm, seed)["test"].items()}
 
 

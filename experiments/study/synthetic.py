@@ -1,4 +1,4 @@
-"""Synthetic pictures: petcomp's by a recipe, or naive cut-and-paste."""
+"""Synthetic pictures, from petcomp with a recipe or from naive cut-and-paste."""
 
 import json
 
@@ -6,7 +6,7 @@ from . import distractors, files, naive, reality
 
 
 def pictures(study, name):
-    """The pictures of a generator, made if they are not there, and what made them."""
+    """Pictures of a generator, generated if missing, and the version that made them."""
     generator = described(study.arms["generators"], name)
     folder = study.cache / "synthetic" / name
     count = generator.get("pictures", study.arms["synthetic"]["pictures"])
@@ -23,7 +23,7 @@ def pictures(study, name):
 
 
 def described(generators, name):
-    """A generator with all that it takes over from its `base`."""
+    """A generator including everything that it inherits from its `base`."""
     own = generators[name]
     if "base" not in own:
         return own

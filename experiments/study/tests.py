@@ -1,4 +1,4 @@
-"""Of what needs no training: `python -m unittest study.tests` in the folder of the experiments."""
+"""Tests that need no training: `python -m unittest study.tests` in the folder of the experiments."""
 
 import importlib.util
 import tempfile
@@ -48,7 +48,7 @@ class Intervals(unittest.TestCase):
 
 class Check(unittest.TestCase):
     def test_the_headline_is_welcome_where_nothing_is_trained(self):
-        """As `make experiment` and README.md call it: without a name."""
+        """Called without a name, as by `make experiment` and in README.md."""
         for rooms, test_pictures in ((None, None), ([24], 40)):
             with self.subTest(rooms=rooms), tempfile.TemporaryDirectory() as cache:
                 check_headline(Path(cache), rooms, test_pictures)
@@ -64,7 +64,7 @@ def check_headline(cache, rooms, test_pictures):
 
 @unittest.skipUnless(importlib.util.find_spec("torch"), "PyTorch is not there")
 class Augmented(unittest.TestCase):
-    """Of the pictures that a GPU augments; a processor does the same."""
+    """Tests of the augmentation for GPUs, run on the CPU."""
 
     @unittest.mock.patch("study.augment.LEAST_AREA", 0)
     @unittest.mock.patch("study.augment.LEAST_SIDE", 0)
@@ -100,7 +100,7 @@ class Augmented(unittest.TestCase):
 
 
 def red_rectangle(folder, name):
-    """Of a third of a black picture, with its label."""
+    """Write a black picture with a red rectangle, and its label."""
     picture = np.zeros((120, 160, 3), np.uint8)
     left, top = 20 * name, 10 * name
     picture[top : top + 40, left : left + 80] = (0, 0, 255)
@@ -112,7 +112,7 @@ def red_rectangle(folder, name):
 
 
 def boxed(batch, margin):
-    """Where boxes are, larger by so many pixels on each side."""
+    """Mask of the boxes, enlarged by `margin` pixels on each side."""
     mask = np.zeros((len(batch["img"]), *batch["img"].shape[2:]), bool)
     for owner, (x, y, width, height) in zip(batch["batch_idx"].int(), batch["bboxes"].numpy() * 160):
         mask[owner, side(y, height / 2 + margin), side(x, width / 2 + margin)] = True
@@ -124,7 +124,7 @@ def side(centre, reach):
 
 
 def some_matches(pictures=20):
-    """Of one box in each picture, found in every other one."""
+    """Matches of one box per picture, found in every other picture."""
     right = np.repeat(np.arange(pictures) % 2 == 0, len(score.IOUS)).reshape(pictures, -1)
     return score.Matches(np.arange(pictures), right, np.ones(pictures))
 

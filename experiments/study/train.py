@@ -1,10 +1,10 @@
-"""One training of a detector, and what it then finds in the test pictures.
+"""Trains a detector and runs it on the test pictures.
 
     python -m study.train TRAINING.json
 
-The file says everything (see `arms.training`). A training that was broken off goes on from its last
-checkpoint; what was found stands in `predictions/ROOM/NAME.txt` beside the file, and
-`training.done.json` is written last.
+The file contains all settings (see `study.describe`). An interrupted training resumes from its last
+checkpoint. Detections are written to `predictions/ROOM/NAME.txt` next to the file, then
+`training.done.json`.
 """
 
 import functools
@@ -56,7 +56,7 @@ def main(path):
 
 
 def train(training, folder):
-    """The last weights."""
+    """Train; return the path of the last weights."""
     last = folder / "detector/weights/last.pt"
     if last.exists() and is_finished(last):
         return last
@@ -65,7 +65,7 @@ def train(training, folder):
 
 
 def is_finished(last):
-    """Whether it is of the last part: nothing is left to be resumed then."""
+    """Whether the checkpoint is of the last part, so that nothing is left to resume."""
     return torch.load(last, map_location="cpu", weights_only=False)["epoch"] in (PARTS - 1, -1)
 
 
@@ -107,7 +107,7 @@ def on_gpu(training):
 
 
 def data_file(training, folder):
-    """Ultralytics wants a list of pictures of its own; ours come by `Streams`."""
+    """Write the list of pictures that Ultralytics requires; the real batches come from `Streams`."""
     pictures = training["real"] or training["synthetic"]
     list_file(folder, "few", pictures[: training["batch"]])
     names = "".join(f"  {k}: {name}\n" for k, name in enumerate(files.CLASSES))
@@ -120,8 +120,8 @@ def list_file(folder, name, pictures):
 
 
 class Model(DetectionModel):
-    """Computes its loss with 16-bit floats on processors that have them (AVX-512) too, which Ultralytics does on GPUs alone.
-    Others are eight times as slow with them."""
+    """A model that computes its loss with 16-bit floats also on CPUs that support them (AVX-512); Ultralytics does so
+    only on GPUs. Other CPUs are eight times as slow with them."""
 
     def loss(self, batch, preds=None):
         is_quick = torch.ops.mkldnn._is_mkldnn_bf16_supported()
@@ -132,8 +132,8 @@ class Model(DetectionModel):
 class Streams(torch.utils.data.Sampler):
     """The batches of a part: indices into [real pictures..., synthetic pictures...].
 
-    Each source is an endless stream of shuffled passes that depends on the seed alone, so a training
-    that goes on sees what one in one piece would have seen.
+    Each source is an endless stream of shuffled passes that depends only on the seed, so a resumed
+    training sees the same pictures as an uninterrupted one.
     """
 
     def __init__(self, training, part):
@@ -147,7 +147,7 @@ class Streams(torch.utils.data.Sampler):
         return map(self.indices, self.numbers())
 
     def numbers(self):
-        """Of the batches of the part."""
+        """Numbers of the batches of the part."""
         first = self.part() * len(self)
         return range(first, first + len(self))
 
@@ -162,7 +162,7 @@ class Streams(torch.utils.data.Sampler):
         return self.both(number, 0.5 if mix == "balanced" else mix)
 
     def both(self, number, real_share):
-        """Of each batch a share from each source."""
+        """A batch with a share from each source."""
         real, synthetic = self.counts
         of_real = round(real_share * self.batch)
         of_synthetic = self.batch - of_real
@@ -170,13 +170,13 @@ class Streams(torch.utils.data.Sampler):
         return self.stream("real", real, number * of_real, of_real) + theirs
 
     def balanced_then_real(self, number):
-        """Both sources, and at the end real pictures alone."""
+        """A batch of both sources, or near the end of real pictures only."""
         if number < (PARTS - FINE_TUNING_PARTS) * len(self):
             return self.both(number, 0.5)
         return self.stream("fine_tuning", self.counts[0], number * self.batch, self.batch)
 
     def single_source_batch(self, number):
-        """Of each source as many batches as it has pictures, in an order of chance."""
+        """A batch of one source; batches alternate randomly, in proportion to the sources' numbers of pictures."""
         real, synthetic = self.counts
         size = self.batch
         is_real = [slot < real for slot in self.stream("order", real + synthetic, 0, number + 1)]
@@ -196,7 +196,7 @@ class Streams(torch.utils.data.Sampler):
 
 
 def trainer(training, folder):
-    """Ultralytics' trainer with our batches, and equation 2 of the paper where the arm asks for it."""
+    """Ultralytics' trainer with our batches, and equation 2 of the paper if the arm uses it."""
     factors = loss_factors(training)
     real = set(training["real"])
 
@@ -233,7 +233,7 @@ def trainer(training, folder):
             return {}, 0.0
 
         def final_eval(self):
-            """The test pictures are none of the trainer's business."""
+            """Do nothing: the trainer does not use the test pictures."""
 
     return Trainer
 

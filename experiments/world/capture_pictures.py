@@ -6,8 +6,8 @@
         --name b00 --class cap --thickness 0.07 -o OUT/assets
     python3 experiments/world/capture_pictures.py pictures golden/capture/soft b00 OUT docs/images
 
-The parts with the bottle are renderings (experiments/world); around them a photo is what the display shows, with the
-sensor's noise. Needs numpy and opencv-python.
+The parts with the bottle are rendered (experiments/world); the rest of a photo shows the display, with sensor noise.
+Needs numpy and opencv-python.
 """
 import glob
 import json
@@ -35,7 +35,7 @@ def read(path):
 
 
 class Place:
-    """A rendered place: its display, and where the rendered view lies in a photo."""
+    """A rendered place: its display, and the position of the rendered view in a photo."""
 
     def __init__(self, folder):
         with open(os.path.join(folder, "place.json")) as handle:
@@ -60,7 +60,7 @@ class Place:
         return photo + deviation * self.rng.standard_normal(photo.shape)
 
     def photo(self, frame, name, bottle):
-        """And with one."""
+        """A photo of a frame with the bottle."""
         photo = self.bare(frame)
         record = next(b for b in self.record["bottles"] if b["name"] == bottle)
         part = read(f"{self.folder}/{bottle}_{name}.jpg")
@@ -81,7 +81,7 @@ def write_photos(folder, bottle, out):
 
 
 def strip(paths, height, part=np.s_[:, :]):
-    """Pictures beside each other."""
+    """Put pictures side by side."""
     pictures = [cv2.imread(path)[part] for path in paths]
     sized = [cv2.resize(p, (round(p.shape[1] * height / p.shape[0]), height), interpolation=cv2.INTER_AREA) for p in pictures]
     framed = [cv2.copyMakeBorder(p, 10, 10, 5, 5, cv2.BORDER_CONSTANT, value=GREY) for p in sized]

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Makes the reality of the experiments: rooms, piles in them, and photographs for petcomp.
+"""Makes the reality of the experiments: rooms with piles, and photographs for petcomp.
 
     make.py --out WORLD [--rooms 21,22,23] [--sets photos,backgrounds,test,real] [--piles 100] ...
 
-WORLD is a cache. What is there is not made again, so a broken-off run goes on where it stopped, and
-a larger `--piles` adds to what is there. Each pile depends on its own number alone.
+WORLD is a cache. Existing files are not made again, so rerun the same command to resume an interrupted run,
+or use a larger `--piles` to add piles. Each pile depends only on its own number.
 """
 
 import argparse
@@ -42,12 +42,12 @@ def main(argv):
 def parse(argv):
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--out", required=True, type=Path)
-    parser.add_argument("--rooms", default="21,22,23", help="comma list (default 21,22,23)")
-    parser.add_argument("--sets", default="photos,backgrounds,test,real", help="comma list")
-    parser.add_argument("--piles", type=int, default=100, help="piles a room and set (default 100)")
-    parser.add_argument("--bottles", type=int, default=24, help="bottles photographed (default 24)")
+    parser.add_argument("--rooms", default="21,22,23", help="comma-separated list (default 21,22,23)")
+    parser.add_argument("--sets", default="photos,backgrounds,test,real", help="comma-separated list")
+    parser.add_argument("--piles", type=int, default=100, help="piles per room and set (default 100)")
+    parser.add_argument("--bottles", type=int, default=24, help="bottles to photograph (default 24)")
     parser.add_argument("--backgrounds", type=int, default=6, help="photos of an empty tray (default 6)")
-    parser.add_argument("--processes", type=int, default=os.cpu_count(), help="pictures at once")
+    parser.add_argument("--processes", type=int, default=os.cpu_count(), help="pictures to render in parallel")
     options = parser.parse_args(argv)
     options.rooms = [int(room) for room in options.rooms.split(",")]
     options.sets = options.sets.split(",")
@@ -58,7 +58,7 @@ def parse(argv):
 
 
 def jobs(options):
-    """What is asked for, picture by picture: the arguments and the file that is written last."""
+    """Yield the requested pictures: their arguments and the file that is written last."""
     if "photos" in options.sets:
         yield from photos(options)
     if "backgrounds" in options.sets:
@@ -81,7 +81,7 @@ def photos(options):
 
 
 def backgrounds(options):
-    """Photos of the empty trays, and of each one with a sheet of white paper in it."""
+    """Yield photos of the empty trays, and one of each with a sheet of white paper in it."""
     for room in options.rooms:
         out = options.out / f"room{room}"
         command = ["backgrounds", "--room-seed", room, "--tray", TRAYS[room], "--format", "jpg", "--spp", 8]
@@ -104,7 +104,7 @@ def pile(options, name, room, index):
 
 
 def chunks(todo):
-    """Neighbouring numbers of one set, in the order in which they were asked for."""
+    """Yield chunks of neighbouring numbers of one set, in the requested order."""
     sets = {}
     for job in todo:
         sets.setdefault((str(job["out"]), tuple(map(str, job["command"]))), []).append(job)

@@ -46,28 +46,28 @@ def parser():
 
     def common(name, text):
         q = sub.add_parser(name, help=text, description=text)
-        q.add_argument("--out", required=True, metavar="DIR", help="output folder; a sub-folder per kind is made in it")
+        q.add_argument("--out", required=True, metavar="DIR", help="output folder, with a subfolder for each kind")
         q.add_argument("--seed", type=between(0, 2**31, int), default=1, help="seed of cameras, lights, poses and noise (default 1)")
         q.add_argument("--first", type=between(0, 10**6, int), default=0, help="index of the first picture set (default 0)")
-        q.add_argument("--count", type=positive(int), default=1, help="how many picture sets (default 1)")
+        q.add_argument("--count", type=positive(int), default=1, help="number of picture sets (default 1)")
         q.add_argument("--spp", type=between(1, 4096, int), default=32, help="render samples per pixel (default 32)")
         q.add_argument("--threads", type=between(1, 256, int), default=3, help="render threads (default 3)")
         q.add_argument("--no-denoise", action="store_true", help="do not denoise the renders")
         q.add_argument("--noise", type=between(0, 20), default=1.0, help="sensor noise, relative to a good camera (default 1)")
         q.add_argument("--blur", type=between(0, 5), default=0.35, help="optical blur, sigma in pixels (default 0.35)")
         q.add_argument("--exposure", type=between(0.05, 20), default=1.0, help="exposure factor (default 1)")
-        q.add_argument("--cost-log", metavar="FILE", help="append the time each picture took, as JSON lines")
+        q.add_argument("--cost-log", metavar="FILE", help="append the time of each picture to FILE as JSON lines")
         return q
 
     def library(q):
         q.add_argument("--library-seed", type=between(0, 2**31, int), default=1, help="seed of the bottle library (default 1)")
-        q.add_argument("--cache", metavar="DIR", help="folder that keeps crushed shapes between runs")
+        q.add_argument("--cache", metavar="DIR", help="folder in which to keep crushed shapes between runs")
         q.add_argument("--wall", choices=("solid", "thin"), help="refracting double wall, or one thin surface")
 
     b = common("bottles", "photos of single bottles on a screen, with their outlines")
     library(b)
     b.set_defaults(wall="solid")
-    b.add_argument("--photos", type=between(1, 8, int), default=2, help="photos per bottle, each from another flat side (default 2)")
+    b.add_argument("--photos", type=between(1, 8, int), default=2, help="photos per bottle, each of another flat side (default 2)")
     b.add_argument("--width", type=between(64, 4096, int), default=640, help="picture width in pixels (default 640)")
     b.add_argument("--screen", choices=("auto", "green", "blue", "grey"), default="auto", help="screen colour (default: one not in the bottle)")
     b.add_argument("--light", choices=("auto", "soft", "window", "lamp", "overhead"), default="auto")
@@ -97,16 +97,16 @@ def parser():
     g = common("backgrounds", "the empty tray on its table, with pose ground truth")
     tray(g)
     g.set_defaults(width=1280, height=960)
-    g.add_argument("--views", default="fronto,above,tilted", help="comma list of fronto, above, tilted, extreme; taken in turn")
-    g.add_argument("--lights", default="bright,dim,ambient", help="comma list of bright, dim, ambient; taken in turn")
+    g.add_argument("--views", default="fronto,above,tilted", help="comma-separated list of fronto, above, tilted, extreme; used in turn")
+    g.add_argument("--lights", default="bright,dim,ambient", help="comma-separated list of bright, dim, ambient; used in turn")
 
-    g.add_argument("--paper", action="store_true", help="with a sheet of white paper in the tray")
+    g.add_argument("--paper", action="store_true", help="put a sheet of white paper in the tray")
 
     l = common("piles", "bottles piled in the tray, with detection ground truth")
     library(l)
     tray(l)
     l.set_defaults(width=640, height=480, wall="thin")
-    l.add_argument("--library-count", type=positive(int), default=136, help="how many bottles of the library may appear (default 136)")
+    l.add_argument("--library-count", type=positive(int), default=136, help="number of bottles of the library that may appear (default 136)")
     l.add_argument("--bottles", default="5-13", metavar="MIN-MAX", help="bottles per pile (default 5-13)")
     l.add_argument("--mode", choices=("test", "cycle", "real"), default="test",
                    help="test: every light x every camera position per pile; cycle: one picture per pile, the combinations in "
