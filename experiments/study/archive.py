@@ -1,4 +1,4 @@
-"""Detections stored with `results.csv`, so that results outlive the cache and can be joined with other machines'."""
+"""Detections stored next to `results.csv`: results outlive the cache and join those of other machines."""
 
 import csv
 import io

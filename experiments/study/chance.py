@@ -1,4 +1,4 @@
-"""Random variation of trainings: how much those of an arm that differ only in their seed vary.
+"""Random variation of trainings: how much those of an arm vary if only the seed differs.
 
     python -m study.chance results/first_rooms
 """

@@ -103,7 +103,7 @@ def trainings(study, names, seeds):
 
 
 def train_all(study, todo, processes):
-    """Train in `processes` processes with one thread each: more throughput than one process with more threads."""
+    """Train in `processes` processes of one thread each, rather than in one process of many threads."""
     data = threading.Lock()
     with concurrent.futures.ThreadPoolExecutor(processes) as pool:
         jobs = [pool.submit(train, study, arm, seed, data) for arm, seed in todo]

@@ -5,7 +5,7 @@
     taskset -c 0 target/peers-python/bin/python tests/benches/peers/eval.py [-o FOLDER] [--images N]
 
 Ground truth and detections of 2000 images are random and written as COCO JSON. eval.json times the work in memory: reading
-both files, evaluating, summarizing (petcomp by library.rs, the COCO definition; pycocotools called from Python).
+both files, evaluating, summing up (petcomp by library.rs, the COCO definition; pycocotools called from Python).
 eval_commands.json times whole processes: petcomp with both definitions, its tables and images; Python with its imports.
 Error: the greatest difference of mean AP, AP at 0.5 and AP at 0.75 from those of pycocotools. YOLOv5 defines AP differently
 and is compared with its own definition in petcomp. Its package needs PyTorch; if missing, it is listed as absent.

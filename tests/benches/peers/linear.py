@@ -1,4 +1,4 @@
-"""Reads and writes scene-linear images by OpenEXR and OpenCV, as arrays of rows from the top."""
+"""Reads and writes scene-linear images with OpenEXR and OpenCV, as arrays of rows from the top."""
 
 import cv2
 import numpy as np
@@ -6,7 +6,7 @@ import OpenEXR
 
 
 def to_srgb(linear):
-    """Encode display values 0 to 1 (IEC 61966-2-1)."""
+    """Encode as display values 0 to 1 (IEC 61966-2-1)."""
     c = np.clip(linear, 0, 1)
     return np.where(c <= 0.0031308, 12.92 * c, 1.055 * np.maximum(c, 1e-9) ** (1 / 2.4) - 0.055)
 

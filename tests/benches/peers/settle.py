@@ -8,9 +8,9 @@
 which takes minutes per round). Bullet gets the same boxes, masses, friction, damping, walls and starts, in three settings:
 its own defaults; petcomp's time step with the scale recommended for small bodies (lengths and gravity times ten); and the
 same scale with a smaller step and more iterations. It stops like petcomp: when all bodies are slower than 1 cm/s and
-0.5 rad/s for 0.1 s, or after 10 s. Seconds are those of one heap in memory: petcomp (library.rs) including its check of the result, Bullet
-including calls from Python, two per body and step. Overlap, the deepest of three heaps, is measured for both by the
-separating-axis test below, in double precision.
+0.5 rad/s for 0.1 s, or after 10 s. Seconds are those of one heap in memory: petcomp (library.rs) including its check of the
+result, Bullet including calls from Python, two per body and step. Overlap, the deepest of three heaps, is measured for both
+by the separating-axis test below, in double precision.
 """
 import json
 

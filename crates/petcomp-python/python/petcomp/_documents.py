@@ -34,7 +34,7 @@ def loaded(text: str) -> Any:
 
 
 def dumped(name: str, value: Any) -> str:
-    """Serialize plain data, which may contain NumPy numbers, tuples and objects with ``to_dict``."""
+    """Write plain data as JSON; it may contain NumPy numbers, tuples and objects with ``to_dict``."""
     return json.dumps(plain(name, value))
 
 

@@ -1,4 +1,4 @@
-"""The pinhole camera, and solving it from a rectangle of known size."""
+"""The pinhole camera, and how to solve it from a rectangle of known size."""
 
 from __future__ import annotations
 
@@ -243,9 +243,9 @@ class Solution:
 def solve(label: Mapping[str, Any], force: bool = False) -> Solution:
     """Solve the camera of a label, which is plain data in the format of ``NAME.label.json``.
 
-    Raises ``CameraError``, or ``InvalidValueError`` for a size that is not in metres and for a lens that folds
-    the corners of the image over. ``force`` returns a camera even if it has such a lens, does not fit its
-    label or is too far away to see objects.
+    Raises ``CameraError``, or ``InvalidValueError`` for a size that is not in metres, a camera too far away to
+    see objects and a lens that folds the corners of the image over. ``force`` accepts these three, and a
+    camera that does not fit its label.
     """
     camera, text = _petcomp.solve_camera(dumped("label", label), force)
     record = loaded(text)

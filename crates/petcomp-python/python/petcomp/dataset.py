@@ -16,7 +16,7 @@ from .sample import Sample
 
 __all__ = ["DatasetCounts", "Progress", "generate"]
 
-# Functions that make samples must have returned before the interpreter ends.
+# Functions that make samples must have returned before the interpreter exits.
 atexit.register(_petcomp.end_callers)
 
 

@@ -62,7 +62,7 @@ class UnsettledError(Error):
 
 
 class InterruptedError(Error):
-    """Work that was stopped early; repeat a call of ``generate`` to resume it."""
+    """Work that was stopped early; repeat the call of ``generate`` to resume."""
 
 
 class ClosedError(Error, ValueError):
