@@ -1,4 +1,4 @@
-//! Decoders by the kind of file, and OpenImageIO for the kinds that they do not know.
+//! Decoders by kind of file, and OpenImageIO for the kinds that they do not support.
 
 use super::codec::exif::CameraNotes;
 use super::codec::raster::Raster;
@@ -19,7 +19,7 @@ use std::io::{BufRead, Cursor, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-/// Samples by our decoders, or by OpenImageIO where those do not know the kind.
+/// Decodes samples with our decoders, or with OpenImageIO for the kinds that they do not support.
 pub(super) fn decode_raster(
     source: &SourceFile,
     options: &ReadOptions,
@@ -31,7 +31,7 @@ pub(super) fn decode_raster(
     }
 }
 
-/// Samples by our decoders.
+/// Decodes samples with our decoders.
 fn decode_here(
     source: &SourceFile,
     options: &ReadOptions,
@@ -52,12 +52,12 @@ fn needs_library(format: Format) -> Refusal {
     Refusal::Unsupported(format!("{} needs {}", format.name(), format.library()))
 }
 
-/// The last defence: a decoder that panics has met a damaged file.
+/// The last line of defence: a decoder that panics was given a damaged file.
 pub(super) fn catch_panic<T>(f: impl FnOnce() -> Result<T, Refusal>) -> Result<T, Refusal> {
     catch_unwind(AssertUnwindSafe(f)).unwrap_or_else(|_| Err("damaged: the decoder gave up".into()))
 }
 
-/// What stands in front of the pixels, and no more of the file than that takes.
+/// Reads what precedes the pixels, and no more of the file than necessary.
 pub(super) fn read_file_header<R: BufRead + Seek>(
     file: &mut R,
     bytes: u64,
@@ -75,7 +75,7 @@ pub(super) fn read_file_header<R: BufRead + Seek>(
     Ok((header, notes_of_file(file, format)))
 }
 
-/// The notes of a file that may be read from its start again.
+/// The notes of a file that can be rewound.
 fn notes_of_file(file: &mut (impl BufRead + Seek), format: Format) -> CameraNotes {
     match format {
         Format::Png | Format::Tiff if file.rewind().is_ok() => read_notes(file, format),
@@ -83,7 +83,7 @@ fn notes_of_file(file: &mut (impl BufRead + Seek), format: Format) -> CameraNote
     }
 }
 
-/// A JPEG has both its header and its notes in front of the first scan.
+/// In a JPEG both header and notes precede the first scan.
 fn read_jpeg_header(
     file: &mut impl BufRead,
     bytes: u64,
@@ -94,17 +94,17 @@ fn read_jpeg_header(
     Ok((header, CameraNotes::read(Cursor::new(&start))))
 }
 
-/// What the camera noted; EXR and HDR have no room for it.
+/// What the camera recorded; EXR and HDR have no such notes.
 pub(super) fn camera_notes(source: &SourceFile) -> CameraNotes {
     match source.format {
         Format::Jpeg | Format::Tiff | Format::Png => notes_of_source(source),
-        // libheif turns the picture by the file's own word for it.
+        // libheif already rotates the picture as the file requires.
         Format::Heif => notes_of_source(source).upright(),
         _ => CameraNotes::default(),
     }
 }
 
-/// Names a photo of which nobody can tell whether it lies on its side.
+/// Warns of a photo whose orientation cannot be determined.
 pub(super) fn warn_unreadable(notes: &CameraNotes, path: &Path) {
     if notes.unreadable {
         let path = path.display();
@@ -115,7 +115,7 @@ pub(super) fn warn_unreadable(notes: &CameraNotes, path: &Path) {
 }
 
 fn notes_of_source(source: &SourceFile) -> CameraNotes {
-    // Behind a JPEG's first scan may lie further pictures, with notes of their own.
+    // A JPEG's first scan may be followed by further pictures with their own notes.
     let start = (source.format == Format::Jpeg)
         .then(|| jpeg::read_before_scan(&mut &source.bytes[..], &Limits::default()).ok())
         .flatten();
@@ -130,7 +130,7 @@ fn read_notes(file: impl BufRead + Seek, format: Format) -> CameraNotes {
     }
 }
 
-/// Another decoder for what ours do not know.
+/// Another decoder for kinds that ours do not support.
 #[cfg(feature = "oiio")]
 pub(super) fn decode_elsewhere(
     source: &SourceFile,
@@ -166,8 +166,8 @@ fn with_known_alpha(raster: Raster, source: &SourceFile) -> Raster {
     }
 }
 
-/// OpenImageIO divides the entries of a palette by 257 and rounds down, which gives a code less
-/// where they are codes times 256. A code of 1 cannot be told from 0 any more, and stays 0.
+/// OpenImageIO divides palette entries by 257 and rounds down, which is one code too low if they
+/// are codes times 256. A code of 1 can then no longer be distinguished from 0, and stays 0.
 #[cfg(feature = "oiio")]
 fn with_whole_palette(mut raster: Raster, source: &SourceFile) -> Raster {
     let is_less = source.format == Format::Tiff && tiff::has_shifted_palette(&source.bytes);
@@ -178,7 +178,7 @@ fn with_whole_palette(mut raster: Raster, source: &SourceFile) -> Raster {
     raster
 }
 
-/// A header by the other decoder.
+/// Reads a header with the other decoder.
 #[cfg(feature = "oiio")]
 pub(super) fn header_elsewhere(
     source: &SourceFile,

@@ -1,4 +1,4 @@
-//! OpenEXR files by the names of their channels and parts.
+//! OpenEXR files, accessed by the names of their channels and parts.
 
 pub use super::codec::exr::{Channel, ChannelSamples, Part};
 
@@ -13,13 +13,13 @@ use crate::error::{Error, Result};
 use crate::work::{self, Kind};
 use std::path::Path;
 
-/// Writes float channels under names of their own, zip-compressed, with text attributes.
+/// Writes float channels under the given names, zip-compressed, with text attributes.
 ///
 /// `size` is width and height; every channel has `width * height` samples, row by row from the top.
-/// Names may hold a layer: `diffuse.R`.
+/// Names may include a layer: `diffuse.R`.
 ///
 /// # Errors
-/// [`Error::File`] for a channel of another size, a name twice, or a file that cannot be written.
+/// [`Error::File`] for a channel of another size, a duplicate name, or a file that cannot be written.
 pub fn write_channels(
     path: impl AsRef<Path>,
     size: (usize, usize),
@@ -30,7 +30,8 @@ pub fn write_channels(
     write_encoded(path.as_ref(), encode(size, planes, metadata))
 }
 
-/// As [`write_channels`], of channels that nobody needs any more: many large ones are not copied.
+/// Like [`write_channels`], but takes ownership of the channels, so that many large ones are not
+/// copied.
 ///
 /// # Errors
 /// Those of [`write_channels`].
@@ -46,7 +47,7 @@ pub fn write_owned_channels(
     write_encoded(path.as_ref(), encode(size, planes, metadata))
 }
 
-/// As [`write_channels`], a picture somewhere on a canvas, without texts.
+/// Like [`write_channels`], for a picture placed on a canvas, without text attributes.
 ///
 /// # Errors
 /// Those of [`write_channels`].
@@ -61,7 +62,7 @@ pub fn write_channels_on(
     write_encoded(path.as_ref(), encoded)
 }
 
-/// As [`write_channels`], with half floats.
+/// Like [`write_channels`], with half floats.
 ///
 /// # Errors
 /// Those of [`write_channels`].
@@ -98,11 +99,11 @@ fn encode(
     exr::encode(size, canvas, planes, compression, metadata)
 }
 
-/// Writes parts of one size (width, height) into one EXR file, losslessly compressed; the same
+/// Writes parts of the same size (width, height) to one EXR file, losslessly compressed; the same
 /// parts give the same bytes.
 ///
 /// # Errors
-/// [`Error::File`] for no part at all, a channel of another size, a name twice, or a
+/// [`Error::File`] for an empty list of parts, a channel of another size, a duplicate name, or a
 /// file that cannot be written.
 pub fn write_parts(path: impl AsRef<Path>, size: (usize, usize), parts: &[Part]) -> Result<()> {
     write_encoded(path.as_ref(), exr::encode_parts(size, parts))
@@ -117,7 +118,7 @@ fn write_encoded(path: &Path, encoded: std::result::Result<Vec<u8>, String>) -> 
 /// Reads every channel of the first part of an EXR file, and the picture's size.
 ///
 /// # Errors
-/// [`Error::File`] for a file that cannot be opened, is not an EXR, is damaged or goes beyond the
+/// [`Error::File`] for a file that cannot be opened, is not an EXR, is damaged or exceeds the
 /// default [`Limits`](super::Limits).
 pub fn read_channels(path: impl AsRef<Path>) -> Result<((usize, usize), Vec<Channel>)> {
     let (path, limits) = (path.as_ref(), ReadOptions::default().limits);

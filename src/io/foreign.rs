@@ -1,13 +1,13 @@
-//! Kinds of picture file that are known and not read: what they are, and what to do with them.
+//! Kinds of picture files that are recognised but not read: their names, and what to do with them.
 
 use super::format::begins_at;
 
-/// How the compressed pictures of phones and of the web become one that is read.
+/// How to convert compressed pictures from phones and from the web to a supported format.
 const CONVERT: &str = "convert it to PNG first";
-/// The same of what a camera has not developed.
+/// The same for raw files from cameras.
 pub(super) const DEVELOP: &str = "develop it to a 16-bit TIFF first";
 
-/// First bytes of each kind from a place on; its name, and what to do.
+/// First bytes of each kind and their position; its name, and what to do.
 const KINDS: [(usize, &[u8], &str, &str); 22] = [
     (4, b"ftyphevc", SEQUENCE, CONVERT),
     (4, b"ftypmsf1", SEQUENCE, CONVERT),
@@ -27,7 +27,7 @@ const KINDS: [(usize, &[u8], &str, &str); 22] = [
     (0, b"IIU\0", RAW, DEVELOP),
     (0, b"FUJIFILMCCD-RAW", RAW, DEVELOP),
     (0, b"FOVb", RAW, DEVELOP),
-    // Phase One: behind IIII and a letter, which pixels of an ordinary TIFF may begin with, too.
+    // Phase One: after IIII and a letter, which may also be the first pixels of an ordinary TIFF.
     (13, b"waR", RAW, DEVELOP),
     (8, b"MMMMRaw", RAW, DEVELOP),
     (6, b"HEAPCCDR", RAW, DEVELOP),
@@ -37,7 +37,7 @@ const KINDS: [(usize, &[u8], &str, &str); 22] = [
 const SEQUENCE: &str = "a sequence of HEIC pictures";
 pub(super) const RAW: &str = "a camera's raw file";
 
-/// Name and advice of a file of such a kind.
+/// Name and advice for a file of one of these kinds.
 pub(super) fn recognized(start: &[u8]) -> Option<(&'static str, &'static str)> {
     KINDS
         .iter()

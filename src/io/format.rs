@@ -1,8 +1,8 @@
-//! Which kind of file it is, by its first bytes or its extension.
+//! The kind of a file, by its first bytes or its extension.
 
 use std::path::Path;
 
-/// The kinds of picture file that are read and written.
+/// The kinds of picture files that are read and written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
     /// OpenEXR: scene-linear half or float, any number of named channels.
@@ -16,16 +16,15 @@ pub enum Format {
     Tiff,
     /// Radiance RGBE (`.hdr`): scene-linear.
     Hdr,
-    /// HEIF, which phones write as HEIC: 8 to 16 bits, display-encoded; through libheif, reading
-    /// only.
+    /// HEIF, which phones write as HEIC: 8 to 16 bits, display-encoded; through libheif, read only.
     Heif,
-    /// DPX film scans; through OpenImageIO only, reading only.
+    /// DPX film scans; through OpenImageIO only, read only.
     Dpx,
-    /// Cineon film scans; through OpenImageIO only, reading only.
+    /// Cineon film scans; through OpenImageIO only, read only.
     Cineon,
 }
 
-/// First bytes of each kind, from a place on.
+/// First bytes of each kind, and their position.
 const MAGIC: [(usize, &[u8], Format); 16] = [
     (0, b"\x76\x2f\x31\x01", Format::Exr),
     (0, b"\x89PNG\r\n\x1a\n", Format::Png),
@@ -54,7 +53,7 @@ impl Format {
             .map(|&(.., format)| format)
     }
 
-    /// The kind that an extension promises, in any case; what a new file is written as.
+    /// The kind for an extension, ignoring case; new files are written as this kind.
     pub fn from_extension(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "exr" => Some(Self::Exr),
@@ -69,7 +68,7 @@ impl Format {
         }
     }
 
-    /// Its name, as OpenImageIO spells the reader that it has for it.
+    /// Its name, as spelled by OpenImageIO for the corresponding reader.
     pub fn name(self) -> &'static str {
         match self {
             Self::Exr => "openexr",
@@ -83,7 +82,7 @@ impl Format {
         }
     }
 
-    /// The library that decodes what our decoders do not.
+    /// The library that decodes what our decoders do not support.
     pub(super) fn library(self) -> &'static str {
         match self {
             Self::Heif => "libheif",
@@ -91,7 +90,7 @@ impl Format {
         }
     }
 
-    /// The kind whose [`name`](Self::name) it is.
+    /// The kind with this [`name`](Self::name).
     #[cfg(feature = "oiio")]
     pub(super) fn from_name(name: &str) -> Option<Self> {
         MAGIC
@@ -101,7 +100,7 @@ impl Format {
     }
 }
 
-/// Some bytes of a file stand at a place.
+/// Whether a file has certain bytes at a position.
 pub(super) fn begins_at(file: &[u8], at: usize, bytes: &[u8]) -> bool {
     file.get(at..).is_some_and(|rest| rest.starts_with(bytes))
 }

@@ -1,4 +1,4 @@
-//! Entry points of the fuzzers: nothing is caught.
+//! Entry points of the fuzzers: no panic is caught.
 
 use super::decode::read_file_header;
 use super::format::Format;
@@ -17,7 +17,7 @@ pub(crate) fn header_of(bytes: &[u8]) -> Result<Header, String> {
         .map_err(|e| e.to_string())
 }
 
-/// Whether the bytes are a whole response of a worker.
+/// Whether the bytes are a complete response of a worker.
 #[cfg(feature = "oiio")]
 pub(crate) fn is_worker_response(bytes: &[u8]) -> bool {
     let mut from = bytes;

@@ -1,15 +1,15 @@
-//! What a file may ask for before a single pixel is decoded.
+//! Limits on what a file may demand before a single pixel is decoded.
 //!
-//! A damaged or hostile header of 60 bytes can ask for 245 GB, and an allocation that fails aborts
-//! the process: so sizes are checked first, in arithmetic that cannot wrap.
+//! A damaged or hostile header of 60 bytes can demand 245 GB, and a failed allocation aborts the
+//! process: so sizes are checked first, with arithmetic that cannot overflow.
 
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::OnceLock;
 
-/// Bounds on what a picture file may ask for; a file beyond them is refused before its pixels are
-/// touched.
+/// Limits on what a picture file may demand; a file that exceeds them is rejected before its pixels
+/// are decoded.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {
@@ -30,29 +30,29 @@ pub struct Limits {
     pub metadata_bytes: u64,
     /// Parts of a multi-part EXR. Default: 1,024.
     pub parts: u64,
-    /// Wall-clock seconds for a file in the OpenImageIO worker, and one more for each 10 million
+    /// Wall-clock seconds for a file in the OpenImageIO worker, plus one for each 10 million
     /// pixels; at most 86,400. Default: 10.
     pub seconds: u64,
-    /// Bytes of a document (TOML, JSON, YAML, CSV): recipes, labels, manifests. Truth and
-    /// detections in COCO's JSON are data, for which `file_bytes` holds. Default: 16 MiB.
+    /// Bytes of a document (TOML, JSON, YAML, CSV): recipes, labels, manifests. Ground truth and
+    /// detections in COCO JSON are data and subject to `file_bytes`. Default: 16 MiB.
     pub document_bytes: u64,
-    /// Levels that a document is nested, at most 80. Default: 64.
+    /// Nesting depth of a document, at most 80. Default: 64.
     pub document_depth: u64,
-    /// Share of the machine's memory that a picture may need, at 12 bytes for each pixel and
-    /// channel, percent. Default: 50.
+    /// Share of the machine's memory that a picture may need, at 12 bytes per pixel and channel,
+    /// percent. Default: 50.
     pub memory_percent: u64,
 }
 
-/// A day: longer than anybody waits for a picture.
+/// A day: longer than anyone waits for a picture.
 const MAX_SECONDS: u64 = 86_400;
-/// Levels that the readers of TOML and JSON follow by themselves.
+/// Levels that the TOML and JSON readers support.
 const MAX_DOCUMENT_DEPTH: u64 = 80;
-/// Largest value of the other limits: sums of a few such numbers cannot wrap.
+/// Maximum value of the other limits: sums of a few such numbers cannot overflow.
 const MAX_LIMIT: u64 = 1 << 53;
-/// Percent of the memory: all there is, and more.
+/// Maximum percentage of the memory: all of it, and more.
 const MAX_MEMORY_PERCENT: u64 = 10_000;
 
-/// Most bytes that a pixel takes in each channel in use: three floats.
+/// Maximum number of bytes that a pixel uses per channel: three floats.
 const BYTES_PER_SAMPLE: u64 = 12;
 
 /// Below this many decoded bytes no ratio is suspicious: a plain white picture compresses very
@@ -78,7 +78,7 @@ impl Default for Limits {
     }
 }
 
-/// What `K`, `M` and `G` behind a number stand for.
+/// The meaning of `K`, `M` and `G` after a number.
 const SUFFIXES: [(char, u64); 3] = [('K', 1 << 10), ('M', 1 << 20), ('G', 1 << 30)];
 
 /// A new value for one limit: `side=65536`, `decoded_bytes=4G`.
@@ -119,10 +119,10 @@ fn parse_with_suffix(number: &str) -> Option<u64> {
 }
 
 impl Limits {
-    /// These limits with another value for one of them.
+    /// These limits with a new value for one of them.
     ///
     /// # Errors
-    /// [`Error::Value`] for a name that no limit has, and for a value that none can have.
+    /// [`Error::Value`] for an unknown limit, and for an invalid value.
     pub fn with(mut self, limit: &LimitOverride) -> Result<Self> {
         let LimitOverride { name, value } = limit;
         let mut named = self.named();
@@ -137,10 +137,11 @@ impl Limits {
         Ok(self)
     }
 
-    /// Refuses a picture in memory of a size that no file may have; the text says what was expected.
+    /// Rejects a picture in memory with a size that no file may have; the text states what was
+    /// expected.
     ///
     /// # Errors
-    /// A size of nothing, and one over the limits of sides and of pixels.
+    /// For an empty picture, and one that exceeds the limits on sides or pixels.
     #[doc(hidden)]
     pub fn check_size(&self, [width, height]: [usize; 2]) -> std::result::Result<(), String> {
         let (side, pixels) = (self.side, self.pixels);
@@ -153,7 +154,7 @@ impl Limits {
         ))
     }
 
-    /// Every limit with its name and its largest value.
+    /// Every limit with its name and its maximum.
     fn named(&mut self) -> [(&'static str, &mut u64, u64); 12] {
         [
             ("side", &mut self.side, MAX_LIMIT),
@@ -186,7 +187,7 @@ fn unknown_limit(name: &str, known: [&str; 12]) -> Error {
     Error::value(name, what)
 }
 
-/// What the header of a file asks for.
+/// What the header of a file demands.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Demand {
     pub(super) width: u64,
@@ -197,7 +198,7 @@ pub(super) struct Demand {
 }
 
 impl Demand {
-    /// What a picture asks for all of whose channels are stored alike.
+    /// The demand of a picture whose channels are all stored alike.
     pub(super) fn new(
         [width, height]: [impl Into<u64>; 2],
         channels: impl Into<u64>,
@@ -219,12 +220,12 @@ impl Demand {
 }
 
 impl Limits {
-    /// Refuses what cannot be right, is too much or has no memory; the text names the limit.
+    /// Rejects a demand that is invalid, too large or exceeds the memory; the text names the limit.
     pub(super) fn check(&self, demand: Demand) -> std::result::Result<(), String> {
         affordable(self.check_bounds(demand)?)
     }
 
-    /// As [`check`](Self::check), without a look at the memory. Returns the decoded bytes.
+    /// Like [`check`](Self::check), but without checking the memory. Returns the decoded bytes.
     pub(super) fn check_bounds(&self, demand: Demand) -> std::result::Result<u64, String> {
         let (width, height, channels) = (demand.width, demand.height, demand.channels);
         if demand.is_empty() {
@@ -251,14 +252,14 @@ impl Limits {
         at_most(bytes / file_bytes.max(1), self.ratio, what, "ratio")
     }
 
-    /// Fails on a header that goes on beyond the limit of metadata.
+    /// Fails for a header that exceeds the metadata limit.
     pub(super) fn check_header_bytes(&self, bytes: u64) -> std::result::Result<(), String> {
         let what = "bytes without an end of the header";
         at_most(bytes, self.metadata_bytes, what, "metadata_bytes")
     }
 
-    /// Refuses a picture that needs too much of the machine's memory; the text shows the sum. Where
-    /// the system does not report how much it has, nothing is refused.
+    /// Rejects a picture that needs too much of the machine's memory; the text shows the
+    /// calculation. If the system does not report its memory, nothing is rejected.
     pub(super) fn check_memory(
         &self,
         width: usize,
@@ -288,20 +289,20 @@ impl Limits {
     }
 }
 
-/// A product of sizes, the largest number where that is too small for it.
+/// A product of sizes, saturating at the largest number.
 pub(super) fn saturating_product<const N: usize>(sizes: [u64; N]) -> u64 {
     sizes.into_iter().fold(1, u64::saturating_mul)
 }
 
-/// The memory of this machine, or of the control group that this process is confined to; none where
-/// the system does not report it. Asked once.
+/// The memory of this machine, or of the control group that limits this process; none if the system
+/// does not report it. Queried once.
 pub(crate) fn machine_bytes() -> Option<u64> {
     static BYTES: OnceLock<Option<u64>> = OnceLock::new();
     *BYTES.get_or_init(usable_bytes)
 }
 
-/// How many pictures of so many bytes each half of a machine's memory holds, one at least; any
-/// number where the memory is not known.
+/// How many pictures of this many bytes fit into half of a machine's memory, at least one;
+/// unlimited if the memory is unknown.
 pub(super) fn fitting_pictures(machine_bytes: Option<u64>, picture_bytes: u64) -> usize {
     let need = picture_bytes.max(1);
     let fitting = machine_bytes.map_or(u64::MAX, |bytes| bytes / 2 / need);
@@ -319,7 +320,7 @@ fn installed_bytes() -> Option<u64> {
     Some(kib << 10)
 }
 
-/// The least that this process's control group (cgroup v2) or one above it allows.
+/// The lowest limit of this process's control group (cgroup v2) and those above it.
 fn control_group_bytes() -> Option<u64> {
     own_control_group()?
         .ancestors()
@@ -327,7 +328,7 @@ fn control_group_bytes() -> Option<u64> {
         .min()
 }
 
-/// The rest of the first line of a file that begins like this.
+/// The rest of the first line in a file that begins with `start`.
 fn line_after(start: &str, file: &str) -> Option<String> {
     let text = std::fs::read_to_string(file).ok()?;
     let rest = text.lines().find_map(|line| line.strip_prefix(start))?;
@@ -344,7 +345,7 @@ fn group_bytes(group: &Path) -> Option<u64> {
     most.trim().parse().ok()
 }
 
-/// One limit: `what` is counted, `name` is the field to raise.
+/// Checks one limit: `what` is counted, `name` is the field to raise.
 pub(super) fn at_most(
     count: u64,
     limit: u64,
@@ -359,8 +360,8 @@ pub(super) fn at_most(
     ))
 }
 
-/// Refuses what the system has no memory for, as far as it reports that: an allocation that fails
-/// ends the process.
+/// Rejects a demand for which the system has no memory, as far as it reports that: a failed
+/// allocation ends the process.
 pub(super) fn affordable(bytes: u64) -> std::result::Result<(), String> {
     if can_reserve(bytes) {
         return Ok(());

@@ -1,7 +1,7 @@
-//! Input and output: the only place that opens pictures, and the only one that calls C++.
+//! Input and output: the only module that opens pictures, and the only one that calls C++.
 //!
-//! A picture is read by its content, not by its name, and becomes the pixel type that the caller
-//! requests:
+//! A picture is recognised by its content, not its name, and is converted to the pixel type that
+//! the caller requests:
 //!
 //! ```
 //! use petcomp::{Image, LinearRgb, io};
@@ -19,57 +19,59 @@
 //! | integers (PNG, JPEG, HEIC, TIFF) | decoded with the exact sRGB curve, or by the gamma that a PNG states | straight unless a TIFF states otherwise | code / full scale, never decoded |
 //! | half and float (EXR, TIFF, HDR) | treated as scene-linear Rec. 709 | EXR premultiplied, TIFF as it states | as it is |
 //!
-//! Premultiplication happens here, in linear light. A fourth sample that a TIFF does not call alpha
-//! (`ExtraSamples` 0) is left out with a warning. The orientation noted by a camera is applied. An
-//! EXR is cropped or padded with transparent black (a film passes all light there) from its data
-//! window to its display window ([`Window`] keeps the former), and converted if it names other
-//! primaries. A colour profile (ICC) of primaries and curves, such as Display P3 or Adobe RGB, is
-//! applied to display codes, as are code points of Rec. 709, Rec. 2020 and Display P3 with the
-//! curve of sRGB or none, and a camera's word (EXIF) for Adobe RGB in a JPEG or TIFF without
-//! profile; others are named in a warning and the codes treated as sRGB. Inks (CMYK) are
-//! multiplied; CIELab is refused. Samples that are infinite or NaN are counted in a warning, and
-//! become codes of 0 or full scale where integers are written.
+//! Premultiplication happens here, in linear light. A fourth sample that a TIFF does not declare as
+//! alpha (`ExtraSamples` 0) is ignored with a warning. The orientation recorded by a camera is
+//! applied. An EXR is cropped or padded with transparent black (a film passes all light there) from
+//! its data window to its display window ([`Window`] can keep the former), and converted if it
+//! names other primaries. An ICC colour profile with primaries and curves, such as Display P3 or
+//! Adobe RGB, is applied to display codes, as are code points of Rec. 709, Rec. 2020 and Display P3
+//! with the curve of sRGB or none, and Adobe RGB as recorded by a camera (EXIF) in a JPEG or TIFF
+//! without profile; others are named in a warning and the codes treated as sRGB. Inks (CMYK) are
+//! multiplied; CIELab is rejected. Samples that are infinite or NaN are counted in a warning, and
+//! become codes of 0 or full scale when integers are written.
 //!
-//! # What holds for untrusted files
+//! # Guarantees for untrusted files
 //!
-//! No file crashes petcomp, hangs it, exhausts the machine's memory or leads out of its folder;
-//! what can be read is read correctly, what cannot is named in one line.
+//! No file crashes petcomp, hangs it, exhausts the machine's memory or leads out of its folder; a
+//! readable file is read correctly, and an unreadable one is reported in one line.
 //!
 //! * **What is opened.** Regular files only, by content and not by name: EXR, PNG, JPEG, HEIC,
-//!   TIFF, Radiance HDR; DPX and Cineon only under their own names.
-//! * **What a file may ask for** is in [`Limits`], and checked before pixels are touched, in
-//!   arithmetic that cannot wrap: by default 32,768 pixels along a side, 128 Mi in all, 64
-//!   channels, 1 GiB decoded, 10,000 times the file above 64 MiB, 64 MiB that is not pixels. Memory
-//!   that the system does not give is not attempted.
-//! * **Who decodes.** Decoders in Rust, in this process; one that panics has met a damaged file.
-//!   What they do not know goes to OpenImageIO, HEIC to libheif, in a worker process, which gets the
-//!   file's bytes through a socket and gives samples through a pipe. It may open no file (Landlock,
-//!   seccomp, file size 0), start nothing but threads, connect nowhere, has memory for the current
-//!   file only, and is killed when it takes more than [`Limits::seconds`]. A file on which two
-//!   workers die is named with the signal. The worker is not trusted either.
-//! * **What is written** goes to a temporary file beside its place, is synced, and moved there:
-//!   whole or not at all. (The samples of a dataset are synced many at once, after they are moved;
-//!   what a power cut tears of the last ones is made again.) A link in its place is replaced, not
-//!   followed, a file gives its permissions, a device or a pipe is refused; `refuse_links` keeps
-//!   outputs in their folder. No metadata of an input gets into an output, so neither positions
-//!   (GPS) nor serial numbers do; keyers alone keep where an EXR lies and the shape of its pixels.
-//! * **Where a document leads.** A path in a document that may come from anywhere (journal and
-//!   manifest of a dataset or an asset folder, label, scene, scene for another renderer) is looked
-//!   for in the folder of that document alone: [`inside`] refuses `..`, links that lead out, and
-//!   all but regular files. Trusted are documents that people write for themselves and that name
-//!   files elsewhere on purpose: recipes (`assets`, `backgrounds`, `environment.files`), lists of
-//!   photos, `data.yaml` and the lists it names. What they name must be regular files within the
-//!   limits too. Files that petcomp appends to (`.lock`, `index.jsonl`, `.runs.jsonl`) are refused
-//!   where a link is in their place.
+//!   TIFF, Radiance HDR; DPX and Cineon only under their own extensions.
+//! * **What a file may demand** is defined by [`Limits`], and checked before pixels are decoded,
+//!   with arithmetic that cannot overflow: by default 32,768 pixels per side, 128 Mi in total, 64
+//!   channels, 1 GiB decoded, 10,000 times the file size above 64 MiB, 64 MiB of data that is not
+//!   pixels. Memory that the system cannot provide is not requested.
+//! * **Who decodes.** Decoders in Rust, in this process; a panic in one of them means a damaged
+//!   file. Kinds that they do not support go to OpenImageIO, HEIC to libheif, in a worker process,
+//!   which receives the file's bytes through a socket and returns samples through a pipe. It cannot
+//!   open files (Landlock, seccomp, file size 0), start anything but threads, or connect to
+//!   anything, has memory for the current file only, and is killed when it takes longer than
+//!   [`Limits::seconds`]. A file on which two workers die is reported with the signal. The worker's
+//!   output is not trusted either.
+//! * **What is written** goes to a temporary file next to its destination, is synced, and moved
+//!   there: completely or not at all. (The samples of a dataset are moved first and then synced
+//!   many at once; any of the last ones that a power failure tears are generated again.) A link at
+//!   the destination is replaced, not followed, an existing file's permissions are kept, a device
+//!   or a pipe is rejected; `refuse_links` keeps outputs in their folder. No metadata of an input
+//!   is copied to an output, so neither GPS positions nor serial numbers are; only keyers keep the
+//!   position of an EXR and its pixel aspect.
+//! * **Where a document leads.** Paths in documents that may come from anywhere (journal and
+//!   manifest of a dataset or an asset folder, label, scene, scene for another renderer) are only
+//!   searched in the folder of that document: [`inside`] rejects `..`, links that lead out, and
+//!   anything but regular files. Trusted are documents that people write for themselves and that
+//!   name files elsewhere on purpose: recipes (`assets`, `backgrounds`, `environment.files`), lists
+//!   of photos, `data.yaml` and the lists it names. The files that they name must also be regular
+//!   and within the limits. Files to which petcomp appends (`.lock`, `index.jsonl`, `.runs.jsonl`)
+//!   are rejected if they are links.
 //! * **Documents** (JSON, TOML) are by default at most 16 MiB and nested 64 deep, without duplicate
-//!   keys or numbers that are not finite; a mistake is named with its line.
+//!   keys or numbers that are not finite; a mistake is reported with its line.
 //!
-//! Not guaranteed: that decoders have no bugs (`oiio::read` and `Fallback::InProcess` let
+//! Not guaranteed: that decoders have no bugs (`oiio::read` and `Fallback::InProcess` load
 //! OpenImageIO's into this process, and Debian does not fix them), that a kernel without Landlock
-//! or seccomp has an equal sandbox (one warning reports it; [`Fallback::StrictWorker`] refuses),
-//! that the stages behind reading fit into any memory, or anything against a person with an account
-//! on the machine. Wrong pixels out of a JPEG or HEIC that is damaged in the middle, with its end
-//! in place, cannot be distinguished from real ones.
+//! or seccomp has an equivalent sandbox (one warning reports it; [`Fallback::StrictWorker`]
+//! refuses), that later stages fit into any memory, or anything against a person with an account on
+//! the machine. Wrong pixels from a JPEG or HEIC that is damaged in the middle but has its end
+//! cannot be distinguished from real ones.
 
 mod codec;
 mod decode;

@@ -1,9 +1,8 @@
-//! Pictures through OpenImageIO in this process: for those who trust their files, and for
-//! comparisons.
+//! Pictures through OpenImageIO in this process: for trusted files, and for comparisons.
 //!
 //! A damaged file can crash OpenImageIO, and a program that calls this module links about 260
-//! shared libraries. [`io::read`](super::read) calls it in a process of its own, for the kinds of
-//! file that the Rust decoders do not know.
+//! shared libraries. [`io::read`](super::read) runs it in a separate process, for the kinds of file
+//! that the Rust decoders do not support.
 
 pub use super::worker::Linked;
 
@@ -24,11 +23,11 @@ pub fn in_process() -> Linked {
     Linked(openimageio::answer)
 }
 
-/// Reads a picture through OpenImageIO, in this process; pixels mean the same as in
+/// Reads a picture through OpenImageIO, in this process; pixels have the same meaning as in
 /// [`io::read`](super::read).
 ///
 /// # Errors
-/// [`Error::File`] as [`io::read`](super::read). A damaged file may end the process instead.
+/// [`Error::File`] as in [`io::read`](super::read). A damaged file may crash the process instead.
 pub fn read<P: FromFile>(path: impl AsRef<Path>) -> Result<Image<P>> {
     read_by(
         Fallback::InProcess(in_process()),
@@ -37,11 +36,11 @@ pub fn read<P: FromFile>(path: impl AsRef<Path>) -> Result<Image<P>> {
     )
 }
 
-/// Writes a picture through OpenImageIO, encoded as [`io::write_with`](super::write_with) does.
+/// Writes a picture through OpenImageIO, encoded as by [`io::write_with`](super::write_with).
 ///
 /// # Errors
-/// [`Error::File`] as [`io::write_with`](super::write_with); the file is written in place, not
-/// beside it.
+/// [`Error::File`] as in [`io::write_with`](super::write_with); the file is written in place,
+/// without a temporary file.
 pub fn write_with<P: ToFile>(
     path: impl AsRef<Path>,
     image: &Image<P>,
@@ -67,7 +66,7 @@ fn encode<P: ToFile>(
     openimageio::write_file(name, format, &layout, &samples, &options.metadata)
 }
 
-/// As requested, or the format's own; film scans have 16 bits.
+/// As requested, or the format's default; film scans have 16 bits.
 fn written_bits<P: ToFile>(
     format: Format,
     requested: Option<Bits>,

@@ -1,4 +1,4 @@
-//! How pictures are read.
+//! Options for reading pictures.
 
 use super::header::Window;
 use super::limits::Limits;
@@ -7,18 +7,18 @@ use super::worker::Linked;
 use crate::error::{Error, Result};
 use std::sync::OnceLock;
 
-/// What reads the kinds of file that the Rust decoders do not know.
+/// The reader for kinds of file that the Rust decoders do not support.
 #[derive(Clone, Copy, Debug, Default)]
 pub enum Fallback {
-    /// Nothing: such files are refused.
+    /// None: such files are rejected.
     Nothing,
-    /// OpenImageIO in a process of its own, where petcomp was built with the feature `oiio`.
+    /// OpenImageIO in a separate process, if petcomp was built with the feature `oiio`.
     #[default]
     Worker,
-    /// As `Worker`, but such files are refused where the system cannot sandbox it, with Landlock
-    /// and seccomp.
+    /// Like `Worker`, but such files are rejected if the system cannot sandbox it with Landlock and
+    /// seccomp.
     StrictWorker,
-    /// OpenImageIO in this process, for people who trust their files:
+    /// OpenImageIO in this process, for trusted files:
     /// [`oiio::in_process`](super::oiio::in_process).
     #[cfg(feature = "oiio")]
     InProcess(Linked),
@@ -27,15 +27,15 @@ pub enum Fallback {
 /// How a picture is read.
 #[derive(Clone, Debug)]
 pub struct ReadOptions {
-    /// What a file may ask for. Default: [`Limits::default`].
+    /// What a file may demand. Default: [`Limits::default`].
     pub limits: Limits,
-    /// What reads other kinds of file. Default: [`Fallback::Worker`].
+    /// The reader for other kinds of file. Default: [`Fallback::Worker`].
     pub fallback: Fallback,
-    /// Which part of an EXR is read. Default: [`Window::Display`].
+    /// Which region of an EXR is read. Default: [`Window::Display`].
     pub window: Window,
 }
 
-/// What a program chose for all its files.
+/// The options that a program chose for all its files.
 static PROCESS_DEFAULT: OnceLock<ReadOptions> = OnceLock::new();
 
 impl Default for ReadOptions {
@@ -52,11 +52,11 @@ impl Default for ReadOptions {
 }
 
 impl ReadOptions {
-    /// Makes these the default of this process, for every file that a stage reads by itself.
-    /// Decides which files are read, never what is in them; for programs, once, at their start.
+    /// Makes these the default of this process, for every file that a stage reads. They decide
+    /// which files are read, never what their content is; programs call this once, when they start.
     ///
     /// # Errors
-    /// [`Error::Value`] when it was done before.
+    /// [`Error::Value`] if it was already called.
     pub fn make_default(self) -> Result<()> {
         PROCESS_DEFAULT
             .set(self)

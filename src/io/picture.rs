@@ -1,4 +1,4 @@
-//! A decoded picture whose pixels are made on request.
+//! A decoded picture whose pixels are converted on request.
 
 use super::codec::channels::{ChannelMatch, Wanted};
 use super::codec::profile::{ColorDescription, DisplayProfile};
@@ -15,9 +15,9 @@ use crate::image::Image;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// A picture in the samples of its file: a byte for each channel of a pixel in most.
+/// A picture stored as the samples of its file, usually one byte per channel of a pixel.
 ///
-/// For what looks at large pictures part by part; [`read`](super::read) gives all pixels at once.
+/// For processing large pictures part by part; [`read`](super::read) returns all pixels at once.
 #[derive(Debug)]
 pub struct Picture {
     path: PathBuf,
@@ -27,10 +27,10 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Reads a picture of colours, with the default [`ReadOptions`].
+    /// Reads a colour picture with the default [`ReadOptions`].
     ///
     /// # Errors
-    /// [`Error::File`] as [`read`](super::read).
+    /// [`Error::File`] as in [`read`](super::read).
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let picture = Self::decode(path.as_ref(), &ReadOptions::default(), Wanted::Color)?;
         Wanted::Color
@@ -53,7 +53,7 @@ impl Picture {
         Self::from_raster(raster, source, &options.limits, wanted)
     }
 
-    /// Finds the meaning of samples, and turns the picture the way the camera was held.
+    /// Determines the meaning of the samples, and rotates the picture upright.
     pub(super) fn from_raster(
         raster: std::result::Result<Raster, Refusal>,
         source: &SourceFile,
@@ -90,25 +90,25 @@ impl Picture {
         self.format
     }
 
-    /// Names of the channels that its colours are made from.
+    /// Names of the channels used for its colours.
     pub fn channels(&self) -> &[String] {
         &self.raster.names
     }
 
-    /// Its samples are display-encoded integers; others are scene-linear.
+    /// Whether its samples are display-encoded integers; others are scene-linear.
     pub fn is_display_encoded(&self) -> bool {
         self.raster.display_encoded
     }
 
-    /// Its colours have alpha.
+    /// Whether its colours have alpha.
     pub fn has_alpha(&self) -> bool {
         Wanted::Color
             .pick(&self.raster.names)
             .is_ok_and(|picked| picked.len() > 3)
     }
 
-    /// The colours of some rows, as [`read`](super::read) makes them; of `LinearRgb`, without a
-    /// look at alpha.
+    /// The colours of some rows, converted as by [`read`](super::read); for `LinearRgb`, without
+    /// checking alpha.
     ///
     /// # Panics
     /// When the rows reach outside the picture, or the requested pixels are not colours.
@@ -116,19 +116,19 @@ impl Picture {
         self.colors(self.profile.as_ref(), rows)
     }
 
-    /// As [`rows`](Self::rows), but by sRGB whatever profile the file has: encoded again, they are
-    /// its codes.
+    /// Like [`rows`](Self::rows), but decoded as sRGB whatever the file's profile: encoding them
+    /// again gives its codes.
     ///
     /// # Panics
-    /// As [`rows`](Self::rows).
+    /// As in [`rows`](Self::rows).
     pub fn rows_as_srgb<P: FromFile>(&self, rows: Range<usize>) -> Image<P> {
         self.colors(None, rows)
     }
 
-    /// All colours, as [`read`](super::read) makes them.
+    /// All colours, converted as by [`read`](super::read).
     ///
     /// # Errors
-    /// [`Error::File`] for a picture with alpha below 1 where `LinearRgb` is requested.
+    /// [`Error::File`] for a picture with alpha below 1 if `LinearRgb` is requested.
     ///
     /// # Panics
     /// When the requested pixels are not colours.
@@ -159,7 +159,7 @@ impl Picture {
     }
 }
 
-/// The colour profile of display codes, where there is one other than sRGB.
+/// The colour profile of display codes, if there is one other than sRGB.
 fn usable_profile(
     raster: &Raster,
     source: &SourceFile,
@@ -187,7 +187,7 @@ fn usable_profile(
     profile
 }
 
-/// The profile in a file, or that its camera noted, if it is not sRGB anyway; formats of linear
+/// The profile in a file, or the one recorded by its camera, unless it is sRGB; formats with linear
 /// light have none.
 fn described_profile(
     source: &SourceFile,
@@ -208,7 +208,7 @@ fn described_profile(
     description.map_or(Ok(None), DisplayProfile::from_description)
 }
 
-/// Infinite depth is where nothing is; elsewhere it is worth a warning.
+/// Warns of samples that are not finite; infinite depth is normal where there is nothing.
 fn warn_not_finite(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     if wanted == Wanted::Depth {
         return;
@@ -220,7 +220,7 @@ fn warn_not_finite(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     }
 }
 
-/// Names the channels of a picture that has none of the default names.
+/// Reports the channels used from a picture without the default names.
 fn warn_unusual_channels(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     let path = source.path.display();
     match wanted.choose(&raster.names) {
@@ -234,8 +234,8 @@ fn warn_unusual_channels(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     }
 }
 
-/// Says where a TIFF has samples behind its colours, the first of which it does not call alpha:
-/// most programs leave them out, some take that one for alpha.
+/// Reports a TIFF with samples after its colours, the first of which is not declared as alpha: most
+/// programs ignore them, some treat the first one as alpha.
 fn warn_left_out(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     let picked = Wanted::Color.pick(&raster.names);
     let is_without_alpha = picked.is_ok_and(|picked| picked.len() == 3);
@@ -251,7 +251,7 @@ fn warn_left_out(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     }
 }
 
-/// Says where a PNG has codes of video, whose black and white are not the outermost ones.
+/// Reports a PNG with video codes, whose black and white are not the lowest and highest codes.
 fn warn_narrow_range(source: &SourceFile, limits: &Limits, wanted: Wanted) {
     if source.format != Format::Png || !wanted.is_color() {
         return;
@@ -275,7 +275,7 @@ mod tests {
     const APP1: u8 = 0xe1;
     const APP2: u8 = 0xe2;
 
-    /// Light of a JPEG of one colour with a segment.
+    /// Light of a single-colour JPEG with a segment.
     fn light(marker: u8, data: &[u8]) -> LinearRgb {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.jpg");

@@ -1,4 +1,4 @@
-//! Typed pictures out of files.
+//! Reads pictures as typed pixels.
 
 use super::codec::FromFile;
 use super::codec::exif::CameraNotes;
@@ -21,10 +21,10 @@ use std::path::Path;
 
 /// Reads a picture as pixels of the requested type, with the default [`ReadOptions`].
 ///
-/// `LinearRgb` wants an opaque picture: one with alpha below 1 is refused, an alpha of 1 is
-/// dropped. `PremulRgba` and `StraightRgba` get alpha 1 from a file without alpha, and 0 where an
-/// EXR stores no pixel. `Coverage` is the only channel of a file, or `R`, `G` and `B` where they
-/// are equal and no alpha below 1 is beside them, or `A`; `Depth` the only one, or `Z`, in float.
+/// `LinearRgb` requires an opaque picture: one with alpha below 1 is rejected, an alpha of 1 is
+/// dropped. `PremulRgba` and `StraightRgba` get alpha 1 for a file without alpha, and 0 where an
+/// EXR stores no pixel. `Coverage` is the only channel of a file, or `R`, `G` and `B` if they are
+/// equal and have no alpha below 1, or `A`; `Depth` is the only channel, or `Z`, in float.
 ///
 /// # Errors
 /// [`Error::File`] for a file that is missing, not regular, not a picture, damaged, beyond the
@@ -33,18 +33,18 @@ pub fn read<P: FromFile>(path: impl AsRef<Path>) -> Result<Image<P>> {
     read_with(path, &ReadOptions::default())
 }
 
-/// Reads a picture as [`read`] does, with options of the caller's.
+/// Reads a picture like [`read`], with the given options.
 ///
 /// # Errors
-/// As [`read`].
+/// As in [`read`].
 pub fn read_with<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Image<P>> {
     Picture::decode(path.as_ref(), options, P::WANTED)?.into_image()
 }
 
-/// Reads a picture as [`read`] does, where a check finds nothing wrong with the bytes of its file.
+/// Reads a picture like [`read`], if a check accepts the bytes of its file.
 ///
 /// # Errors
-/// As [`read`]; [`Error::File`] with what the check found.
+/// As in [`read`]; [`Error::File`] with the result of the check.
 #[cfg(feature = "pipeline")]
 pub(crate) fn read_checked<P: FromFile>(
     path: &Path,
@@ -59,7 +59,7 @@ pub(crate) fn read_checked<P: FromFile>(
 /// Reads the description of a picture in a file, without the pixels.
 ///
 /// # Errors
-/// [`Error::File`] as [`read`].
+/// [`Error::File`] as in [`read`].
 pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
     let (path, options) = (path.as_ref(), ReadOptions::default());
     let opened = OpenedSource::open(path, &options.limits)?;
@@ -86,23 +86,23 @@ pub fn read_format(path: impl AsRef<Path>) -> Result<Format> {
     Ok(OpenedSource::open(path.as_ref(), &limits)?.format)
 }
 
-/// Refuses a photo whose pixels are not square, as an EXR may say.
+/// Rejects a photo whose pixels are not square, as an EXR may declare.
 ///
 /// # Errors
 /// Those of [`Header::check_square_pixels`] and [`read_header`].
 #[doc(hidden)]
 pub fn check_square_pixels(path: impl AsRef<Path>) -> Result<()> {
     let path = path.as_ref();
-    // Headers of other formats may take long, and say nothing of it.
+    // Headers of other formats may take long to read, and do not contain it.
     match read_format(path)? {
         Format::Exr => read_header(path)?.check_square_pixels(path),
         _ => Ok(()),
     }
 }
 
-/// How many pictures like these are worked on at once: as many as half of the machine's memory holds
-/// of the largest, one at least; any number where that is one on each thread, or memory or every
-/// size is unknown.
+/// How many pictures like these to process at once: as many of the largest as fit into half of the
+/// machine's memory, at least one; unlimited if that is at least one per thread, or if the memory
+/// or all sizes are unknown.
 #[doc(hidden)]
 pub fn pictures_at_once(
     paths: impl IntoIterator<Item = impl AsRef<Path>>,
@@ -119,7 +119,7 @@ pub fn pictures_at_once(
     }
 }
 
-/// By our decoders.
+/// Reads a header with our decoders.
 fn header_of(
     mut opened: OpenedSource,
     options: &ReadOptions,
@@ -128,7 +128,7 @@ fn header_of(
     catch_panic(|| read_file_header(&mut opened.file, bytes, format, &options.limits))
 }
 
-/// Adds what the camera noted; the size becomes that of the upright picture.
+/// Adds what the camera recorded; the size becomes that of the upright picture.
 fn apply_notes(header: &mut Header, notes: &CameraNotes) {
     let stored = [header.width, header.height];
     header.cropped = notes.has_other_shape(stored);
@@ -143,7 +143,7 @@ fn apply_notes(header: &mut Header, notes: &CameraNotes) {
     header.focal_by_sensor = notes.focal_by_sensor;
 }
 
-/// Reads a picture by OpenImageIO alone, even one that the Rust decoders could read.
+/// Reads a picture with OpenImageIO only, even if the Rust decoders could read it.
 #[cfg(feature = "oiio")]
 pub(super) fn read_by<P: FromFile>(
     fallback: Fallback,
@@ -159,11 +159,11 @@ pub(super) fn read_by<P: FromFile>(
     Picture::from_raster(raster, &source, &options.limits, P::WANTED)?.into_image()
 }
 
-/// Reads a picture through the OpenImageIO worker, even one that the Rust decoders could read: for
+/// Reads a picture through the OpenImageIO worker, even if the Rust decoders could read it: for
 /// comparisons.
 ///
 /// # Errors
-/// As [`read_with`].
+/// As in [`read_with`].
 #[cfg(feature = "oiio")]
 #[doc(hidden)]
 pub fn read_in_worker<P: FromFile>(

@@ -1,4 +1,4 @@
-//! Picture files as they are opened: by their first bytes, not by their names.
+//! Picture files, recognised by their first bytes, not by their names.
 
 use super::foreign;
 use super::format::Format;
@@ -9,14 +9,14 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-/// A whole file in memory, and its kind by its content.
+/// A complete file in memory, and its kind by its content.
 pub(super) struct SourceFile {
     pub(super) path: PathBuf,
     pub(super) bytes: Vec<u8>,
     pub(super) format: Format,
 }
 
-/// A file that is open at its first byte, and its kind by its content.
+/// A file opened at its first byte, and its kind by its content.
 pub(super) struct OpenedSource {
     pub(super) file: BufReader<File>,
     pub(super) bytes: u64,
@@ -24,8 +24,8 @@ pub(super) struct OpenedSource {
 }
 
 impl OpenedSource {
-    /// Opens a picture file that is worth decoding: regular, not empty, of a known kind, not larger
-    /// than allowed.
+    /// Opens a picture file that passes the basic checks: regular, not empty, of a known kind, and
+    /// not larger than allowed.
     pub(super) fn open(path: &Path, limits: &Limits) -> Result<Self> {
         let (file, bytes) = open_regular(path, (limits.file_bytes, "file_bytes"), "picture")?;
         let mut file = BufReader::new(file);
@@ -40,7 +40,7 @@ impl OpenedSource {
 }
 
 impl SourceFile {
-    /// Reads a picture file that is worth decoding.
+    /// Reads a picture file that passes the basic checks.
     pub(super) fn open(path: &Path, limits: &Limits) -> Result<Self> {
         let OpenedSource {
             file,
@@ -57,11 +57,11 @@ impl SourceFile {
     }
 }
 
-/// The kinds of file that messages name.
+/// The kinds of file listed in messages.
 const EXPECTED_FORMATS: &str = "expected EXR, PNG, JPEG, HEIC, TIFF or HDR";
 
-/// The kind of a file by its first bytes. Film scans are read only under a name of their own:
-/// OpenImageIO has to read them, and what is called otherwise was not meant to be one.
+/// The kind of a file by its first bytes. Film scans are only read under their own extensions:
+/// OpenImageIO has to read them, and a file with another extension was not meant to be one.
 fn recognized(path: &Path, start: &[u8]) -> std::result::Result<Format, String> {
     if start.is_empty() {
         return Err("empty file (0 bytes), expected a picture".into());
@@ -89,7 +89,7 @@ fn is_misnamed_scan(path: &Path, format: Format) -> bool {
     is_scan && Format::from_extension(path) != Some(format)
 }
 
-/// The first bytes in a form that is safe to print on one line: text, or hexadecimal numbers.
+/// The first bytes in a form that is safe to print on one line: as text, or as hexadecimal numbers.
 fn printable_start(bytes: &[u8]) -> String {
     let head = &bytes[..bytes.len().min(12)];
     match std::str::from_utf8(head) {
@@ -120,7 +120,7 @@ mod tests {
             "is AVIF, expected EXR, PNG, JPEG, HEIC, TIFF or HDR: convert it to PNG first"
         );
         assert!(told(b"RIFF\x10\0\0\0WEBPVP8 ").starts_with("is WebP, expected EXR"));
-        // By its first bytes a TIFF.
+        // A TIFF by its first bytes.
         for start in [
             b"II*\0\x10\0\0\0CR\x02\0".as_slice(),
             b"II*\0\x08\x0a\0\0IIIICwaR",

@@ -1,4 +1,4 @@
-//! Typed pictures to files: the format by the extension, the encoding by the pixel type.
+//! Writes typed pictures: the extension determines the format, the pixel type the encoding.
 
 use super::codec::codes::{Bits, Codes, ToFile, interleaved};
 use super::codec::exr::{self, Compression, FlatSamples};
@@ -14,11 +14,11 @@ use crate::work::{self, Kind};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// How a picture is written.
+/// Options for writing a picture.
 #[derive(Clone, Debug)]
 pub struct WriteOptions {
-    /// Storage of a sample. Default: the format's own (PNG and JPEG 8 bits, TIFF 16 bits, EXR
-    /// half; depths always float).
+    /// Storage of a sample. Default: the format's own (PNG and JPEG 8 bits, TIFF 16 bits, EXR half;
+    /// depths always float).
     pub bits: Option<Bits>,
     /// Compression of an EXR. Default: [`Compression::Zip`].
     pub compression: Compression,
@@ -27,11 +27,11 @@ pub struct WriteOptions {
     pub png_effort: Quality,
     /// Quality of a JPEG, 1 to 100. Default: 95.
     pub jpeg_quality: u8,
-    /// Samples of colour in a JPEG. Default: one for each pixel.
+    /// Chroma subsampling of a JPEG. Default: none.
     pub jpeg_chroma: Chroma,
-    /// Texts to store with the picture, by name. Default: none.
+    /// Text attributes to store with the picture, by name. Default: none.
     pub metadata: Vec<(String, String)>,
-    /// Where the picture of an EXR lies, and of what pixels. Default: [`Canvas::default`].
+    /// Position of an EXR's picture and its pixel aspect. Default: [`Canvas::default`].
     pub canvas: Canvas,
 }
 
@@ -49,27 +49,27 @@ impl Default for WriteOptions {
     }
 }
 
-/// Names the colour space of float files that petcomp writes; other programs drop or rename their
-/// own attribute for it.
+/// Attribute with the colour space of float files that petcomp writes; other programs drop or
+/// rename their own one.
 const COLORSPACE: (&str, &str) = ("petcomp:colorspace", "scene-linear Rec. 709");
 
 /// Writes a picture with the defaults of [`WriteOptions`]; see [`write_with`].
 ///
 /// # Errors
-/// As [`write_with`].
+/// As in [`write_with`].
 pub fn write<P: ToFile>(path: impl AsRef<Path>, image: &Image<P>) -> Result<()> {
     write_with(path, image, &WriteOptions::default())
 }
 
-/// Writes a picture in the format that the extension names: `exr`, `png`, `jpg`, `tif`.
+/// Writes a picture in the format of the extension: `exr`, `png`, `jpg`, `tif`.
 ///
-/// Colours go display-encoded (sRGB, straight alpha, clipped to 0 to 1) into integer samples and
-/// scene-linear (premultiplied, unclipped) into float ones; mattes are stored as they are. The file
-/// appears whole or not at all, and the same picture gives the same bytes.
+/// Integer samples get display-encoded colours (sRGB, straight alpha, clipped to 0 to 1), float
+/// samples scene-linear ones (premultiplied, unclipped); mattes are stored unchanged. The file
+/// appears complete or not at all, and the same picture gives the same bytes.
 ///
 /// # Errors
-/// [`Error::File`] for an extension that is not written, samples that the format or the pixel
-/// cannot have, transparent pixels in a JPEG, an empty picture, and errors of the system.
+/// [`Error::File`] for an unsupported extension, samples that the format or the pixel type does not
+/// support, transparent pixels in a JPEG, an empty picture, and system errors.
 pub fn write_with<P: ToFile>(
     path: impl AsRef<Path>,
     image: &Image<P>,
@@ -80,7 +80,7 @@ pub fn write_with<P: ToFile>(
     write_bytes(path, &bytes)
 }
 
-/// The bytes of a JPEG file of a quality from 1 to 100.
+/// The bytes of a JPEG file with a quality of 1 to 100.
 ///
 /// # Errors
 /// An image without pixels, or with transparent ones.
@@ -141,7 +141,7 @@ fn check_not_empty((width, height): (usize, usize)) -> std::result::Result<(), S
     ))
 }
 
-/// The storage of a sample: as requested, or the format's own.
+/// The storage of a sample: as requested, or the format's default.
 pub(super) fn sample_storage<P: ToFile>(
     format: Option<Format>,
     requested: Option<Bits>,
@@ -156,8 +156,8 @@ pub(super) fn sample_storage<P: ToFile>(
     Err(format!("{} samples, expected {expected}", bits.name()))
 }
 
-/// What a format can store of a pixel that means something in integers, or of one that does not;
-/// its own choice first.
+/// What a format can store for a pixel type that is meaningful as integer codes, or for one that is
+/// not; its default first.
 fn possible_storage<P: ToFile>(
     format: Option<Format>,
 ) -> std::result::Result<&'static [Bits], String> {
@@ -174,7 +174,7 @@ fn possible_storage<P: ToFile>(
     }
 }
 
-/// The same for a pixel that means something in integers.
+/// The same for a pixel type that is meaningful as integer codes.
 fn possible_codes(format: Option<Format>) -> std::result::Result<&'static [Bits], String> {
     match format {
         Some(Format::Exr) => Ok(&[Bits::Half, Bits::Float]),
@@ -237,7 +237,7 @@ fn without_alpha(codes: &[u8]) -> std::result::Result<Vec<u8>, String> {
         .collect())
 }
 
-/// The texts with the colour space in front, unless the caller named one.
+/// The texts, preceded by the colour space unless the caller specified one.
 fn with_colorspace(metadata: &[(String, String)]) -> Vec<(String, String)> {
     let (name, space) = COLORSPACE;
     let is_named = metadata.iter().any(|(key, _)| key == name);

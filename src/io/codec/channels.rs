@@ -1,17 +1,17 @@
-//! Which channels of a file pixels are made from.
+//! Selects the channels of a file from which pixels are read.
 
 /// Channels of a film's measured transmittance: the screen seen through it and in its shadow.
 pub(crate) const TRANSMITTANCE: [&str; 3] = ["TR", "TG", "TB"];
 /// Channels of a film's view transmittance: the share of the line of sight that passes.
 pub(crate) const VIEW_TRANSMITTANCE: [&str; 3] = ["VR", "VG", "VB"];
 
-/// Which channels a kind of pixel is made from.
+/// The kind of pixel that is read, which determines its channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Wanted {
     /// `R G B`, or `Y` for grey; `A` if present.
     Color,
-    /// As `Color`, with the transmittance `VR VG VB` or else `TR TG TB`, if present.
+    /// Like `Color`, with the transmittance `VR VG VB` or else `TR TG TB`, if present.
     Film,
     /// The only channel, or the three equal ones of a grey picture, or `A`.
     Coverage,
@@ -19,24 +19,24 @@ pub enum Wanted {
     Depth,
 }
 
-/// How channels serve a purpose, the best first.
+/// How channels were matched, the best match first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum ChannelMatch {
     /// By their default names.
     Named,
-    /// They are those of a layer: `diffuse.R`.
+    /// As channels of a layer: `diffuse.R`.
     Layer,
-    /// There is no other.
+    /// As the only candidate.
     Alone,
 }
 
 /// How well channels match, and their indices.
 pub(crate) type Choice = (ChannelMatch, Vec<usize>);
 
-/// Layers that are preferred to others: what programs call the finished picture.
+/// Layers preferred over others: common names of the finished picture.
 const FINISHED_LAYERS: [&str; 5] = ["combined", "rgba", "rgb", "beauty", "color"];
 
-/// Channels that are no grey picture.
+/// Channels that are not a grey picture.
 const INVISIBLE_CHANNELS: [&str; 3] = ["A", "Z", "ZBack"];
 
 impl Wanted {
@@ -45,7 +45,7 @@ impl Wanted {
         self.choose(names).map(|(_, picked)| picked)
     }
 
-    /// As [`pick`](Self::pick), and how well they match.
+    /// Like [`pick`](Self::pick), and how well they match.
     pub(crate) fn choose(self, names: &[String]) -> Result<Choice, String> {
         let found = match self {
             Self::Film => choose_film(names),
@@ -57,7 +57,7 @@ impl Wanted {
         found.ok_or_else(|| self.missing_among(names))
     }
 
-    /// How well the only channel of a picture serves as a matte or a depth.
+    /// How well the only channel of a picture matches a matte or a depth.
     fn match_alone(self, name: &str) -> ChannelMatch {
         let expected: &[&str] = match self {
             Self::Depth => &["Z"],
@@ -69,12 +69,12 @@ impl Wanted {
         }
     }
 
-    /// Pixels are colours.
+    /// Whether the pixels are colours.
     pub(crate) fn is_color(self) -> bool {
         matches!(self, Self::Color | Self::Film)
     }
 
-    /// The names with an alpha behind them, where they are those of colours without one.
+    /// The names with an alpha appended, if they are colours without alpha.
     pub(crate) fn with_alpha(self, names: &[String]) -> Option<Vec<String>> {
         let picks = |names: &[String]| self.pick(names).map_or(0, |picked| picked.len());
         let layer = names[0].rfind('.').map_or("", |dot| &names[0][..=dot]);
@@ -83,13 +83,13 @@ impl Wanted {
         is_without.then_some(extended)
     }
 
-    /// Whether a channel is 1, and not 0, where nothing is stored: all light passes there.
+    /// Whether a channel is 1 instead of 0 where nothing is stored: all light passes there.
     pub(crate) fn is_one_where_empty(self, name: &str) -> bool {
         let is_transmittance = VIEW_TRANSMITTANCE.contains(&name) || TRANSMITTANCE.contains(&name);
         self == Self::Film && is_transmittance
     }
 
-    /// The message where the wanted channels are not there.
+    /// The message if the wanted channels are missing.
     pub(crate) fn missing_among(self, names: &[String]) -> String {
         format!(
             "has the channels {}, expected {}",
@@ -107,7 +107,7 @@ impl Wanted {
     }
 }
 
-/// Colour, with the transmittance in place of alpha where there is one.
+/// Colour, with the transmittance instead of alpha if there is one.
 fn choose_film(names: &[String]) -> Option<Choice> {
     let (fit, mut picked) = choose_color(names)?;
     if let Some(transmittance) = transmittance_of(names) {
@@ -128,7 +128,7 @@ fn choose_coverage(names: &[String]) -> Option<Choice> {
     Some((ChannelMatch::Named, picked))
 }
 
-/// `Z`, or the only `Z` of a layer.
+/// `Z`, or the only `Z` in a layer.
 fn choose_depth(names: &[String]) -> Option<Choice> {
     if let Some(depth) = index_in_layer(names, "", "Z") {
         return Some((ChannelMatch::Named, vec![depth]));
@@ -137,7 +137,7 @@ fn choose_depth(names: &[String]) -> Option<Choice> {
     Some((ChannelMatch::Layer, vec![depth]))
 }
 
-/// Colour by its default names, or a layer of that, or the only channel that can be seen.
+/// Colour by its default names, or in a layer, or the only visible channel.
 fn choose_color(names: &[String]) -> Option<Choice> {
     if let Some(picked) = color_of_layer(names, "") {
         return Some((ChannelMatch::Named, picked));
@@ -147,7 +147,7 @@ fn choose_color(names: &[String]) -> Option<Choice> {
         .or_else(|| Some((ChannelMatch::Alone, only_visible(names)?)))
 }
 
-/// The only channel that can be seen, three times over, and the only alpha.
+/// The only visible channel three times, and the only alpha.
 fn only_visible(names: &[String]) -> Option<Vec<usize>> {
     let seen = only_index(names, |_| true)
         .or_else(|| only_index(names, |name| !INVISIBLE_CHANNELS.contains(&base_name(name))))?;
@@ -155,7 +155,7 @@ fn only_visible(names: &[String]) -> Option<Vec<usize>> {
     Some([seen; 3].into_iter().chain(alpha).collect())
 }
 
-/// Colour of the layer that is called finished, or of the first that has one.
+/// Colour of the layer named as finished, or of the first layer that has colour.
 fn color_of_best_layer(names: &[String]) -> Option<Vec<usize>> {
     let layers: Vec<(&str, Vec<usize>)> = names
         .iter()
@@ -167,7 +167,7 @@ fn color_of_best_layer(names: &[String]) -> Option<Vec<usize>> {
     Some(color.clone())
 }
 
-/// A layer, with its dot or without, that holds the finished picture by its name.
+/// Whether the name of a layer, with or without trailing dot, is that of a finished picture.
 pub(crate) fn is_finished(layer: &str) -> bool {
     let name = base_name(layer.trim_end_matches('.')).to_lowercase();
     FINISHED_LAYERS.contains(&name.as_str())
@@ -195,12 +195,12 @@ fn index_in_layer(names: &[String], layer: &str, channel: &str) -> Option<usize>
         .position(|name| name.strip_prefix(layer) == Some(channel))
 }
 
-/// A channel's own name, without its layer's.
+/// A channel's name without its layer.
 fn base_name(name: &str) -> &str {
     name.rsplit('.').next().unwrap_or(name)
 }
 
-/// The index of the only one of a kind.
+/// The index of the only channel of a kind.
 fn only_index(names: &[String], is: impl Fn(&str) -> bool) -> Option<usize> {
     let mut found = names.iter().enumerate().filter(|(_, name)| is(name));
     let (i, _) = found.next()?;

@@ -1,4 +1,4 @@
-//! What pixels become in a file: integer codes, or scene-linear channels.
+//! Pixels as stored in a file: integer codes, or scene-linear channels.
 
 use crate::color::{decode_srgb8, encode_srgb8, encode_srgb16};
 use crate::image::Image;
@@ -34,18 +34,18 @@ pub trait ToFile: Copy + Send + Sync {
     /// Names of its channels.
     #[doc(hidden)]
     const NAMES: &'static [&'static str];
-    /// It means something in integers of 0 to 1.
+    /// Whether it is meaningful as integer codes for 0 to 1.
     #[doc(hidden)]
     const CODED: bool = true;
-    /// Display-encoded straight codes (a matte: as it is); as many as there are names are used.
+    /// Display-encoded straight codes (a matte unchanged); only as many as there are names are used.
     #[doc(hidden)]
     fn codes<C: DisplayCode>(self) -> [C; 4];
-    /// Scene-linear channels, colours multiplied by alpha.
+    /// Scene-linear channels, colours premultiplied.
     #[doc(hidden)]
     fn linear(self) -> [f32; MAX_CHANNELS];
 }
 
-/// Channels of the pixel that has most.
+/// Channels of the pixel type that has the most.
 const MAX_CHANNELS: usize = 7;
 
 /// The channels, with zeros for the rest.
@@ -57,14 +57,14 @@ fn padded<const N: usize>(channels: [f32; N]) -> [f32; MAX_CHANNELS] {
 const RGB: &[&str] = &["R", "G", "B"];
 const RGBA: &[&str] = &["R", "G", "B", "A"];
 
-/// An integer that stands for 0 to 1: what is outside is clipped, NaN is 0.
+/// An integer code for 0 to 1: values outside are clipped, NaN is 0.
 pub trait DisplayCode: Copy + Default + Send {
     #[doc(hidden)]
     const FULL_SCALE: Self;
-    /// The value as it is.
+    /// The value without display encoding.
     #[doc(hidden)]
     fn from_value(v: f32) -> Self;
-    /// Light as sRGB displays it.
+    /// Light encoded as sRGB.
     #[doc(hidden)]
     fn from_light(light: LinearRgb) -> [Self; 3];
     /// The same value as an 8-bit code.
@@ -139,7 +139,7 @@ impl ToFile for PremulRgba {
 }
 
 impl ToFile for Film {
-    /// Programs that know no film see the grey one: `A`.
+    /// Programs without film support see the grey one: `A`.
     const NAMES: &'static [&'static str] = &["R", "G", "B", "A", "TR", "TG", "TB"];
     const CODED: bool = false;
     fn codes<C: DisplayCode>(self) -> [C; 4] {
@@ -205,7 +205,7 @@ impl ToFile for Srgba8 {
     }
 }
 
-/// Codes of 8 or 16 bits, channels interleaved.
+/// Interleaved codes of 8 or 16 bits.
 pub(crate) enum Codes {
     U8(Vec<u8>),
     U16(Vec<u16>),
@@ -220,7 +220,7 @@ impl Codes {
     }
 }
 
-/// Channels side by side, pixel after pixel, rows in parallel.
+/// Channels of pixel after pixel, interleaved, rows in parallel.
 pub(crate) fn interleaved<P: ToFile, T: Copy + Default + Send, const N: usize>(
     image: &Image<P>,
     channels: impl Fn(P) -> [T; N] + Sync,
@@ -231,7 +231,7 @@ pub(crate) fn interleaved<P: ToFile, T: Copy + Default + Send, const N: usize>(
         .par_chunks_exact_mut(n)
         .with_min_len(image.width().max(1));
     slots.zip(image.pixels()).for_each(|(slot, &p)| {
-        // Not as a slice: a call to copy three bytes takes longer than the bytes do.
+        // Not as a slice: the call to copy three bytes takes longer than copying them.
         for (slot, channel) in slot.iter_mut().zip(channels(p)) {
             *slot = channel;
         }

@@ -1,20 +1,19 @@
-//! What the camera wrote beside the pixels: which way up, how wide the lens was, and in which
-//! colours.
+//! What the camera recorded besides the pixels: the orientation, the focal length and the colour
+//! space.
 
 use super::orient::Orientation;
 use super::profile::ColorDescription;
 use exif::{Error, Exif, In, Tag, Value};
 use std::io::{BufRead, Read, Seek, SeekFrom};
 
-/// Diagonal of 36 mm x 24 mm film, which equivalents of focal lengths refer to, millimetres.
+/// Diagonal of 36 mm x 24 mm film, to which equivalent focal lengths refer, millimetres.
 const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
-/// Ratios of sides closer than this belong to one shape: sizes are rounded, and to multiples of 16
-/// at times.
+/// Aspect ratios closer than this count as equal: sizes are rounded, sometimes to multiples of 16.
 const SHAPE_TOLERANCE: f64 = 0.01;
-/// The same for sizes: no more than the middle of a lens is uncertain anyway.
+/// The same for sizes: a difference within the uncertainty of the principal point.
 const SIZE_TOLERANCE: f64 = 0.005;
-/// In the names of programs that state the size which they made as the one that was taken; cameras
-/// name their firmware in the same place.
+/// In the names of programs that record the size of their output as that of the original; cameras
+/// record their firmware in the same field.
 const EDITORS: [&str; 20] = [
     "acdsee",
     "adobe",
@@ -37,45 +36,47 @@ const EDITORS: [&str; 20] = [
     "snapseed",
     "xnview",
 ];
-/// Directories that a file may point to; cameras have three, and pixels may look like some.
+/// Maximum number of directories that a file may point to; cameras have three, and pixel data may
+/// resemble some.
 const MOST_POINTERS: usize = 8;
-/// Directories of pictures in a row that the reader follows.
+/// Maximum number of successive picture directories that the reader follows.
 const MOST_PICTURES: usize = 8;
-/// Bytes of an entry of a directory.
+/// Bytes of a directory entry.
 const ENTRY_BYTES: u64 = 12;
-/// What the reader says of notes whose first bytes are damaged.
+/// The reader's messages for notes whose first bytes are damaged.
 const DAMAGED_STARTS: [&str; 3] = [
     "Truncated TIFF header",
     "Invalid TIFF byte order",
     "Invalid forty two",
 ];
 
-/// The part of the EXIF data that means something here.
+/// The EXIF data used here.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct CameraNotes {
     pub(crate) orientation: Orientation,
     /// Focal length that would give the same view on 36 x 24 mm film, millimetres.
     pub(crate) focal_35mm: Option<f64>,
-    /// It is reckoned from the resolution of the sensor, which is wrong in a picture that was
-    /// resized.
+    /// Whether it was computed from the resolution of the sensor, which is wrong for a resized
+    /// picture.
     pub(crate) focal_by_sensor: bool,
-    /// The middle of the picture was enlarged.
+    /// Whether the centre of the picture was enlarged.
     pub(crate) digital_zoom: bool,
-    /// Size of the picture as it was taken, before anybody turned it.
+    /// Size of the picture as taken, before any rotation.
     pub(crate) size: Option<[f64; 2]>,
-    /// By a program that may have cut the picture and stated its new size.
+    /// Whether a program wrote it that may have cropped the picture and recorded its new size.
     pub(crate) edited: bool,
-    /// Of a file without a colour profile; none for sRGB.
+    /// For a file without a colour profile; none for sRGB.
     pub(crate) color: Option<ColorDescription>,
-    /// There are notes, and none of them can be read.
+    /// Whether there are notes, but none of them can be read.
     pub(crate) unreadable: bool,
 }
 
 impl CameraNotes {
-    /// The notes in a JPEG, TIFF, PNG or HEIF file. A photo without notes is as good as another, and
-    /// a damaged note leaves the others.
+    /// The notes in a JPEG, TIFF, PNG or HEIF file. Missing notes are not an error, and a damaged
+    /// note does not affect the others.
     pub(crate) fn read(mut file: impl BufRead + Seek) -> Self {
-        // The reader follows every pointer, in circles too: thousands of them fill any memory.
+        // The reader follows every pointer, even in circles: thousands of them would exhaust any
+        // memory.
         if count_pointers(&mut file).is_ok_and(|count| count > MOST_POINTERS) {
             return Self {
                 unreadable: true,
@@ -96,7 +97,7 @@ impl CameraNotes {
         }
     }
 
-    /// What is left of damaged notes.
+    /// The intact part of damaged notes.
     fn from_part(exif: &Exif) -> Self {
         Self {
             unreadable: exif.fields().next().is_none(),
@@ -104,7 +105,7 @@ impl CameraNotes {
         }
     }
 
-    /// The same of a picture that stands upright already.
+    /// The same for a picture that is already upright.
     pub(crate) fn upright(self) -> Self {
         Self {
             orientation: Orientation::default(),
@@ -130,15 +131,16 @@ impl CameraNotes {
         }
     }
 
-    /// The camera noted the size that the file has, or an integer multiple of it, whichever way up:
-    /// nothing was cut away.
+    /// Whether the camera recorded the size of the file, or an integer multiple of it, in either
+    /// orientation: the picture was then not cropped.
     pub(crate) fn has_same_size(&self, stored: [usize; 2]) -> bool {
         let stored = longer_first(stored.map(|s| s as f64));
         let taken = self.size.filter(|_| !self.edited).map(longer_first);
         taken.is_some_and(|taken| is_multiple(taken, stored))
     }
 
-    /// The camera noted a size of another shape than the file has, whichever way up.
+    /// Whether the camera recorded a size with another aspect ratio than the file, in either
+    /// orientation.
     pub(crate) fn has_other_shape(&self, stored: [usize; 2]) -> bool {
         let shape = aspect_ratio(stored.map(|s| s as f64));
         self.size
@@ -146,7 +148,7 @@ impl CameraNotes {
     }
 }
 
-/// One size is another times an integer, but for [`SIZE_TOLERANCE`].
+/// Whether one size is an integer multiple of another, within [`SIZE_TOLERANCE`].
 fn is_multiple([width, height]: [f64; 2], [long, short]: [f64; 2]) -> bool {
     let factor = (width / long).round();
     factor >= 1.0 && is_close(width, factor * long) && is_close(height, factor * short)
@@ -156,15 +158,15 @@ fn is_close(side: f64, expected: f64) -> bool {
     (side / expected - 1.0).abs() <= SIZE_TOLERANCE
 }
 
-/// Pointers to directories in a TIFF, or places in another file that look like one; the file is at
-/// its start again then.
+/// Counts pointers to directories in a TIFF, or places in another file that look like one; rewinds
+/// the file.
 fn count_pointers(file: &mut (impl BufRead + Seek)) -> std::io::Result<usize> {
     let header = read_at(file, 0, 8)?;
     file.rewind()?;
     let count = match TiffOrder::of(&header) {
-        // Pixels that are not compressed may look like any number of them.
+        // Uncompressed pixels may contain any number of apparent pointers.
         Some(order) => order.count_pointers(file, order.number(&header[4..]))?,
-        // The reader knows no BigTIFF.
+        // The reader does not support BigTIFF.
         None if is_big_tiff(&header) => 0,
         None => count_likely_pointers(file)?,
     };
@@ -176,7 +178,7 @@ pub(super) fn is_big_tiff(header: &[u8]) -> bool {
     header.starts_with(b"II+\0") || header.starts_with(b"MM\0+")
 }
 
-/// So many bytes at a place in a file, or those up to its end.
+/// This many bytes at a position in a file, or those up to its end.
 pub(super) fn read_at(
     file: &mut (impl Read + Seek),
     place: u64,
@@ -188,24 +190,23 @@ pub(super) fn read_at(
     Ok(bytes)
 }
 
-/// In which order a TIFF has the bytes of a number.
+/// The byte order of a TIFF.
 #[derive(Clone, Copy)]
 pub(super) enum TiffOrder {
     LittleEndian,
     BigEndian,
 }
 
-/// What a directory of a TIFF points to.
+/// What a TIFF directory points to.
 struct TiffDirectory {
-    /// Directories of the camera, of its position, or of what it shares with others, up to one
-    /// more than there may be.
+    /// EXIF, GPS and interoperability directories, up to one more than the maximum.
     children: Vec<u64>,
-    /// That of the next picture; 0 for none.
+    /// The directory of the next picture; 0 for none.
     next: u64,
 }
 
 impl TiffOrder {
-    /// None where a file with this header is no TIFF.
+    /// None if a file with this header is not a TIFF.
     fn of(header: &[u8]) -> Option<Self> {
         match header {
             [b'I', b'I', 42, 0, _, _, _, _] => Some(Self::LittleEndian),
@@ -222,8 +223,8 @@ impl TiffOrder {
         }
     }
 
-    /// Those that the reader follows, from pictures and from what they point to, up to where they
-    /// are too many.
+    /// Pointers that the reader follows, from pictures and from the directories that they point to;
+    /// stops counting when there are too many.
     fn count_pointers(self, file: &mut (impl Read + Seek), first: u64) -> std::io::Result<usize> {
         let (mut next, mut count) = (first, 0);
         for _ in 0..MOST_PICTURES {
@@ -258,15 +259,15 @@ impl TiffOrder {
         let starts = starts.zip(entries.chunks_exact(ENTRY_BYTES as usize));
         let pointers = starts.filter_map(|(start, entry)| self.pointer_in(entry, start));
         let mut children = Vec::new();
-        // Each is read by itself, and one more than there may be is too many.
+        // Each is read separately; one more than the maximum is enough to detect too many.
         for (place, size) in pointers.take(MOST_POINTERS + 1) {
             children.push(self.number(&read_at(file, place, size)?));
         }
         Ok(TiffDirectory { children, next })
     }
 
-    /// Where the pointer of an entry is that starts at some place, and its bytes: in the entry
-    /// itself, or elsewhere where there are several, of which the reader takes the first.
+    /// The position of the pointer in an entry that starts at `start`, and its size in bytes: in
+    /// the entry itself, or elsewhere for several values, of which the reader uses the first.
     fn pointer_in(self, entry: &[u8], start: u64) -> Option<(u64, u64)> {
         if !is_pointer([entry[0], entry[1], entry[2], entry[3]]) {
             return None;
@@ -286,7 +287,7 @@ impl TiffOrder {
     }
 }
 
-/// Places in a file that look like a pointer to a directory.
+/// Counts places in a file that look like a pointer to a directory.
 fn count_likely_pointers(file: &mut impl BufRead) -> std::io::Result<usize> {
     let (mut last, mut count) = ([0; 4], 0);
     loop {
@@ -302,8 +303,8 @@ fn count_likely_pointers(file: &mut impl BufRead) -> std::io::Result<usize> {
     }
 }
 
-/// An entry begins so, in either byte order, that points to a directory: of the camera, of its
-/// position, or of what it shares with others; as any integer.
+/// Whether an entry begins like a pointer to an EXIF, GPS or interoperability directory, of any
+/// integer type, in either byte order.
 fn is_pointer([a, b, c, d]: [u8; 4]) -> bool {
     [[a, b, c, d], [b, a, d, c]].into_iter().any(|entry| {
         matches!(
@@ -317,14 +318,14 @@ fn is_damaged_start(e: &Error) -> bool {
     matches!(e, Error::InvalidFormat(what) if DAMAGED_STARTS.contains(what))
 }
 
-/// The last program that wrote the file is one that edits pictures.
+/// Whether the last program that wrote the file is one that edits pictures.
 fn is_edited(exif: &Exif) -> bool {
     let program = text(exif, Tag::Software).unwrap_or_default().to_lowercase();
     EDITORS.iter().any(|editor| program.contains(editor))
 }
 
-/// What a camera says in place of a colour profile: Adobe RGB by the index of its files (DCF 2.0,
-/// 4.2), or that it is another space than sRGB.
+/// What a camera records instead of a colour profile: Adobe RGB by the index of its files (DCF 2.0,
+/// 4.2), or a colour space other than sRGB.
 fn noted_color(exif: &Exif) -> Option<ColorDescription> {
     const SRGB: u32 = 1;
     const UNCALIBRATED: u32 = 65_535;
@@ -342,7 +343,7 @@ fn noted_size(exif: &Exif) -> Option<[f64; 2]> {
     Some([width, positive(exif, Tag::PixelYDimension)?])
 }
 
-/// A ratio of 0 means that there was none.
+/// A ratio of 0 means no digital zoom.
 fn has_digital_zoom(exif: &Exif) -> bool {
     rational(exif, Tag::DigitalZoomRatio).is_some_and(|zoom| zoom > 0.0 && zoom != 1.0)
 }
@@ -351,13 +352,13 @@ fn longer_first([a, b]: [f64; 2]) -> [f64; 2] {
     [a.max(b), a.min(b)]
 }
 
-/// The longer side over the shorter one.
+/// The longer side divided by the shorter one.
 fn aspect_ratio([w, h]: [f64; 2]) -> f64 {
     w.max(h) / w.min(h)
 }
 
 /// The 35 mm equivalent by the picture's diagonal, from the focal length and the sensor's pixels
-/// per length.
+/// per unit of length.
 fn focal_35mm_by_sensor(exif: &Exif, size: [f64; 2]) -> Option<f64> {
     let unit_mm = resolution_unit_mm(exif)?;
     let focal_mm = rational(exif, Tag::FocalLength).filter(|&mm| mm > 0.0)?;
@@ -365,7 +366,7 @@ fn focal_35mm_by_sensor(exif: &Exif, size: [f64; 2]) -> Option<f64> {
     Some(focal_mm * px_per_unit / unit_mm * FILM_DIAGONAL_MM / libm::hypot(size[0], size[1]))
 }
 
-/// The length that pixels of the sensor are counted by; inches where none is named.
+/// The unit of the sensor's resolution; inches if unspecified.
 fn resolution_unit_mm(exif: &Exif) -> Option<f64> {
     const INCH: u32 = 2;
     const CENTIMETRE: u32 = 3;
@@ -428,8 +429,8 @@ mod tests {
         }
     }
 
-    /// As piexif writes it: the orientation 6, and a directory of a position that no offset of a
-    /// further one ends, but its own data do.
+    /// As written by piexif: orientation 6, and a GPS directory followed directly by its data
+    /// instead of the offset of a next directory.
     fn unended() -> Vec<u8> {
         let mut file = b"MM\0*\0\0\0\x08\0\x02".to_vec();
         file.extend(b"\x01\x12\0\x03\0\0\0\x01\0\x06\0\0");
@@ -441,8 +442,7 @@ mod tests {
 
     #[test]
     fn a_damaged_note_leaves_the_others() {
-        // Where the number begins that says where the value of the latitude, or the next directory,
-        // is.
+        // Positions of the offsets of the latitude's value and of the next directory.
         const LATITUDE: usize = 60;
         const NEXT: usize = 34;
         let with = |at: usize, offset: u32| {
@@ -459,7 +459,7 @@ mod tests {
         }
     }
 
-    /// A directory whose entries point to itself would be read a thousand times a thousand times.
+    /// A directory whose entries point to itself would be read a million times.
     #[test]
     fn pointers_in_circles_are_not_followed() {
         let mut file = b"MM\0*\0\0\0\x08".to_vec();
@@ -492,7 +492,7 @@ mod tests {
         }
     }
 
-    /// A directory behind the first one, from which a thousand pointers lead on.
+    /// A directory after the first one, with a thousand pointers to others.
     #[test]
     fn pointers_of_a_directory_that_is_pointed_to_count() {
         let mut file = b"MM\0*\0\0\0\x08\0\x01".to_vec();
@@ -503,7 +503,7 @@ mod tests {
         assert!(CameraNotes::read(Cursor::new(file)).unreadable);
     }
 
-    /// Each would be read eight times over.
+    /// Each would be read eight times.
     #[test]
     fn pointers_are_counted_up_to_where_they_are_too_many() {
         let mut file = b"MM\0*\0\0\0\x08\0\x08".to_vec();
@@ -537,7 +537,7 @@ mod tests {
         Value::Rational(vec![Rational { num, denom }])
     }
 
-    /// A 22.3 mm sensor of 3888 x 2592 pixels (Canon EOS 400D), with a lens of 50 mm.
+    /// A 22.3 mm sensor of 3888 x 2592 pixels (Canon EOS 400D), with a 50 mm lens.
     fn reflex_fields(per_unit: Value) -> Vec<(Tag, Value)> {
         vec![
             (Tag::FocalLength, rational(50, 1)),
@@ -555,7 +555,7 @@ mod tests {
 
     #[test]
     fn the_sensor_s_resolution_gives_the_equivalent_by_the_diagonal() {
-        // 3888 px on 22.2 mm; the sensor's diagonal is 26.7 mm, so 50 mm are 81 mm equivalent.
+        // 3888 px on 22.2 mm; the sensor's diagonal is 26.7 mm, so 50 mm are equivalent to 81 mm.
         let by_inch = reflex(rational(3_888_000, 875), None).focal_35mm.unwrap();
         assert!((by_inch - 81.0).abs() < 0.2, "{by_inch}");
         assert_eq!(

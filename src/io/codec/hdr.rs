@@ -12,21 +12,21 @@ use image::codecs::hdr::HdrDecoder;
 use image::{ImageDecoder, ImageError};
 use std::io::{BufRead, Cursor, Read};
 
-/// The first line that the decoder knows; the same is called `#?RGBE` by others.
+/// The first line that the decoder accepts; other programs write `#?RGBE` instead.
 const FIRST_LINE: &[u8] = b"#?RADIANCE\n";
 /// Light in the primaries of the display, or in CIE XYZ.
 const RGBE_LINE: &[u8] = b"FORMAT=32-bit_rle_rgbe\n";
 const XYZE_LINE: &[u8] = b"FORMAT=32-bit_rle_xyze\n";
-/// CIE XYZ as the primaries of light: its white is that of equal energy.
+/// CIE XYZ as primaries of light, with an equal-energy white.
 const XYZ_SPACE: RgbSpace = RgbSpace {
     primaries: [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]],
     white: [1.0 / 3.0; 2],
 };
-/// Characters of a line that are shown where it is no size.
+/// Maximum number of characters shown of a line that is not a valid size.
 const LONGEST_SHOWN: usize = 40;
 
-/// A file that the decoder reads as one of rows from the top in its own primaries, and what it
-/// really is.
+/// A file presented to the decoder as one with rows from the top and its own primaries, and its
+/// actual orientation and primaries.
 struct OpenedHdr<R: Read> {
     decoder: HdrDecoder<R>,
     orientation: Orientation,
@@ -57,8 +57,8 @@ fn open(
     })
 }
 
-/// The lines up to the empty one as the decoder knows them, and whether light is in CIE XYZ by
-/// them.
+/// The lines up to the empty one in the form that the decoder accepts, and whether they declare CIE
+/// XYZ.
 fn plain_head(file: &mut impl BufRead) -> Result<(Vec<u8>, bool), Refusal> {
     read_line(file)?;
     let (mut head, mut is_xyz) = (FIRST_LINE.to_vec(), false);
@@ -83,15 +83,15 @@ fn read_line(file: &mut impl BufRead) -> Result<Vec<u8>, Refusal> {
     }
 }
 
-/// Length and number of the rows that are stored, and how they lie in the picture: the axis and
-/// sense of the rows come first, those of the pixels in a row second; `-Y` goes down.
+/// Length and number of the stored rows, and their orientation in the picture: the axis and
+/// direction of the rows come first, those of the pixels in a row second; `-Y` goes down.
 fn resolution(line: &[u8]) -> Result<([u32; 2], Orientation), Refusal> {
     let text = String::from_utf8_lossy(line);
     parsed_resolution(&text).ok_or_else(|| unknown_resolution(&text))
 }
 
 fn unknown_resolution(text: &str) -> Refusal {
-    // Where the line does not end, all of the pixels would be in the message.
+    // A line without an end would put all of the pixels into the message.
     let shown: String = text.trim().chars().take(LONGEST_SHOWN).collect();
     Refusal::Broken(format!(
         "damaged HDR: size {shown:?}, expected \"-Y 480 +X 640\""
@@ -107,7 +107,7 @@ fn parsed_resolution(text: &str) -> Option<([u32; 2], Orientation)> {
     Some((size, orientation_of(rows, columns)?))
 }
 
-/// How the picture lies by the axes and senses of rows and columns.
+/// The orientation of the picture by the axes and directions of rows and columns.
 fn orientation_of(rows: &str, columns: &str) -> Option<Orientation> {
     let axes = [
         ("-Y", "+X"),
@@ -169,7 +169,8 @@ fn light_raster((width, height): (usize, usize), light: Vec<f32>) -> Raster {
     }
 }
 
-/// The header ends in time: its lines are kept, however many and long they are.
+/// Checks that the header ends within the limit: all of its lines are kept, whatever their number
+/// and length.
 fn check_head_length(bytes: &[u8], limits: &Limits) -> Result<(), String> {
     let start = &bytes[..bytes.len().min(limits.metadata_bytes as usize + 1)];
     match start.windows(2).any(|pair| pair == b"\n\n") {

@@ -1,9 +1,9 @@
-//! HEIF, which phones write as HEIC: what its boxes say of size and colours. libheif decodes its
+//! HEIF, which phones write as HEIC: reads size and colours from its boxes. libheif decodes the
 //! pixels.
 //!
 //! # Method
-//! ISO/IEC 14496-12 (boxes) and 23008-12 (properties of items): `meta` names the primary item
-//! (`pitm`), and `iprp` its properties (`ipco`), each by its number (`ipma`).
+//! ISO/IEC 14496-12 (boxes) and 23008-12 (item properties): `meta` names the primary item (`pitm`),
+//! and `iprp` its properties (`ipco`), each by its number (`ipma`).
 
 use super::profile::ColorDescription;
 
@@ -12,14 +12,15 @@ pub(crate) fn color_description(bytes: &[u8]) -> Option<ColorDescription> {
     let own = primary_properties(bytes)?;
     let mut colors = own.iter().filter_map(color_of);
     let first = colors.next()?;
-    // A profile says more than code points do.
+    // A profile is more specific than code points.
     let profile = colors.find(|color| matches!(color, ColorDescription::Icc(_)));
     Some(profile.unwrap_or(first))
 }
 
-/// Width and height of the primary picture the way up that the file says; none where it is cropped.
+/// Width and height of the primary picture in the orientation given by the file; none if it is cropped.
 ///
-/// libheif 1.15 turns the size only where the file says so behind the size, and the pixels always.
+/// libheif 1.15 always rotates the pixels, but the size only if the file lists the rotation after
+/// the size.
 #[cfg(feature = "oiio")]
 pub(crate) fn upright_size(bytes: &[u8]) -> Option<[i64; 2]> {
     let own = primary_properties(bytes)?;
@@ -51,7 +52,7 @@ struct HeifBox<'a> {
     content: &'a [u8],
 }
 
-/// The boxes in some bytes; ends where one does not fit.
+/// The boxes in some bytes; stops at a box that does not fit.
 fn boxes(mut bytes: &[u8]) -> impl Iterator<Item = HeifBox<'_>> {
     std::iter::from_fn(move || {
         let first;
@@ -60,7 +61,7 @@ fn boxes(mut bytes: &[u8]) -> impl Iterator<Item = HeifBox<'_>> {
     })
 }
 
-/// The first box and what is behind it.
+/// The first box and the bytes after it.
 fn split_box(bytes: &[u8]) -> Option<(HeifBox<'_>, &[u8])> {
     let (size, rest) = bytes.split_first_chunk()?;
     let (&kind, rest) = rest.split_first_chunk()?;
@@ -77,13 +78,13 @@ fn split_box(bytes: &[u8]) -> Option<(HeifBox<'_>, &[u8])> {
     Some((HeifBox { kind, content }, rest))
 }
 
-/// The content of the first box of a kind.
+/// The content of the first box of a type.
 fn child<'a>(bytes: &'a [u8], kind: &[u8; 4]) -> Option<&'a [u8]> {
     let found = boxes(bytes).find(|b| b.kind == *kind)?;
     Some(found.content)
 }
 
-/// Version and flags of a box that begins with them, and the rest.
+/// Version and flags at the start of a box, and the rest.
 fn full_box(content: &[u8]) -> Option<(FullBox, &[u8])> {
     let (&[version, .., flags], rest) = content.split_first_chunk::<4>()?;
     Some((FullBox { version, flags }, rest))
@@ -91,7 +92,7 @@ fn full_box(content: &[u8]) -> Option<(FullBox, &[u8])> {
 
 struct FullBox {
     version: u8,
-    /// The lowest eight.
+    /// The lowest eight bits.
     flags: u8,
 }
 
@@ -100,12 +101,12 @@ fn primary_item(pitm: &[u8]) -> Option<u32> {
     number(&mut rest, if head.version == 0 { 2 } else { 4 })
 }
 
-/// Numbers, from 1 on, of the properties of an item.
+/// Numbers, starting at 1, of the properties of an item.
 fn property_numbers(ipma: &[u8], item: u32) -> Option<Vec<usize>> {
     let (head, mut rest) = full_box(ipma)?;
     let id_bytes = if head.version == 0 { 2 } else { 4 };
     let number_bytes = if head.flags & 1 == 0 { 1 } else { 2 };
-    // The highest bit says that a property matters.
+    // The highest bit marks a property as essential.
     let mask = (1 << (8 * number_bytes - 1)) - 1;
     let entries = number(&mut rest, 4)?;
     for _ in 0..entries {
@@ -121,7 +122,7 @@ fn property_numbers(ipma: &[u8], item: u32) -> Option<Vec<usize>> {
     None
 }
 
-/// Takes a big-endian number of some bytes, 4 at most.
+/// Consumes a big-endian number of `count` bytes, at most 4.
 fn number(bytes: &mut &[u8], count: usize) -> Option<u32> {
     let (taken, rest) = bytes.split_at_checked(count)?;
     *bytes = rest;
@@ -141,7 +142,7 @@ fn color_of(property: &HeifBox<'_>) -> Option<ColorDescription> {
     }
 }
 
-/// ITU-T H.273: 2 is what nobody said.
+/// ITU-T H.273: 2 means unspecified.
 const UNSPECIFIED: u8 = 2;
 
 fn code_points(nclx: &[u8]) -> Option<ColorDescription> {
@@ -162,8 +163,8 @@ mod tests {
         [&size[..], kind, &content].concat()
     }
 
-    /// Two pictures: the thumbnail, 1, is of P3; the primary one, 2, has both descriptions of its
-    /// colours, and is turned by a property in front of its size.
+    /// Two pictures: the thumbnail, 1, is P3; the primary one, 2, has both kinds of colour
+    /// description, and is rotated by a property listed before its size.
     fn file(version: u8, flags: u8) -> Vec<u8> {
         let id = |n: u8| {
             if version == 0 {

@@ -1,4 +1,5 @@
-//! JPEG: 8 bits, display-encoded, no alpha. Arithmetic coding and the like are left to OpenImageIO.
+//! JPEG: 8 bits, display-encoded, no alpha. Arithmetic coding and other rare kinds are left to
+//! OpenImageIO.
 
 use super::raster::{Raster, Samples, default_names};
 use super::refusal::Refusal;
@@ -19,8 +20,8 @@ const EOI: u8 = 0xd9;
 const SOS: u8 = 0xda;
 const COM: u8 = 0xfe;
 const APP2: u8 = 0xe2;
-/// First bytes of a segment with a part of a colour profile (ICC.1:2022, B.4); its number and their
-/// count follow.
+/// First bytes of a segment with a part of a colour profile (ICC.1:2022, B.4), followed by its
+/// number and the number of parts.
 const ICC_SIGNATURE: &[u8] = b"ICC_PROFILE\0";
 
 impl From<ImageError> for Refusal {
@@ -32,7 +33,7 @@ impl From<ImageError> for Refusal {
     }
 }
 
-/// The part of a file in front of its first scan: everything that is known before pixels.
+/// The part of a file before its first scan: everything known before the pixels.
 pub(crate) fn read_before_scan(file: &mut impl Read, limits: &Limits) -> Result<Vec<u8>, Refusal> {
     let mut bytes = Vec::new();
     append(&mut bytes, file, 2)?;
@@ -57,17 +58,17 @@ fn append_segment(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<u8, Refus
     let marker = append_marker(bytes, file)?;
     let at = bytes.len();
     append(bytes, file, 2)?;
-    // It counts its own two bytes.
+    // The length includes its own two bytes.
     let length = usize::from(u16::from_be_bytes([bytes[at], bytes[at + 1]]));
     append(bytes, file, length.saturating_sub(2))?;
     Ok(marker)
 }
 
-/// Reads a marker that a segment follows.
+/// Reads a marker that is followed by a segment.
 fn append_marker(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<u8, Refusal> {
     let at = bytes.len();
     append(bytes, file, 2)?;
-    // Bytes of padding in front of a marker.
+    // Skips padding bytes before a marker.
     while bytes[at + 1] == 0xff {
         bytes.truncate(at + 1);
         append(bytes, file, 1)?;
@@ -86,8 +87,8 @@ fn append(bytes: &mut Vec<u8>, file: &mut impl Read, count: usize) -> Result<(),
         .map_err(|_| "truncated JPEG (no picture)".into())
 }
 
-/// Refuses kinds of JPEG that our decoder does not know, by their frame's marker (ISO/IEC 10918-1,
-/// table B.1) and what stands in its segment (B.2.2).
+/// Rejects kinds of JPEG that our decoder does not support, by the marker of the frame (ISO/IEC
+/// 10918-1, table B.1) and the content of its segment (B.2.2).
 fn check_kind(marker: u8, frame: &[u8]) -> Result<(), Refusal> {
     let kind: String = match (marker, frame.first()) {
         (0xc0..=0xc2, Some(8)) if has_sampling_factor_3(frame) => "sampling factors of 3".into(),
@@ -101,8 +102,8 @@ fn check_kind(marker: u8, frame: &[u8]) -> Result<(), Refusal> {
     Err(Refusal::Unsupported(format!("unsupported JPEG: {kind}")))
 }
 
-/// A component has a horizontal or vertical sampling factor of 3. Bits, lines, columns and the
-/// number of components stand in front of them, and each has three bytes.
+/// Whether a component has a horizontal or vertical sampling factor of 3. The components follow the
+/// bits, lines, columns and number of components, and take three bytes each.
 fn has_sampling_factor_3(frame: &[u8]) -> bool {
     let components = frame.get(6..).unwrap_or_default().chunks_exact(3);
     components
@@ -122,7 +123,7 @@ fn open<'a>(
     Ok(decoder)
 }
 
-/// `start` is what stands [before the first scan](read_before_scan) at least.
+/// `start` must include at least the part [before the first scan](read_before_scan).
 pub(crate) fn header(start: &[u8], file_bytes: u64, limits: &Limits) -> Result<Header, Refusal> {
     let decoder = open(start, file_bytes, limits)?;
     let (width, height) = decoder.dimensions();
@@ -144,7 +145,7 @@ fn notes_of_comments(bytes: &[u8]) -> Notes {
         .collect()
 }
 
-/// The embedded colour profile, which segments of 64 KiB hold in parts.
+/// The embedded colour profile, split over segments of 64 KiB.
 pub(crate) fn profile(bytes: &[u8]) -> Option<Vec<u8>> {
     let mut parts: Vec<(u8, &[u8])> = segments(bytes)
         .take_while(|s| s.marker != SOS)
@@ -171,8 +172,8 @@ fn check_complete(bytes: &[u8]) -> Result<(), Refusal> {
     }
 }
 
-/// Decodes a complete file; decoders, also those of other kinds, return a half-grey picture for one
-/// that was cut, so that is looked at first.
+/// Decodes a complete file; decoders, including those of other libraries, return a half-grey
+/// picture for a truncated one, so this is checked first.
 pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     let start = read_before_scan(&mut &bytes[..], limits);
     if !matches!(start, Err(Refusal::Broken(_))) {
@@ -199,8 +200,8 @@ struct JpegSegment<'a> {
     data: &'a [u8],
 }
 
-/// The segments in order, scans skipped; ends early where the file does. An EXIF thumbnail, a JPEG
-/// in itself, lies inside a segment and so does not end the file.
+/// The segments in order, without scans; stops early if the file ends. An EXIF thumbnail, itself a
+/// JPEG, is inside a segment and so does not end the file.
 fn segments(bytes: &[u8]) -> impl Iterator<Item = JpegSegment<'_>> {
     let mut rest = bytes.get(2..).unwrap_or_default();
     let mut after_scan = false;
@@ -215,7 +216,7 @@ fn segments(bytes: &[u8]) -> impl Iterator<Item = JpegSegment<'_>> {
     })
 }
 
-/// The first segment and what is behind it; behind the end of the picture is nothing.
+/// The first segment and the bytes after it; none follow the end of the picture.
 fn split_segment(mut bytes: &[u8]) -> Option<(JpegSegment<'_>, &[u8])> {
     while bytes.starts_with(&[0xff, 0xff]) {
         bytes = &bytes[1..];
@@ -231,18 +232,17 @@ fn split_segment(mut bytes: &[u8]) -> Option<(JpegSegment<'_>, &[u8])> {
     Some((JpegSegment { marker, data }, &tail[length..]))
 }
 
-/// Where the entropy-coded data ends: at a marker that is neither a stuffed byte, a restart nor
-/// padding.
+/// The end of the entropy-coded data: a marker that is not a stuffed byte, a restart or padding.
 fn end_of_scan(bytes: &[u8]) -> usize {
     bytes.windows(2).position(is_marker).unwrap_or(bytes.len())
 }
 
-/// Neither an escaped byte of data nor padding nor a restart.
+/// Whether two bytes are a marker, not an escaped data byte, padding or a restart.
 fn is_marker(pair: &[u8]) -> bool {
     pair[0] == 0xff && !matches!(pair[1], 0 | 0xff | 0xd0..=0xd7)
 }
 
-/// A whole file, of a quality of 1 to 100, from 8-bit codes of one or three channels.
+/// A complete file with a quality of 1 to 100, from 8-bit codes of one or three channels.
 pub(crate) fn encode(
     (width, height): (usize, usize),
     codes: &[u8],
@@ -262,7 +262,7 @@ pub(crate) fn encode(
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, quality);
     encoder.set_sampling_factor(chroma.sampling_factor());
-    // As cameras do; the colour of one pixel of each block would alias.
+    // As cameras do; using the colour of one pixel of each block would cause aliasing.
     encoder.set_chroma_subsampling_method(ChromaSubsamplingMethod::Average);
     let encoded = encoder.encode(codes, columns, rows, color);
     encoded.map_err(|e| e.to_string())?;
@@ -270,17 +270,17 @@ pub(crate) fn encode(
     Ok(bytes)
 }
 
-/// How many samples of colour a JPEG file has beside those of brightness (ITU-T T.871).
+/// Chroma subsampling of a JPEG file (ITU-T T.871).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Chroma {
-    /// One for each pixel.
+    /// One sample per pixel.
     #[default]
     #[serde(rename = "4:4:4")]
     Full,
-    /// One for two pixels beside each other.
+    /// One sample per two horizontally adjacent pixels.
     #[serde(rename = "4:2:2")]
     HalfWidth,
-    /// One for two by two pixels, as most cameras write.
+    /// One sample per two by two pixels, as most cameras write.
     #[serde(rename = "4:2:0")]
     Quarter,
 }
@@ -295,8 +295,8 @@ impl Chroma {
     }
 }
 
-/// A picture as it comes back from a file of a quality, 1 to 100; nothing for one that no file holds,
-/// as one without pixels.
+/// A picture after encoding and decoding as JPEG with a quality of 1 to 100; none for one that
+/// cannot be stored, such as one without pixels.
 pub fn through_jpeg(image: &Image<Srgb8>, quality: u8, chroma: Chroma) -> Option<Image<Srgb8>> {
     let codes = bytemuck::cast_slice(image.pixels());
     let file = encode(image.size(), codes, quality, chroma, &[]).ok()?;
@@ -308,7 +308,7 @@ pub fn through_jpeg(image: &Image<Srgb8>, quality: u8, chroma: Chroma) -> Option
     Some(Image::from_vec(raster.width, raster.height, pixels))
 }
 
-/// Puts the notes into a comment segment right behind the start marker.
+/// Inserts the notes as a comment segment right after the start marker.
 fn insert_comment(jpeg: &mut Vec<u8>, notes: &[(String, String)]) -> Result<(), String> {
     if notes.is_empty() {
         return Ok(());
@@ -337,7 +337,7 @@ mod tests {
         assert!(segments(&whole).any(|s| s.marker == EOI));
     }
 
-    /// The start of a picture of one pixel, with a frame of any kind.
+    /// The beginning of a one-pixel picture with any kind of frame.
     fn frame(marker: u8, bits: u8) -> Result<Vec<u8>, Refusal> {
         sampled_frame(marker, bits, 0x11)
     }

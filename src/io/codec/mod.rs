@@ -1,4 +1,4 @@
-//! Codecs: files as samples, samples as pixels, and both ways back.
+//! Codecs: conversion between files and samples, and between samples and pixels.
 
 pub(crate) mod channels;
 pub(crate) mod codes;

@@ -1,4 +1,4 @@
-//! Turning a picture the way the camera was held (EXIF `Orientation`).
+//! Rotating a picture upright (EXIF `Orientation`).
 
 use bytemuck::{Pod, zeroed_vec};
 use rayon::prelude::*;
@@ -8,14 +8,14 @@ use rayon::prelude::*;
 pub(crate) struct Orientation(pub(crate) u8);
 
 impl Default for Orientation {
-    /// Upright as it is stored.
+    /// Stored upright.
     fn default() -> Self {
         Self(1)
     }
 }
 
 impl Orientation {
-    /// Rows of the file are columns of the picture.
+    /// Whether rows of the file are columns of the picture.
     fn is_sideways(self) -> bool {
         (5..=8).contains(&self.0)
     }
@@ -29,8 +29,8 @@ impl Orientation {
         }
     }
 
-    /// Where the upright pixel `(x, y)` lies in the file, whose last column and row are `right` and
-    /// `bottom`.
+    /// Position of the upright pixel `(x, y)` in the file, whose last column and row are `right`
+    /// and `bottom`.
     fn stored(self, x: usize, y: usize, right: usize, bottom: usize) -> (usize, usize) {
         match self.0 {
             2 => (right - x, y),
@@ -44,12 +44,12 @@ impl Orientation {
         }
     }
 
-    /// There is something to turn.
+    /// Whether anything is rotated or mirrored.
     pub(crate) fn turns(self) -> bool {
         (2..=8).contains(&self.0)
     }
 
-    /// The samples of the upright picture, out of those of the stored one, `n` to a pixel.
+    /// The samples of the upright picture from those of the stored one, `n` per pixel.
     pub(crate) fn apply<T: Pod + Send + Sync>(
         self,
         stored: &[T],
@@ -83,7 +83,7 @@ impl Orientation {
 mod tests {
     use super::*;
 
-    /// The letters of a 2 x 3 picture as rows, after turning.
+    /// The letters of a 2 x 3 picture as rows, after rotation.
     fn turned(orientation: u8) -> Vec<String> {
         let turn = Orientation(orientation);
         let letters = turn.apply(b"abcdef", 1, (2, 3));

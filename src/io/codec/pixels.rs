@@ -1,7 +1,7 @@
-//! Pixels made from the samples of a file: the one place where samples get their meaning.
+//! Conversion of the samples of a file to pixels: the only place where samples get their meaning.
 //!
-//! The rule: integer samples are display-encoded sRGB and their alpha is straight, float samples
-//! are scene-linear, unless the file states otherwise. A matte or a depth is never display-encoded.
+//! The rule: integer samples are display-encoded sRGB with straight alpha, float samples are
+//! scene-linear, unless the file states otherwise. A matte or a depth is never display-encoded.
 
 use super::channels::Wanted;
 use super::profile::DisplayProfile;
@@ -14,22 +14,21 @@ use half::f16;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// How a pixel type is made from the samples of a file. Sealed by being private to `io`.
+/// Conversion of the samples of a file to a pixel type. Sealed by being private to `io`.
 pub trait FromFile: Copy + Send + Sync + Default + Zeroable + 'static {
     #[doc(hidden)]
     const WANTED: Wanted;
-    /// Refuses rows that cannot be such pixels.
+    /// Rejects rows that cannot be such pixels.
     #[doc(hidden)]
     fn check(_: &SampleRows<'_>) -> Result<(), String> {
         Ok(())
     }
-    /// The channel that they are made from, where only the values of all rows show which of several
-    /// it is.
+    /// The channel to convert, where only the values of all rows show which of several it is.
     #[doc(hidden)]
     fn channel(_: &SampleRows<'_>) -> Result<Option<usize>, String> {
         Ok(None)
     }
-    /// Makes the pixels of the rows.
+    /// Converts the samples of the rows.
     #[doc(hidden)]
     fn fill(rows: &SampleRows<'_>, pixels: &mut [Self]) -> Result<(), String>;
 }
@@ -60,7 +59,7 @@ impl FromFile for LinearRgb {
 
 impl FromFile for Film {
     const WANTED: Wanted = Wanted::Film;
-    /// Transmittance where float channels have it, else alpha for every channel.
+    /// Transmittance if there are float channels of it, otherwise alpha for every channel.
     fn fill(rows: &SampleRows<'_>, pixels: &mut [Self]) -> Result<(), String> {
         let picked = Wanted::Film.pick(&rows.raster.names)?;
         match (&rows.raster.samples, <[usize; 6]>::try_from(picked)) {
@@ -106,7 +105,7 @@ fn triple<T: FileSample>(px: &[T], channels: [usize; 3]) -> LinearRgb {
     channels.map(|i| px[i].into()).into()
 }
 
-/// Colour with alpha in whichever form the file has it.
+/// Colour with alpha, created from whichever form the file has.
 trait Colored: Copy + Send {
     fn straight(color: [f32; 3], alpha: f32) -> Self;
     fn premultiplied(color: [f32; 3], alpha: f32) -> Self;
@@ -134,7 +133,7 @@ impl Colored for StraightRgba {
     }
 }
 
-/// Opaque colour; that it is opaque was checked before.
+/// Opaque colour; opacity was already checked.
 impl Colored for LinearRgb {
     #[inline(always)]
     fn straight(color: [f32; 3], _: f32) -> Self {
@@ -148,13 +147,13 @@ impl Colored for LinearRgb {
 
 /// A sample of a file, as a number and as a display code.
 trait FileSample: Copy + Send + Sync + Into<f32> {
-    /// The sample that stands for 1.
+    /// The sample that represents 1.
     const FULL_SCALE: f32;
 
-    /// Linear light of sRGB display codes.
+    /// Decodes sRGB display codes to linear light.
     fn decode_srgb(codes: [Self; 3]) -> [f32; 3];
 
-    /// Full scale becomes 1.
+    /// Scales full scale to 1.
     #[inline(always)]
     fn normalized(self) -> f32 {
         self.into() / Self::FULL_SCALE
@@ -225,14 +224,14 @@ impl ColorChannels {
     }
 }
 
-/// Alpha from which on a pixel is opaque: half floats next to 1 are 0.0005 apart.
+/// Minimum alpha of an opaque pixel: half floats next to 1 are 0.0005 apart.
 const OPAQUE_ALPHA: f32 = 0.999;
 
-/// How far apart the three channels of a grey may lie: conversions of colour round by an 8-bit
+/// Maximum difference of the three channels of a grey: colour conversions round by up to an 8-bit
 /// code.
 const GREY_TOLERANCE: f32 = 1.01 / 255.0;
 
-/// Rows of a [`Raster`], which only `io` can look into, and the colour profile of its file.
+/// Rows of a [`Raster`], accessible only within `io`, and the colour profile of its file.
 #[derive(Debug)]
 pub struct SampleRows<'a> {
     raster: &'a Raster,
@@ -241,7 +240,7 @@ pub struct SampleRows<'a> {
 }
 
 impl SampleRows<'_> {
-    /// A photo must not hide the share of a pixel that is missing.
+    /// A photo must be opaque: pixels with missing shares must not go unnoticed.
     fn refuse_transparency(&self) -> Result<(), String> {
         let picked = Wanted::Color.pick(&self.raster.names)?;
         match picked.get(3).map_or(0, |&a| self.count_transparent(a)) {
@@ -252,13 +251,13 @@ impl SampleRows<'_> {
         }
     }
 
-    /// Pixels that are not opaque by channel `a`.
+    /// Number of pixels that channel `a` does not mark as opaque.
     fn count_transparent(&self, a: usize) -> usize {
         self.count_values(|value| value(a) < OPAQUE_ALPHA)
     }
 
-    /// The channel of the matte. Programs that know no grey write it into `R`, `G` and `B`, with an
-    /// alpha of 1 or without; where both could be meant, alpha is.
+    /// The channel of the matte. Programs without greyscale support write it to `R`, `G` and `B`,
+    /// with or without an alpha of 1; if both could be meant, alpha is used.
     fn matte_channel(&self) -> Result<usize, String> {
         let picked = Wanted::Coverage.pick(&self.raster.names)?;
         let &[r, g, b, ref alpha @ ..] = &picked[..] else {
@@ -277,12 +276,12 @@ impl SampleRows<'_> {
         }
     }
 
-    /// Pixels that are no grey.
+    /// Number of pixels that are not grey.
     fn count_colored(&self, rgb: [usize; 3]) -> usize {
         self.count_values(|value| channel_spread(rgb.map(value)) > GREY_TOLERANCE)
     }
 
-    /// Pixels for which a predicate holds, given their channels with full scale 1.
+    /// Number of pixels that satisfy a predicate, which gets their channels with full scale 1.
     fn count_values(&self, is: impl Fn(&dyn Fn(usize) -> f32) -> bool + Sync + Send) -> usize {
         match &self.raster.samples {
             Samples::U8(v) => self.count(v, |px| is(&|i| px[i].normalized())),
@@ -303,7 +302,7 @@ impl SampleRows<'_> {
         Ok(())
     }
 
-    /// Colours by the file's profile, or as sRGB.
+    /// Converts colours by the file's profile, or as sRGB.
     fn decode_colors<T: FileSample, P: Colored>(
         &self,
         samples: &[T],
@@ -324,11 +323,10 @@ impl SampleRows<'_> {
         }
     }
 
-    /// Colours in the form that the file has them; `decode` takes its display codes, `light`
+    /// Converts colours from the form that the file has; `decode` takes its display codes, `light`
     /// display values.
     ///
-    /// Long since each of the four forms that a file may have is a loop without a branch for every
-    /// pixel.
+    /// Long because each of the four possible forms is a loop without a branch per pixel.
     fn convert_colors<T: FileSample, P: Colored>(
         &self,
         samples: &[T],
@@ -355,7 +353,7 @@ impl SampleRows<'_> {
         }
     }
 
-    /// Films of pixels whose alpha holds for every channel.
+    /// Films of pixels whose alpha applies to every channel.
     fn fill_grey_films(&self, films: &mut [Film]) -> Result<(), String> {
         let mut rgba = zeroed_vec::<PremulRgba>(films.len());
         self.fill_colors(&mut rgba)?;
@@ -409,21 +407,21 @@ impl SampleRows<'_> {
     }
 }
 
-/// How far apart three channels lie.
+/// The difference between the largest and the smallest of three channels.
 fn channel_spread([r, g, b]: [f32; 3]) -> f32 {
     r.max(g).max(b) - r.min(g).min(b)
 }
 
-/// Straight display values from those that were multiplied by alpha without decoding.
+/// Straight display values from values that were multiplied by alpha without decoding.
 fn unassociated(encoded: [f32; 3], alpha: f32) -> [f32; 3] {
     let k = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
     encoded.map(|v| (v * k).min(1.0))
 }
 
-/// Pixels that are made at a time.
+/// Pixels converted at a time.
 const BAND_PIXELS: usize = 1 << 20;
 
-/// All rows of a picture in bands of about [`BAND_PIXELS`], the last first.
+/// All rows of a picture in bands of about [`BAND_PIXELS`], from bottom to top.
 fn bands_from_bottom(width: usize, height: usize) -> impl Iterator<Item = Range<usize>> {
     let band_rows = (BAND_PIXELS / width.max(1)).max(1);
     let ends = std::iter::successors(Some(height), move |end| end.checked_sub(band_rows));
@@ -432,7 +430,7 @@ fn bands_from_bottom(width: usize, height: usize) -> impl Iterator<Item = Range<
 }
 
 impl Raster {
-    /// Some rows and what their colours mean.
+    /// Some rows with the meaning of their colours.
     pub(crate) fn rows<'a>(
         &'a self,
         profile: Option<&'a DisplayProfile>,
@@ -457,8 +455,8 @@ impl Raster {
         Ok(Image::from_vec(width, height, pixels))
     }
 
-    /// All pixels, from the last row up; the samples' memory is given back on the way, so that
-    /// never much more than one of the two is there.
+    /// All pixels, converted from the last row up; the samples' memory is released on the way, so
+    /// that the total never exceeds the larger of the two by much.
     pub(crate) fn into_image<P: FromFile>(
         mut self,
         profile: Option<&DisplayProfile>,
@@ -558,7 +556,7 @@ mod tests {
             [0.2, none]
         );
         assert_eq!(matte(&[51, 255, 0, 255], "Y A").unwrap(), [0.2, none]);
-        // An alpha that is not 1 everywhere is the matte.
+        // An alpha that is below 1 somewhere is the matte.
         assert_eq!(
             matte(&[51, 51, 51, 255, 0, 0, 0, 0], "R G B A").unwrap(),
             [full, none]
@@ -566,7 +564,7 @@ mod tests {
         let expected = "expected one channel, three equal ones R G B, or one named A or Y";
         let coloured = matte(&[51, 51, 51, 51, 0, 51], "R G B").unwrap_err();
         assert_eq!(coloured, format!("1 coloured pixels, {expected}"));
-        // An alpha that is 1 everywhere is none.
+        // An alpha that is 1 everywhere is ignored.
         let opaque = matte(&[51, 0, 0, 255], "R G B A").unwrap_err();
         assert_eq!(opaque, coloured);
         assert_eq!(

@@ -23,7 +23,7 @@ impl From<png::DecodingError> for Refusal {
     }
 }
 
-/// The file up to its pixels, checked against the limits.
+/// Reads the file up to its pixels and checks it against the limits.
 fn open<R: BufRead + Seek>(
     file: R,
     file_bytes: u64,
@@ -47,7 +47,7 @@ fn demand<R: BufRead + Seek>(reader: &png::Reader<R>, file_bytes: u64) -> Demand
     Demand::new(size, channels, stored_bits(depth) / 8, file_bytes)
 }
 
-/// Bits of a sample as it is handed over: fewer than 8 are expanded.
+/// Bits of a sample after decoding: fewer than 8 are expanded.
 fn stored_bits(depth: BitDepth) -> u32 {
     if depth == BitDepth::Sixteen { 16 } else { 8 }
 }
@@ -80,7 +80,7 @@ fn texts(info: &png::Info<'_>) -> Notes {
 
 /// How the file describes its colours, by the chunk that takes precedence (PNG 3rd edition, 4.3):
 /// code points, a profile, sRGB, or the exponent and the primaries. None for sRGB, and without a
-/// description. Code points that are not applied leave it to a profile beside them.
+/// description. If code points are not supported, a profile in the same file is used.
 pub(crate) fn color_description(bytes: &[u8], limits: &Limits) -> Option<ColorDescription> {
     let reader = open(Cursor::new(bytes), bytes.len() as u64, limits).ok()?;
     let info = reader.info();
@@ -100,7 +100,7 @@ pub(crate) fn color_description(bytes: &[u8], limits: &Limits) -> Option<ColorDe
     }
 }
 
-/// Codes are said to lie in the narrow range of video.
+/// Whether codes are declared to be in the narrow range of video.
 pub(crate) fn has_narrow_range(bytes: &[u8], limits: &Limits) -> bool {
     let reader = open(Cursor::new(bytes), bytes.len() as u64, limits).ok();
     let code_points = reader.and_then(|reader| reader.info().coding_independent_code_points);
@@ -118,7 +118,7 @@ fn described_curve(info: &png::Info<'_>) -> Option<ColorDescription> {
     })
 }
 
-/// What `gAMA` and `cHRM` store for 1: both are numbers times 100,000.
+/// The number stored for 1 in `gAMA` and `cHRM`, which scale by 100,000.
 const SCALED_ONE: f64 = 100_000.0;
 
 fn named_space(named: png::SourceChromaticities) -> RgbSpace {
@@ -170,7 +170,7 @@ fn compression(effort: Quality) -> Compression {
     }
 }
 
-/// A whole file.
+/// A complete file.
 pub(crate) fn encode(
     (width, height): (usize, usize),
     channels: usize,
@@ -215,7 +215,7 @@ fn color_type(channels: usize) -> ColorType {
     }
 }
 
-/// Texts in Latin-1 where that can hold them.
+/// Adds texts, in Latin-1 if possible.
 fn add_texts(
     encoder: &mut png::Encoder<'_, &mut Vec<u8>>,
     metadata: &[(String, String)],
@@ -234,7 +234,7 @@ mod tests {
     use super::*;
     use crate::io::codec::profile::DisplayProfile;
 
-    /// Light of a middle grey code, in a file with what `colors` adds to it.
+    /// Light of a middle grey code, in a file to which `colors` adds descriptions.
     fn light(colors: impl FnOnce(&mut png::Encoder<'_, &mut Vec<u8>>)) -> [f32; 3] {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
@@ -287,7 +287,7 @@ mod tests {
         assert_eq!(both, light(|_| ()));
     }
 
-    /// How a picture with a profile, or without one, and a chunk beside it describes its colours.
+    /// How a picture with or without a profile describes its colours if it also has another chunk.
     fn described(
         icc: &'static [u8],
         name: png::chunk::ChunkType,

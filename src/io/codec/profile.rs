@@ -1,39 +1,39 @@
-//! How files describe their display codes: colour profiles (ICC), the curve and primaries that a
-//! PNG names, and a camera's word in EXIF.
+//! How files describe their display codes: ICC colour profiles, the curve and primaries in a PNG,
+//! and the colour space in a camera's EXIF data.
 //!
-//! Profiles of three primaries and three curves (sRGB, Display P3, Adobe RGB, ProPhoto, ...) and of
-//! one grey curve are applied, with a warning where they have a table of colours beside them; others
-//! are named in a warning and the codes treated as sRGB.
+//! Profiles with three primaries and three curves (sRGB, Display P3, Adobe RGB, ProPhoto, ...) or
+//! with one grey curve are applied, with a warning if they also contain a colour table; others are
+//! named in a warning and the codes treated as sRGB.
 //!
 //! # Method
 //! ICC.1:2022: curves to linear light (10.6, 10.18), the matrix of the colorant columns to XYZ
 //! under D50 (F.3), Bradford to D65 (E.3), and from there to Rec. 709. A grey curve in CIELab gives
-//! lightness, and CIE 15:2018, 8.2.1, light from that. Evaluated here, not by the crate that parses
-//! the profile, so that the bits are the same on every machine.
+//! lightness, which CIE 15:2018, 8.2.1, converts to light. Evaluated here, not by the crate that
+//! parses the profile, so that the bits are the same on every machine.
 //!
-//! A table has precedence over primaries and curves (8.10), and is not applied: what stands beside
-//! it is meant for programs that know no tables, and closer to it than sRGB.
+//! A table takes precedence over primaries and curves (8.10), but is not applied: the curves in the
+//! same profile are meant for programs without table support, and closer to it than sRGB.
 
 use crate::color::{ColorMatrix, RgbSpace, bradford, rgb_from_rgb, rgb_from_xyz, srgb_to_linear};
 use moxcms::{ColorProfile, DataColorSpace, ToneReprCurve};
 use nalgebra::Matrix3;
 
-/// CIE x, y of the connection space's white (ICC.1:2022, 7.2.16: X 0.9642, Y 1, Z 0.8249).
+/// CIE x, y of the white of the profile connection space (ICC.1:2022, 7.2.16: X 0.9642, Y 1, Z 0.8249).
 const D50_WHITE: [f64; 2] = [0.345_70, 0.358_54];
-/// 16-bit codes, the finest that files have.
+/// 16-bit codes, the finest in files.
 const CODE_COUNT: usize = 1 << 16;
-/// The largest of them.
+/// The largest code.
 const LARGEST_CODE: f32 = 65_535.0;
-/// Curves and matrices that differ by less are sRGB's, written with fewer digits or measured from a
-/// table.
+/// Curves and matrices that differ from sRGB's by less count as sRGB: they were written with fewer
+/// digits or measured from a table.
 const SRGB_TOLERANCE: f32 = 2e-3;
-/// The exponent of screens: files name it that mean sRGB, in steps of a hundredth and coarser.
+/// Exponents of screens: files that mean sRGB state them, rounded to a hundredth or coarser.
 const SCREEN_EXPONENTS: std::ops::RangeInclusive<f64> = 2.16..=2.24;
 /// Adobe RGB (1998), 4.3.4.2.
 const ADOBE_EXPONENT: f64 = 563.0 / 256.0;
-/// Chromaticities that differ by less are the same, written with fewer digits.
+/// Chromaticities that differ by less count as equal, written with fewer digits.
 const CHROMATICITY_TOLERANCE: f64 = 1e-3;
-/// A triangle of primaries with less area (in x, y) holds no colours; Rec. 709 has 0.11.
+/// Primaries whose triangle (in x, y) has less area cannot form a colour space; Rec. 709 has 0.11.
 const SMALLEST_GAMUT: f64 = 1e-3;
 
 /// How a file describes its colours.
@@ -41,7 +41,7 @@ const SMALLEST_GAMUT: f64 = 1e-3;
 pub(crate) enum ColorDescription {
     /// A colour profile.
     Icc(Vec<u8>),
-    /// Light is the code raised to an exponent, if that is given, in primaries, if those are.
+    /// Light is the code raised to an exponent, if given, in primaries, if given.
     Curve {
         exponent: Option<f64>,
         primaries: Option<RgbSpace>,
@@ -50,11 +50,11 @@ pub(crate) enum ColorDescription {
     CodePoints(u8, u8),
     /// Adobe RGB (1998), by name.
     AdobeRgb,
-    /// Not sRGB, and nothing says what.
+    /// Not sRGB, and otherwise unspecified.
     Uncalibrated,
 }
 
-/// What code points of ITU-T H.273 stand for, of those that are applied: an exponent or the curve of
+/// The meaning of those code points of ITU-T H.273 that are supported: an exponent or the curve of
 /// sRGB, and primaries.
 pub(crate) fn known_code_points(primaries: u8, transfer: u8) -> Option<(Option<f64>, RgbSpace)> {
     let exponent = match transfer {
@@ -71,13 +71,13 @@ pub(crate) fn known_code_points(primaries: u8, transfer: u8) -> Option<(Option<f
     Some((exponent, space))
 }
 
-/// How display codes become light, where a file describes it itself.
+/// Conversion of display codes to light, as described by a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct DisplayProfile {
     /// Linear light of each 16-bit code, for red, green and blue.
     curves: [Vec<f32>; 3],
     to_rec709: ColorMatrix,
-    /// There is a table of colours, too, which is more exact.
+    /// Whether there is also a colour table, which is more exact.
     pub(crate) has_unapplied_table: bool,
 }
 
@@ -85,7 +85,7 @@ impl DisplayProfile {
     /// The profile that a file describes, if it is not sRGB.
     ///
     /// # Errors
-    /// What is described that cannot be applied.
+    /// What the description contains that cannot be applied.
     pub(crate) fn from_description(description: ColorDescription) -> Result<Option<Self>, String> {
         match description {
             ColorDescription::Icc(bytes) => Self::from_icc(&bytes),
@@ -120,7 +120,7 @@ impl DisplayProfile {
         Self::from_power(exponent, matrix).map(Some)
     }
 
-    /// The curve of an exponent, or sRGB's, and the matrix of primaries other than Rec. 709.
+    /// The curve of an exponent, or that of sRGB, and the matrix for primaries other than Rec. 709.
     fn from_power(exponent: Option<f64>, matrix: Option<ColorMatrix>) -> Result<Self, String> {
         let curve = power_or_srgb_table(exponent).ok_or("a gamma that is not a number")?;
         Ok(Self {
@@ -203,7 +203,7 @@ fn has_table(icc: &ColorProfile) -> bool {
     icc.lut_a_to_b_perceptual.is_some() || icc.lut_a_to_b_colorimetric.is_some()
 }
 
-/// Light, as a share of white's, of a lightness of 0 to 100 (CIE 15:2018, 8.2.1: L*).
+/// Light relative to white for a lightness of 0 to 100 (CIE 15:2018, 8.2.1: L*).
 fn luminance_of_lightness(lightness: f64) -> f64 {
     const LINEAR_UP_TO: f64 = 8.0;
     if lightness <= LINEAR_UP_TO {
@@ -213,7 +213,7 @@ fn luminance_of_lightness(lightness: f64) -> f64 {
     root * root * root
 }
 
-/// Number of the code that is nearest to a display value.
+/// Index of the code nearest to a display value.
 #[inline]
 fn nearest_code(display: f32) -> usize {
     (display.clamp(0.0, 1.0) * LARGEST_CODE + 0.5) as usize
@@ -237,7 +237,7 @@ fn is_srgb_curve(light: &[f32]) -> bool {
         .all(|(code, &v)| is_near(v, srgb_to_linear(code as f32 / LARGEST_CODE)))
 }
 
-/// Light of every 16-bit code; none where there is no curve, or one that gives no numbers.
+/// Light of every 16-bit code; none if there is no curve, or if its values are not numbers.
 fn trc_table(curve: &Option<ToneReprCurve>) -> Option<Vec<f32>> {
     let curve = curve.as_ref()?;
     curve_table(|x| evaluate(curve, x))
@@ -273,8 +273,8 @@ fn evaluate(curve: &ToneReprCurve, x: f64) -> f64 {
     }
 }
 
-/// ICC.1:2022, table 68: a power where `x` is at least a bound, and a straight line below it. A row
-/// of the table is a line.
+/// ICC.1:2022, table 68: a power for `x` above a bound, and a straight line below it. One line of
+/// code per row of the table.
 fn evaluate_parametric(parameters: &[f64], x: f64) -> f64 {
     match *parameters {
         [g] => libm::pow(x, g),
@@ -297,11 +297,11 @@ fn interpolated(table: &[u16], x: f64) -> f64 {
     (low + (high - low) * (at - i as f64)) / f64::from(LARGEST_CODE)
 }
 
-/// The matrix to the library's primaries from those that a file names; none where they are the
+/// The matrix from the primaries that a file names to the library's primaries; none if they are the
 /// same.
 ///
 /// # Errors
-/// For primaries and a white that no colour space has.
+/// For primaries and a white that are not those of a colour space.
 pub(crate) fn to_rec709(named: &RgbSpace) -> Result<Option<ColorMatrix>, String> {
     let (given, ours) = (chromaticities(named), chromaticities(&RgbSpace::REC709));
     if !is_color_space(named) {
@@ -323,7 +323,7 @@ pub(crate) fn convert_primaries(samples: &mut [f32], n: usize, matrix: &ColorMat
     }
 }
 
-/// Primaries may be no colours that can be seen, as those of XYZ and ACES are.
+/// Primaries may be outside the visible colours, as those of XYZ and ACES are.
 fn is_color_space(space: &RgbSpace) -> bool {
     chromaticities(space).iter().all(|v| v.abs() <= 2.0)
         && gamut_area(space) >= SMALLEST_GAMUT
@@ -402,7 +402,7 @@ mod tests {
         }
     }
 
-    /// An empty table of 8 bits, of two nodes a side.
+    /// An empty 8-bit table with two nodes per side.
     fn table() -> LutWarehouse {
         let store = |count| LutStore::Store8(vec![0; count]);
         LutWarehouse::Lut(LutDataType {
@@ -489,7 +489,7 @@ mod tests {
         };
         assert_eq!(described(1, 13), Ok(None));
         let grey = 32768.0 / 65535.0;
-        // Red in Rec. 709: that of Rec. 2020 by ITU-R BT.2407, of Display P3 by CSS Color 4.
+        // Red in Rec. 709: for Rec. 2020 by ITU-R BT.2407, for Display P3 by CSS Color 4.
         for (primaries, expected) in [
             (1, [1.0, 0.0, 0.0]),
             (9, [1.6605, -0.1246, -0.0182]),
@@ -515,7 +515,7 @@ mod tests {
         }
     }
 
-    /// CIE XYZ of equal energy: its middle is the white of Rec. 709.
+    /// CIE XYZ of equal energy: its centre is the white of Rec. 709.
     #[test]
     fn primaries_without_luminance_are_primaries() {
         let xyz = RgbSpace {
@@ -525,7 +525,7 @@ mod tests {
         let matrix = to_rec709(&xyz).unwrap().unwrap();
         let white = matrix.apply([1.0; 3]);
         assert!(white.iter().all(|v| (v - 1.0).abs() < 1e-6), "{white:?}");
-        // Y is the luminance of Rec. 709 before the white is adapted: green has most of it.
+        // Y is the luminance of Rec. 709 before white adaptation: green has most of it.
         let [r, g, b] = matrix.apply([0.0, 1.0, 0.0]);
         assert!(g > 1.0 && r < 0.0 && b < 0.0, "{r} {g} {b}");
         assert_eq!(to_rec709(&RgbSpace::REC709), Ok(None));
@@ -552,7 +552,7 @@ mod tests {
     fn damaged_profiles_are_refused_and_named() {
         let whole = ColorProfile::new_display_p3().encode().unwrap();
         for length in (0..whole.len()).step_by(7) {
-            // A cut may spare everything that counts.
+            // A truncated profile may still have all relevant parts.
             let _ = DisplayProfile::from_icc(&whole[..length]);
         }
         assert_eq!(

@@ -69,7 +69,7 @@ impl Samples {
         }
     }
 
-    /// As [`bytes`](Self::bytes), to be filled.
+    /// Like [`bytes`](Self::bytes), mutable.
     #[cfg(feature = "oiio")]
     pub(crate) fn bytes_mut(&mut self) -> &mut [u8] {
         match self {
@@ -94,7 +94,7 @@ impl Samples {
         }
     }
 
-    /// Those of the upright picture, `n` to a pixel, where the stored one has this size.
+    /// The samples of the upright picture, `n` per pixel, where `stored` is the stored size.
     fn turned(&self, by: Orientation, n: usize, stored: (usize, usize)) -> Self {
         match self {
             Self::U8(v) => Self::U8(by.apply(v, n, stored)),
@@ -104,7 +104,7 @@ impl Samples {
         }
     }
 
-    /// Gives the memory of the last samples back.
+    /// Drops the last samples and releases their memory.
     pub(crate) fn shorten(&mut self, count: usize) {
         match self {
             Self::U8(v) => shorten(v, count),
@@ -120,7 +120,7 @@ fn shorten<T>(samples: &mut Vec<T>, count: usize) {
     samples.shrink_to_fit();
 }
 
-/// What a decoder hands over.
+/// The output of a decoder.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Raster {
     pub(crate) width: usize,
@@ -128,9 +128,9 @@ pub(crate) struct Raster {
     /// Names of the interleaved channels: `R G B A`, `Y`, `Z`, ...
     pub(crate) names: Vec<String>,
     pub(crate) samples: Samples,
-    /// Colour samples are sRGB display values.
+    /// Whether colour samples are sRGB display values.
     pub(crate) display_encoded: bool,
-    /// Colour samples are already multiplied by alpha.
+    /// Whether colour samples are already multiplied by alpha.
     pub(crate) premultiplied: bool,
 }
 
@@ -151,12 +151,12 @@ impl Raster {
         }
     }
 
-    /// Samples of a row.
+    /// Number of samples in a row.
     pub(crate) fn row_samples(&self) -> usize {
         self.width * self.names.len()
     }
 
-    /// The picture of one of its channels.
+    /// The picture reduced to one of its channels.
     pub(crate) fn narrowed(self, channel: usize) -> Self {
         let count = self.names.len();
         if count == 1 {
@@ -169,7 +169,7 @@ impl Raster {
         }
     }
 
-    /// The picture the way the camera was held.
+    /// The picture rotated upright.
     pub(crate) fn upright(self, orientation: Orientation) -> Self {
         if !orientation.turns() {
             return self;
@@ -184,7 +184,7 @@ impl Raster {
         }
     }
 
-    /// Samples that are infinite or NaN.
+    /// Number of samples that are infinite or NaN.
     pub(crate) fn count_not_finite(&self) -> usize {
         match &self.samples {
             Samples::F16(v) => v.par_iter().filter(|x| !x.is_finite()).count(),
@@ -198,7 +198,7 @@ fn one_channel<T: Pod>(samples: &[T], count: usize, channel: usize) -> Vec<T> {
     samples.chunks_exact(count).map(|px| px[channel]).collect()
 }
 
-/// Names of the channels of a picture of `count` channels without names of its own.
+/// Channel names for a picture of `count` unnamed channels.
 pub(crate) fn default_names(count: usize) -> Option<Vec<String>> {
     let names: &[&str] = match count {
         1 => &["Y"],
@@ -210,7 +210,7 @@ pub(crate) fn default_names(count: usize) -> Option<Vec<String>> {
     Some(names.iter().map(|&n| n.into()).collect())
 }
 
-/// The part of `0..shown` that `length` samples from `start` on cover.
+/// The part of `0..shown` covered by `length` samples from `start` on.
 pub(crate) fn overlap(start: i64, length: usize, shown: usize) -> std::ops::Range<usize> {
     let last = shown as i64;
     let end = start + length as i64;

@@ -1,11 +1,11 @@
-//! Why a decoder hands over no picture.
+//! Why a decoder returns no picture.
 
 use crate::error::one_line;
 
-/// Why a decoder did not hand over a picture.
+/// Why a decoder did not return a picture.
 #[derive(Debug)]
 pub(crate) enum Refusal {
-    /// The file may be fine, this decoder does not know its kind: another may.
+    /// The file may be fine, but this decoder does not support its kind: another may.
     Unsupported(String),
     /// The file is damaged, too large or not what was requested.
     Broken(String),
@@ -25,8 +25,8 @@ impl From<&str> for Refusal {
 
 #[cfg(feature = "oiio")]
 impl Refusal {
-    /// With what the first decoder could not read, where it named that: it is the file's own
-    /// property, and the reason why another decoder was asked.
+    /// Adds what the first decoder could not read, if it named that: it is a property of the file,
+    /// and the reason why another decoder was tried.
     pub(crate) fn after(self, what: &str) -> Self {
         match self {
             Self::Broken(why) if what.starts_with("unsupported") => {
@@ -40,7 +40,7 @@ impl Refusal {
 impl std::fmt::Display for Refusal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            // Decoders write messages of several lines; ours have one.
+            // Decoder messages may have several lines; ours have one.
             Self::Unsupported(what) | Self::Broken(what) => f.write_str(&one_line(what)),
         }
     }

@@ -1,5 +1,5 @@
 //! TIFF: integers display-encoded, half, float and double scene-linear; grey or RGB, with or
-//! without alpha, in strips or tiles, planes side by side or apart. Other kinds are left to
+//! without alpha, in strips or tiles, interleaved or in separate planes. Other kinds are left to
 //! OpenImageIO.
 
 use super::codes::Codes;
@@ -20,10 +20,10 @@ use tiff::encoder::{TiffEncoder, TiffValue};
 use tiff::tags::{ExtraSamples, Tag};
 use tiff::{ColorType, TiffError};
 
-/// TIFF 6.0, `ExtraSamples`: colours are already multiplied by alpha, or not.
+/// TIFF 6.0, `ExtraSamples`: colours are premultiplied, or not.
 const ASSOCIATED_ALPHA: u16 = 1;
 const UNASSOCIATED_ALPHA: u16 = 2;
-/// TIFF 6.0, `PlanarConfiguration`: each channel by itself.
+/// TIFF 6.0, `PlanarConfiguration`: each channel in its own plane.
 const SEPARATE_PLANES: u16 = 2;
 /// TIFF 6.0, `FillOrder`: the first pixel is in the lowest bit.
 const LOWEST_BIT_FIRST: u16 = 2;
@@ -36,17 +36,17 @@ const JPEG_COMPRESSION: u16 = 7;
 const END_OF_JPEG: &[u8] = b"\xff\xd9";
 /// TIFF 6.0, `PhotometricInterpretation`: codes are indices into a palette.
 const PALETTE_COLOR: u16 = 3;
-/// TIFF 6.0 and its supplements, the same: lightness and two differences of colour.
+/// TIFF 6.0 and its supplements, the same: lightness and two colour differences.
 const CIE_LAB: u16 = 8;
 const ICC_LAB: u16 = 9;
 const ITU_LAB: u16 = 10;
-/// TIFF/EP and DNG 1.7, the same: raw data of a sensor, behind an array of colour filters or not.
+/// TIFF/EP and DNG 1.7, the same: raw sensor data, with or without a colour filter array.
 const CFA: u16 = 32_803;
 const LINEAR_RAW: u16 = 34_892;
 /// TIFF 6.0, `NewSubfileType`: a smaller version of another picture. Nikon's and Sony's raw files
 /// begin with one.
 const REDUCED_RESOLUTION: u32 = 1;
-/// DNG 1.7, the tag that makes a TIFF a DNG.
+/// DNG 1.7, the tag that identifies a TIFF as a DNG.
 const DNG_VERSION: u16 = 50_706;
 
 impl From<TiffError> for Refusal {
@@ -62,7 +62,7 @@ impl From<TiffError> for Refusal {
     }
 }
 
-/// Bytes are missing.
+/// Whether bytes are missing.
 fn is_early_end(e: &TiffError) -> bool {
     matches!(e, TiffError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof)
 }
@@ -81,7 +81,7 @@ struct OpenedTiff<R: Read + Seek> {
     height: usize,
     names: Vec<String>,
     bits: u8,
-    /// Stored as cyan, magenta, yellow and black.
+    /// Whether it is stored as cyan, magenta, yellow and black.
     inks: bool,
 }
 
@@ -108,7 +108,7 @@ fn open<R: Read + Seek>(
     })
 }
 
-/// The decoder's own limits, with ours on metadata and pixels.
+/// The decoder's default limits, with ours for metadata and pixels.
 fn decoder_limits(limits: &Limits) -> tiff::decoder::Limits {
     let mut most = metadata_limits(limits);
     most.decoding_buffer_size = usize::try_from(limits.decoded_bytes).unwrap_or(usize::MAX);
@@ -116,14 +116,14 @@ fn decoder_limits(limits: &Limits) -> tiff::decoder::Limits {
     most
 }
 
-/// The decoder's own limits, with ours on metadata.
+/// The decoder's default limits, with ours for metadata.
 fn metadata_limits(limits: &Limits) -> tiff::decoder::Limits {
     let mut most = tiff::decoder::Limits::default();
     most.ifd_value_size = usize::try_from(limits.metadata_bytes).unwrap_or(usize::MAX);
     most
 }
 
-/// Channels of a pixel as it is stored, and bits of each.
+/// Number of stored channels of a pixel, and bits per channel.
 fn stored_channels(decoder: &mut Decoder<impl Read + Seek>) -> Result<(u64, u8), Refusal> {
     let extra = extra_samples(decoder)?;
     match decoder.colortype()? {
@@ -151,13 +151,13 @@ fn is_alpha(extra: &[u16]) -> bool {
     matches!(extra, [ASSOCIATED_ALPHA | UNASSOCIATED_ALPHA])
 }
 
-/// The file up to its first picture. Tiles under the tags of strips, which old writers left and
-/// libtiff reads, are not known to our decoder: it calls their number wrong, or treats them as
-/// strips where that happens to be right.
+/// The file up to its first picture. Tiles under the tags of strips, which old programs wrote and
+/// libtiff reads, are not supported by our decoder: it reports a wrong number of them, or treats
+/// them as strips if the number happens to match.
 fn first_picture<R: Read + Seek>(mut file: R) -> Result<Decoder<R>, Refusal> {
     let tags = first_tags(&mut file).unwrap_or_default();
     file.rewind().map_err(TiffError::from)?;
-    // The decoder does not know raw data of a sensor, and OpenImageIO takes them for grey.
+    // The decoder does not support raw sensor data, and OpenImageIO treats it as grey.
     if is_undeveloped(&tags) {
         return Err(raw_file());
     }
@@ -179,20 +179,21 @@ fn raw_file() -> Refusal {
     format!("is {RAW}, whose first picture is not a photo: {DEVELOP}").into()
 }
 
-/// By its tags the file is a DNG, or its first picture is raw data of a sensor.
+/// Whether the tags identify the file as a DNG, or its first picture as raw sensor data.
 fn is_undeveloped(tags: &BTreeMap<u16, u16>) -> bool {
     let kind = tags.get(&Tag::PhotometricInterpretation.to_u16());
     tags.contains_key(&DNG_VERSION) || matches!(kind, Some(&(CFA | LINEAR_RAW)))
 }
 
-/// The picture is a small one of another in the same file; not where that tag cannot be read.
+/// Whether the picture is a smaller version of another one in the same file; false if that tag
+/// cannot be read.
 fn is_reduced(decoder: &mut Decoder<impl Read + Seek>) -> bool {
     let kind = decoder.find_tag_unsigned::<u32>(Tag::NewSubfileType);
     kind.is_ok_and(|kind| kind.is_some_and(|kind| kind & REDUCED_RESOLUTION != 0))
 }
 
-/// The first directory's tags, of a file of either byte order, classic or BigTIFF, with the value
-/// of those that are one number of 16 bits; none of a directory that the file ends in.
+/// The tags of the first directory, in either byte order, classic or BigTIFF, with the values of
+/// those that are a single 16-bit number; empty if the file ends inside the directory.
 fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<BTreeMap<u16, u16>> {
     let start = read_at(file, 0, 16)?;
     let order = match start.starts_with(b"II") {
@@ -209,15 +210,15 @@ fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<BTreeMap<u16, u1
     Ok(entries.map(|entry| directory.tag(entry, order)).collect())
 }
 
-/// How a directory is laid out, in bytes.
+/// The layout of a directory, in bytes.
 struct TiffDirectory {
-    /// Where the file says where its first directory is.
+    /// Position in the file of the offset of its first directory.
     place: Range<usize>,
-    /// Length of the number of entries.
+    /// Size of the entry count.
     count: u64,
-    /// Length of an entry.
+    /// Size of an entry.
     entry: usize,
-    /// Where in an entry its value begins.
+    /// Offset of the value in an entry.
     value: usize,
 }
 
@@ -235,7 +236,7 @@ const BIG_DIRECTORY: TiffDirectory = TiffDirectory {
 };
 
 impl TiffDirectory {
-    /// The entries of the directory at a place; none where the file ends in them.
+    /// The entries of the directory at a position; empty if the file ends inside them.
     fn entries(
         &self,
         file: &mut (impl Read + Seek),
@@ -245,7 +246,7 @@ impl TiffDirectory {
         let count = order.number(&read_at(file, place, self.count)?);
         let length = count.min(u16::MAX.into()) * self.entry as u64;
         let mut bytes = read_at(file, place.saturating_add(self.count), length)?;
-        // What follows a value of 16 bits in its field is not read.
+        // The bytes after a 16-bit value in its field are not read.
         let unused = (self.entry - self.value - 2) as u64;
         if (bytes.len() as u64) < length.saturating_sub(unused) {
             bytes.clear();
@@ -260,8 +261,8 @@ impl TiffDirectory {
     }
 }
 
-/// What OpenImageIO reads in wrong colours: CIELab in another white, and a palette that is not
-/// there as black.
+/// Rejects what OpenImageIO reads in wrong colours: CIELab with another white point, and pictures
+/// whose palette is missing, which would be black.
 fn refuse_misread_colors(decoder: &mut Decoder<impl Read + Seek>) -> Result<(), Refusal> {
     match color_kind(decoder)? {
         Some(PALETTE_COLOR) => refuse_missing_palette(decoder),
@@ -287,13 +288,13 @@ fn refuse_missing_palette(decoder: &mut Decoder<impl Read + Seek>) -> Result<(),
     Err(format!("damaged TIFF: a palette of {entries} entries, expected {expected}").into())
 }
 
-/// The numbers of a tag; none where it is not there.
+/// The numbers of a tag; empty if the tag is missing.
 fn integers(decoder: &mut Decoder<impl Read + Seek>, tag: Tag) -> Result<Vec<u16>, TiffError> {
     let integers = decoder.find_tag_unsigned_vec::<u16>(tag)?;
     Ok(integers.unwrap_or_default())
 }
 
-/// What the camera noted; the reader of EXIF knows no BigTIFF.
+/// What the camera recorded; the EXIF reader does not support BigTIFF.
 pub(crate) fn camera_notes(mut file: impl BufRead + Seek) -> CameraNotes {
     let notes = CameraNotes::read(&mut file);
     let stated = file
@@ -309,7 +310,7 @@ pub(crate) fn camera_notes(mut file: impl BufRead + Seek) -> CameraNotes {
     }
 }
 
-/// A pixel has samples beside its colours, the first of which is not said to be alpha.
+/// Whether pixels have samples in addition to colour, the first of which is not declared as alpha.
 pub(crate) fn has_unspecified_sample(bytes: &[u8]) -> bool {
     let decoder = Decoder::new(Cursor::new(bytes)).ok();
     let extra = decoder.and_then(|mut decoder| extra_samples(&mut decoder).ok());
@@ -317,20 +318,20 @@ pub(crate) fn has_unspecified_sample(bytes: &[u8]) -> bool {
     extra.first().is_some_and(|&kind| !is_alpha(&[kind]))
 }
 
-/// Colours are multiplied by alpha, also in kinds of TIFF that the decoder cannot read.
+/// Whether colours are premultiplied, also for kinds of TIFF that the decoder cannot read.
 #[cfg(feature = "oiio")]
 pub(crate) fn has_associated_alpha(bytes: &[u8]) -> bool {
     first_integer(Cursor::new(bytes), Tag::ExtraSamples) == Some(ASSOCIATED_ALPHA)
 }
 
-/// The entries of the palette are codes times 256, as Pillow writes them, in place of 257.
+/// Whether the palette entries are codes times 256, as written by Pillow, instead of 257.
 #[cfg(feature = "oiio")]
 pub(crate) fn has_shifted_palette(bytes: &[u8]) -> bool {
     let palette = palette(bytes).unwrap_or_default();
     !palette.is_empty() && palette.iter().all(|entry| entry.is_multiple_of(256))
 }
 
-/// The entries of a picture whose codes are indices.
+/// The palette of a picture whose codes are indices.
 #[cfg(feature = "oiio")]
 fn palette(bytes: &[u8]) -> Option<Vec<u16>> {
     let mut decoder = Decoder::new(Cursor::new(bytes)).ok()?;
@@ -347,7 +348,7 @@ fn first_integer(file: impl Read + Seek, tag: Tag) -> Option<u16> {
 
 /// The embedded colour profile.
 pub(crate) fn profile(bytes: &[u8], limits: &Limits) -> Option<Vec<u8>> {
-    // Of kinds of TIFF too that the decoder cannot read: OpenImageIO hands over their codes.
+    // Also for kinds of TIFF that the decoder cannot read: OpenImageIO returns their codes.
     let mut decoder = Decoder::new(Cursor::new(bytes))
         .ok()?
         .with_limits(metadata_limits(limits));
@@ -379,15 +380,15 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     match decode_known(bytes, limits) {
         // OpenImageIO would read its bits as bytes.
         Err(Refusal::Unsupported(what)) if !states_bits(bytes) => Err(Refusal::Broken(what)),
-        // OpenImageIO would fill up what is missing of some kinds.
+        // OpenImageIO would silently fill in what some truncated kinds lack.
         Err(Refusal::Unsupported(_)) if is_cut_file(bytes, limits) => Err(truncated()),
         decoded => decoded,
     }
 }
 
-/// The file ends before a strip or tile of its first picture does. Lengths that are stated too long
-/// do no harm to a JPEG whose end is there, nor without compression, where OpenImageIO itself
-/// refuses what is missing.
+/// Whether the file ends before a strip or tile of its first picture does. Declared lengths that
+/// are too long do not matter for a JPEG whose end is present, nor without compression, where
+/// OpenImageIO itself rejects missing data.
 fn is_cut(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> bool {
     let is_jpeg = match compression(decoder) {
         Ok(NO_COMPRESSION) | Err(_) => return false,
@@ -397,14 +398,14 @@ fn is_cut(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> bool {
     too_long.any(|chunk| !is_jpeg || !chunk.windows(2).any(|pair| pair == END_OF_JPEG))
 }
 
-/// The same of a file whose pixels the decoder cannot read.
+/// The same for a file whose pixels the decoder cannot read.
 fn is_cut_file(bytes: &[u8], limits: &Limits) -> bool {
     let decoder = Decoder::new(Cursor::new(bytes)).ok();
     let decoder = decoder.map(|decoder| decoder.with_limits(metadata_limits(limits)));
     decoder.is_some_and(|mut decoder| is_cut(&mut decoder, bytes))
 }
 
-/// Of strips and tiles that are stated to reach beyond the end of the file, what is there.
+/// The available bytes of strips and tiles that are declared to extend beyond the end of the file.
 fn beyond_the_end<'a>(decoder: &mut Decoder<impl Read + Seek>, bytes: &'a [u8]) -> Vec<&'a [u8]> {
     let lists = [
         [Tag::StripOffsets, Tag::StripByteCounts],
@@ -420,13 +421,13 @@ fn beyond_the_end<'a>(decoder: &mut Decoder<impl Read + Seek>, bytes: &'a [u8]) 
         .collect()
 }
 
-/// The numbers of a tag; none where it is not there or cannot be read.
+/// The numbers of a tag; empty if it is missing or cannot be read.
 fn long_integers(decoder: &mut Decoder<impl Read + Seek>, tag: Tag) -> Vec<u64> {
     let integers = decoder.find_tag_unsigned_vec(tag);
     integers.ok().flatten().unwrap_or_default()
 }
 
-/// The file says how many bits a sample has; where it does not, it is one.
+/// Whether the file states the number of bits per sample; the default is one.
 fn states_bits(bytes: &[u8]) -> bool {
     let tags = first_tags(&mut Cursor::new(bytes)).unwrap_or_default();
     tags.contains_key(&Tag::BitsPerSample.to_u16())
@@ -453,8 +454,8 @@ fn decode_known(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     })
 }
 
-/// Codes from the lowest bit up, as before 1990: such data begins with the clear code (TIFF 6.0,
-/// section 13).
+/// Rejects codes stored from the lowest bit up, as before 1990: LZW data must begin with the clear
+/// code (TIFF 6.0, section 13).
 fn refuse_old_lzw(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> Result<(), Refusal> {
     if !is_lzw(decoder)? {
         return Ok(());
@@ -472,7 +473,7 @@ fn is_lzw(decoder: &mut Decoder<impl Read + Seek>) -> Result<bool, TiffError> {
     Ok(compression(decoder)? == LZW_COMPRESSION)
 }
 
-/// The decoder would fill up what is missing.
+/// Rejects a truncated JPEG: the decoder would silently fill in what is missing.
 fn refuse_cut_jpeg(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> Result<(), Refusal> {
     match compression(decoder)? == JPEG_COMPRESSION && is_cut(decoder, bytes) {
         true => Err(truncated()),
@@ -485,15 +486,15 @@ fn compression(decoder: &mut Decoder<impl Read + Seek>) -> Result<u16, TiffError
     Ok(stated.unwrap_or(NO_COMPRESSION))
 }
 
-/// Where the strips or tiles of a picture lie, and what each of them holds.
+/// The position of the strips or tiles in a picture, and what each of them contains.
 #[derive(Clone, Copy)]
 struct ChunkGrid {
     /// Of the picture.
     width: usize,
     height: usize,
-    /// Channels of the picture as it is stored.
+    /// Number of stored channels.
     channels: usize,
-    /// Each channel has strips or tiles of its own.
+    /// Whether each channel has its own strips or tiles.
     planes: bool,
     /// Of a strip or tile.
     size: (usize, usize),
@@ -516,12 +517,12 @@ impl ChunkGrid {
         self.width.div_ceil(self.size.0)
     }
 
-    /// Strips or tiles of the picture, or of a plane.
+    /// Number of strips or tiles of the picture, or of a plane.
     fn count(&self) -> usize {
         self.across() * self.height.div_ceil(self.size.1)
     }
 
-    /// Strips or tiles of all planes.
+    /// Number of strips or tiles of all planes.
     fn count_all(&self) -> usize {
         self.count() * if self.planes { self.channels } else { 1 }
     }
@@ -530,7 +531,7 @@ impl ChunkGrid {
         self.width * self.height * self.channels
     }
 
-    /// Channels of a strip or tile.
+    /// Number of channels in a strip or tile.
     fn stored_channels(&self) -> usize {
         if self.planes { 1 } else { self.channels }
     }
@@ -543,7 +544,7 @@ impl ChunkGrid {
         )
     }
 
-    /// Puts the samples of a strip or tile, of which `columns` and `rows` are there, into the
+    /// Copies the samples of a strip or tile, of which `columns` and `rows` are inside, into the
     /// picture.
     fn put<T: Copy>(&self, to: &mut [T], from: &[T], index: usize, [columns, rows]: [usize; 2]) {
         let plane = index / self.count();
@@ -557,7 +558,7 @@ impl ChunkGrid {
         }
     }
 
-    /// Puts a row of all channels, or of one, where it begins in the picture.
+    /// Copies a row of all channels, or of one, to its position in the picture.
     fn put_row<T: Copy>(&self, to: &mut [T], row: &[T]) {
         if self.planes {
             let to = to.iter_mut().step_by(self.channels);
@@ -567,7 +568,7 @@ impl ChunkGrid {
         }
     }
 
-    /// The same for samples of any one kind.
+    /// The same for any sample type.
     fn put_samples(
         &self,
         to: &mut Samples,
@@ -586,8 +587,9 @@ impl ChunkGrid {
     }
 }
 
-/// The samples of the picture, strip by strip or tile by tile: the decoder's own way to read all at
-/// once leaves columns black where tiles reach over the border, and knows no planes.
+/// Reads the samples of the picture strip by strip or tile by tile: the decoder's function for the
+/// whole picture leaves columns black where tiles extend beyond the border, and does not support
+/// planes.
 fn read_chunks(file: &mut OpenedTiff<impl Read + Seek>) -> Result<Samples, Refusal> {
     let packed = is_packed(file)?;
     if !packed && !file.bits.is_multiple_of(8) {
@@ -606,12 +608,12 @@ fn read_chunks(file: &mut OpenedTiff<impl Read + Seek>) -> Result<Samples, Refus
     picture.ok_or_else(|| "damaged TIFF: no strips".into())
 }
 
-/// A sample is a bit, and the file leaves that to the default.
+/// Whether samples are single bits by default, because the file does not state their size.
 fn is_packed(file: &mut OpenedTiff<impl Read + Seek>) -> Result<bool, TiffError> {
     Ok(file.bits == 1 && integers(&mut file.decoder, Tag::BitsPerSample)?.is_empty())
 }
 
-/// Codes of black and white, out of rows of so many bits.
+/// Codes of black and white, from rows of this many bits.
 fn unpacked(chunk: &Samples, row_bits: usize) -> Result<Samples, Refusal> {
     let Samples::U8(packed) = chunk else {
         return Err(unsupported(&"signed bits"));
@@ -622,15 +624,15 @@ fn unpacked(chunk: &Samples, row_bits: usize) -> Result<Samples, Refusal> {
     Ok(Samples::U8(codes.collect()))
 }
 
-/// A strip or tile, and its columns and rows.
+/// A strip or tile, and its number of columns and rows.
 fn read_chunk(
     decoder: &mut Decoder<impl Read + Seek>,
     index: usize,
 ) -> Result<(Samples, [usize; 2]), Refusal> {
     let number = u32::try_from(index).map_err(|_| "damaged TIFF: too many strips")?;
     let decoded = decoder.read_chunk(number);
-    // Of tiles that reach over the right border, which it decodes row by row, it takes the last
-    // codes for missing (weezl 0.1.12).
+    // For tiles that extend beyond the right border, which it decodes row by row, the decoder
+    // treats the last codes as missing (weezl 0.1.12).
     if decoded.as_ref().is_err_and(is_early_end)
         && is_lzw(decoder)?
         && decoder.chunk_data_dimensions(number).0 < decoder.chunk_dimensions().0
@@ -642,10 +644,10 @@ fn read_chunk(
     Ok((chunk, [columns as usize, rows as usize]))
 }
 
-/// Doubles become floats and integers of other kinds 16 bits: full scale stays full scale, and what
-/// is below zero becomes zero.
+/// Converts doubles to floats and other integers to 16 bits: full scale stays full scale, and
+/// negative values become zero.
 ///
-/// Long since every kind of samples has its line.
+/// Long because every sample type has its own line.
 fn known_samples(decoded: DecodingResult) -> Samples {
     match decoded {
         DecodingResult::U8(v) => Samples::U8(v),
@@ -666,24 +668,25 @@ fn codes_of<T>(samples: Vec<T>, code: impl Fn(T) -> u16) -> Samples {
     Samples::U16(samples.into_iter().map(code).collect())
 }
 
-/// 7 bits as 16.
+/// Widens 7 bits to 16.
 fn widened_7_bits(x: i8) -> u16 {
     let x = x.max(0) as u16;
     doubled(x << 8 | x << 1 | x >> 6)
 }
 
-/// The first 15 bits of a signed integer as 16.
+/// The highest 15 value bits of a signed integer, widened to 16.
 fn widened_15_bits(x: i64, further_bits: u32) -> u16 {
     doubled((x.max(0) >> further_bits) as u16)
 }
 
-/// 15 bits as 16, the first of them repeated behind the last: 0 stays 0, full scale full scale.
+/// Widens 15 bits to 16 by repeating the highest one at the end: 0 stays 0, and full scale stays
+/// full scale.
 fn doubled(x: u16) -> u16 {
     x << 1 | x >> 14
 }
 
-/// Red, green and blue that cyan, magenta, yellow and black leave of white, display-encoded as the
-/// inks were; a colour profile would be more exact, and is not applied to inks.
+/// Red, green and blue that cyan, magenta, yellow and black leave of white, display-encoded like
+/// the inks; a colour profile would be more exact, but is not applied to inks.
 fn light_left_by_inks(inks: Samples) -> Result<Samples, Refusal> {
     match inks {
         Samples::U8(v) => Ok(Samples::U8(left_by_inks(&v, u8::MAX.into()))),
@@ -704,7 +707,7 @@ fn left_by_inks<T: Copy + Into<u64> + TryFrom<u64> + Default>(inks: &[T], full: 
         .collect()
 }
 
-/// A whole file of integer codes; alpha is straight.
+/// A complete file of integer codes; alpha is straight.
 pub(crate) fn encode_codes(
     size: (usize, usize),
     n: usize,
@@ -718,8 +721,8 @@ pub(crate) fn encode_codes(
     }
 }
 
-/// A whole file of scene-linear floats of one, three or four channels; colours are multiplied by
-/// alpha.
+/// A complete file of scene-linear floats with one, three or four channels; colours are
+/// premultiplied.
 pub(crate) fn encode_floats(
     size: (usize, usize),
     channels: usize,
@@ -730,7 +733,8 @@ pub(crate) fn encode_floats(
     encode_grey_or_rgb::<Gray32Float, RGB32Float>(size, channels, samples, alpha, metadata)
 }
 
-/// A file of one channel as `Grey`, of three or four as `Rgb`; `alpha` is what a fourth one is.
+/// A file with one channel as `Grey`, or three or four as `Rgb`; `alpha` is the meaning of a fourth
+/// one.
 fn encode_grey_or_rgb<Grey, Rgb>(
     size: (usize, usize),
     channels: usize,
@@ -776,7 +780,7 @@ where
     Ok(out.into_inner())
 }
 
-/// Texts in the letters that the format knows.
+/// Texts restricted to the ASCII characters that the format supports.
 fn ascii_notes(metadata: &[(String, String)]) -> String {
     let mut text = lines_of_notes(metadata);
     text.retain(|c| c.is_ascii());
@@ -821,7 +825,7 @@ mod tests {
         file.into_inner()
     }
 
-    /// A grey picture of 2 x 2 pixels, with the directory in front of its only strip.
+    /// A grey picture of 2 x 2 pixels, with the directory before its only strip.
     fn with_strip(compression: u16, strip: &[u8]) -> Vec<u8> {
         let entries = [
             (Tag::ImageWidth, 2),
@@ -851,7 +855,7 @@ mod tests {
         assert!(matches!(left, Refusal::Unsupported(_)), "{left}");
         assert_truncated(&whole[..whole.len() - 1]);
         // Strips are not decoded row by row. The codes 256 (begin) and 7, nine bits each: the
-        // others are not there.
+        // others are missing.
         assert_truncated(&with_strip(LZW_COMPRESSION, &[0x80, 0x01, 0xc0]));
     }
 
@@ -870,7 +874,8 @@ mod tests {
         encoder.encode(&[7; 4], 2, 2, grey).unwrap();
         jpeg.push(0);
         let file = with_strip(JPEG_COMPRESSION, &jpeg);
-        // Without its last byte the strip is one too long, and without two it has no end.
+        // Without its last byte the strip's stated length is one too long, and without two it has
+        // no end.
         for missing in [0, 1] {
             let read = decode(&file[..file.len() - missing], &Limits::default()).unwrap();
             assert_eq!((read.width, read.height), (2, 2));
@@ -896,7 +901,7 @@ mod tests {
     #[test]
     fn raw_data_of_a_sensor_are_no_photo() {
         let kind = Tag::PhotometricInterpretation;
-        // A mosaic of 2 x 2 pixels that is a DNG, too, in the other byte order.
+        // A mosaic of 2 x 2 pixels that is also a DNG, in the other byte order.
         let mut mosaic = b"MM\0*\0\0\0\x08\0\x04".to_vec();
         mosaic.extend(b"\x01\0\0\x03\0\0\0\x01\0\x02\0\0");
         mosaic.extend(b"\x01\x01\0\x03\0\0\0\x01\0\x02\0\0");
@@ -908,9 +913,9 @@ mod tests {
             file[46] = 0;
             file
         };
-        // The file ends behind the two bytes of its last value that count.
+        // The file ends after the two significant bytes of its last value.
         let cut = mosaic[..mosaic.len() - 6].to_vec();
-        // A BigTIFF, of which the last 6 bytes of an entry do not count.
+        // A BigTIFF in which the last 6 bytes of an entry are insignificant.
         let mut cut_big = b"II+\0\x08\0\0\0\x10\0\0\0\0\0\0\0\x01\0\0\0\0\0\0\0".to_vec();
         cut_big.extend(b"\x06\x01\x03\0\x01\0\0\0\0\0\0\0\x23\x80");
         for raw in [
@@ -977,7 +982,7 @@ mod tests {
         assert!(has_associated_alpha(file.get_ref()));
     }
 
-    /// A picture of 5 x 3 whose tiles of 4 x 2 reach over its border, by planes or not.
+    /// A picture of 5 x 3 whose tiles of 4 x 2 extend beyond its border, with or without planes.
     #[test]
     fn tiles_that_reach_over_the_border_are_cut() {
         for planes in [false, true] {

@@ -1,4 +1,5 @@
-//! What no document may hold: a key twice, numbers that are not finite, and nesting without end.
+//! Checks for what no document may contain: duplicate keys, numbers that are not finite, and
+//! excessive nesting.
 
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use std::collections::HashSet;
@@ -6,8 +7,8 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Parses a JSON document and refuses an object with a key twice (most readers silently keep the
-/// last of them) and what is nested deeper than `max_depth` levels.
+/// Parses a JSON document and rejects duplicate keys in an object (most readers silently keep the
+/// last one) and nesting deeper than `max_depth` levels.
 pub(super) fn check_json(text: &str, max_depth: u64) -> serde_json::Result<()> {
     let mut document = serde_json::Deserializer::from_str(text);
     KeyCheck {
@@ -24,7 +25,7 @@ fn too_deep(max_depth: u64) -> String {
     )
 }
 
-/// A value that may be nested by this many levels more.
+/// A value that may be nested by this many more levels.
 #[derive(Clone, Copy)]
 struct KeyCheck {
     levels: u64,
@@ -89,8 +90,8 @@ impl<'de> Visitor<'de> for KeyCheck {
     }
 }
 
-/// What a TOML document holds that JSON cannot express, and where: a number that is infinite or
-/// NaN; or nesting deeper than `max_depth` levels.
+/// Finds what a TOML document contains that JSON cannot express, and where: a number that is
+/// infinite or NaN; or nesting deeper than `max_depth` levels.
 pub(super) fn find_invalid_toml(
     document: &Spanned<DeTable<'_>>,
     max_depth: u64,
@@ -103,7 +104,7 @@ pub(super) fn find_invalid_toml(
     )
 }
 
-/// `levels` more may be nested in it; none where it is too deep itself.
+/// `levels` more may be nested in it; none if it is too deep itself.
 fn find_in_value(
     value: &DeValue<'_>,
     span: Range<usize>,

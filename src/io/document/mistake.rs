@@ -1,8 +1,8 @@
-//! Mistakes in documents, in words for the people who write them.
+//! Mistakes in documents, explained to the people who write them.
 
 use crate::error::{Error, one_line};
 
-/// What a parser did not accept, and where.
+/// What a parser rejected, and where.
 pub(super) struct DocumentMistake {
     /// Path of the field; empty, `.` or `?` for the document itself.
     pub(super) at: String,
@@ -34,13 +34,13 @@ impl DocumentMistake {
     }
 }
 
-/// The path of an unknown key ends with the key itself, which the message names anyway.
+/// The path without its last step for an unknown key, which the message names anyway.
 fn outer_path<'a>(at: &'a str, key: &str) -> &'a str {
     let outer = at.strip_suffix(key).map(|at| at.trim_end_matches('.'));
     outer.unwrap_or(at)
 }
 
-/// The same without the names that Rust has for what was expected.
+/// The message without Rust type names.
 fn without_rust_types(message: &str) -> String {
     let Some((front, wanted)) = message.rsplit_once("expected ") else {
         return message.into();
@@ -55,12 +55,13 @@ fn without_rust_types(message: &str) -> String {
     format!("{front}expected {words}")
 }
 
-/// Whether what was found is too large for its type, whose upper end is otherwise not the field's.
+/// Whether the value is too large for its Rust type, whose upper bound is usually not that of the
+/// field.
 fn is_large_integer(found: &str) -> bool {
     found.starts_with("invalid value: integer `") && !found.contains("`-")
 }
 
-/// What people call a kind of value that has this name in Rust or serde.
+/// The plain name of a kind of value that has this name in Rust or serde.
 fn plain_name(kind: &str) -> Option<&'static str> {
     match kind {
         "u8" => Some("an integer from 0 to 255"),
@@ -90,10 +91,10 @@ fn missing_key(message: &str) -> Option<&str> {
     message.strip_prefix("missing field `")?.strip_suffix('`')
 }
 
-/// Share of letters that agree from which a key is treated as a misspelling.
+/// Minimum share of matching letters for a key to be treated as a misspelling.
 const SIMILAR_SHARE: f64 = 0.5;
 
-/// What was probably meant by a name that is none of those known.
+/// The name that was probably meant by an unknown one.
 pub(crate) fn suggestion(key: &str, known: &[&str]) -> String {
     let nearest = known
         .iter()

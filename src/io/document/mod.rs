@@ -1,4 +1,4 @@
-//! Documents: TOML and JSON in, with the place of a mistake; text out, whole or not at all.
+//! Documents: reads TOML and JSON and locates mistakes; writes text, completely or not at all.
 
 mod duplicate_keys;
 mod mistake;
@@ -25,17 +25,17 @@ const BYTE_ORDER_MARK: char = '\u{feff}';
 /// Reads a TOML document.
 ///
 /// # Errors
-/// [`Error::File`] for a file that cannot be read or is not TOML; [`Error::Field`] for a value that
-/// does not fit, with the key that was probably meant where one is unknown.
+/// [`Error::File`] for a file that cannot be read or is not TOML; [`Error::Field`] for an invalid
+/// value or an unknown key, with the key that was probably meant.
 pub fn read_toml<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     let path = path.as_ref();
     parse_toml(&read_text(path)?).map_err(|e| e.in_file(path))
 }
 
-/// A TOML document in memory, some of its values replaced and then changed by `change`.
+/// Parses a TOML document in memory after replacing some of its values and applying `change`.
 ///
 /// # Errors
-/// As [`parse_toml`]; an override of a value that cannot be there.
+/// Like [`parse_toml`]; an override of a value that cannot exist.
 pub(crate) fn parse_toml_with<T: DeserializeOwned>(
     text: &str,
     overrides: &[Override],
@@ -44,7 +44,7 @@ pub(crate) fn parse_toml_with<T: DeserializeOwned>(
     let mut document: toml::Table = parse_toml(text)?;
     apply_all(overrides, &mut document)?;
     change(&mut document);
-    // The text itself knows the line of a mistake.
+    // Only the text knows the line of a mistake.
     from_table(document).map_err(|e| parse_toml::<T>(text).err().unwrap_or(e))
 }
 
@@ -52,11 +52,11 @@ fn apply_all(overrides: &[Override], document: &mut toml::Table) -> Result<()> {
     overrides.iter().try_for_each(|o| o.apply(document))
 }
 
-/// Settings from overrides alone: all of them lie in the table of that name.
+/// Settings from overrides alone, all of them in the table `table`.
 ///
 /// # Errors
-/// An override outside the table or of a value that cannot be there; a key that `T` does not know,
-/// with the one that was probably meant; a value that does not fit.
+/// An override outside the table or of a value that cannot exist; an unknown key of `T`, with the
+/// one that was probably meant; an invalid value.
 pub fn from_overrides<T: DeserializeOwned>(table: &str, overrides: &[Override]) -> Result<T> {
     let mut document = toml::Table::new();
     document.insert(table.into(), toml::Table::new().into());
@@ -73,15 +73,15 @@ pub fn from_overrides<T: DeserializeOwned>(table: &str, overrides: &[Override]) 
 /// A document from a table in memory.
 ///
 /// # Errors
-/// As [`parse_toml`].
+/// Like [`parse_toml`].
 pub(crate) fn from_table<T: DeserializeOwned>(table: toml::Table) -> Result<T> {
     from_value(table.into(), "")
 }
 
-/// A document from a table in memory, some of its values replaced.
+/// A document from a table in memory with some of its values replaced.
 ///
 /// # Errors
-/// As [`parse_toml`]; an override that leads nowhere.
+/// Like [`parse_toml`]; an override with an invalid path.
 pub(crate) fn from_table_with<T: DeserializeOwned>(
     mut table: toml::Table,
     overrides: &[Override],
@@ -103,11 +103,11 @@ fn from_value<T: DeserializeOwned>(value: toml::Value, outer: &str) -> Result<T>
     })
 }
 
-/// A document from JSON values in memory, as a whole called `name`.
+/// A document from JSON values in memory; `name` is the name of the whole in errors.
 ///
 /// # Errors
-/// [`Error::Value`] for a value that does not fit, by its path below `name`, with the key that was
-/// probably meant where one is unknown.
+/// [`Error::Value`] for an invalid value or an unknown key, by its path below `name`, with the key
+/// that was probably meant.
 pub fn from_json<T: DeserializeOwned>(name: &str, value: serde_json::Value) -> Result<T> {
     serde_path_to_error::deserialize(value).map_err(|e| {
         let at = format!("{name}.{}", e.path());
@@ -115,10 +115,10 @@ pub fn from_json<T: DeserializeOwned>(name: &str, value: serde_json::Value) -> R
     })
 }
 
-/// Reads a document whose extension shows whether it is JSON (`.json`) or TOML (any other).
+/// Reads a document as JSON if its extension is `.json`, otherwise as TOML.
 ///
 /// # Errors
-/// As [`read_toml`].
+/// Like [`read_toml`].
 pub fn read_document<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     if has_extension(path.as_ref(), "json") {
         read_json(path)
@@ -130,8 +130,8 @@ pub fn read_document<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
 /// Writes a document in the format of its extension: JSON (`.json`) or TOML (`.toml`).
 ///
 /// # Errors
-/// [`Error::File`] for another extension, where the format cannot express it or the file cannot be
-/// written.
+/// [`Error::File`] for another extension, if the format cannot express the value, or if the file
+/// cannot be written.
 pub fn write_document<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> Result<()> {
     let path = path.as_ref();
     if has_extension(path, "json") {
@@ -144,7 +144,7 @@ pub fn write_document<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) 
     }
 }
 
-/// Whether a file's name has an extension, in capitals or not.
+/// Whether a file name has an extension, ignoring case.
 pub fn has_extension(path: &Path, expected: &str) -> bool {
     path.extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case(expected))
@@ -153,28 +153,28 @@ pub fn has_extension(path: &Path, expected: &str) -> bool {
 /// Reads a JSON document.
 ///
 /// # Errors
-/// As [`read_toml`].
+/// Like [`read_toml`].
 pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     let path = path.as_ref();
     parse_json(&read_text(path)?).map_err(|e| e.in_file(path))
 }
 
-/// Reads a JSON document that holds data, not settings (truth and detections as COCO has them): as
-/// large as a picture may be ([`Limits::file_bytes`](super::Limits::file_bytes)).
+/// Reads a JSON document with data, not settings (ground truth and detections in COCO format); it
+/// may be as large as a picture ([`Limits::file_bytes`](super::Limits::file_bytes)).
 ///
 /// # Errors
-/// As [`read_toml`].
+/// Like [`read_toml`].
 pub(crate) fn read_json_data<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     let path = path.as_ref();
     let most = (ReadOptions::default().limits.file_bytes, "file_bytes");
     let text = utf8(path, read_regular(path, most, "text file")?)?;
-    // Keeping track of the place costs as much as all the rest, and only a mistake has one.
+    // Tracking the position costs as much as everything else, and only a mistake needs it.
     serde_json::from_str(&text)
         .or_else(|_| deserialize_json(&text))
         .map_err(|e| e.in_file(path))
 }
 
-/// Reads a text file, without the byte order mark that editors of Windows put before it.
+/// Reads a text file, without the byte order mark that Windows editors write.
 ///
 /// # Errors
 /// [`Error::File`] for a file that is missing, not regular, larger than
@@ -190,7 +190,7 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     read_regular(path, (limit, "document_bytes"), "text file")
 }
 
-/// The text of a file behind its byte order mark, if it has one.
+/// The text of a file, without a byte order mark.
 fn utf8(path: &Path, bytes: Vec<u8>) -> Result<String> {
     let mut text = String::from_utf8(bytes).map_err(|_| Error::file(path, "not text (UTF-8)"))?;
     if text.starts_with(BYTE_ORDER_MARK) {
@@ -202,7 +202,7 @@ fn utf8(path: &Path, bytes: Vec<u8>) -> Result<String> {
 /// Writes a document as TOML.
 ///
 /// # Errors
-/// [`Error::File`] where TOML cannot express it or the file cannot be written.
+/// [`Error::File`] if TOML cannot express it or the file cannot be written.
 pub fn write_toml<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> Result<()> {
     let path = path.as_ref();
     let text = toml::to_string_pretty(value);
@@ -215,7 +215,7 @@ pub fn write_toml<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> R
 /// Writes a document as indented JSON.
 ///
 /// # Errors
-/// [`Error::File`] where JSON cannot express it or the file cannot be written.
+/// [`Error::File`] if JSON cannot express it or the file cannot be written.
 pub fn write_json<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> Result<()> {
     let path = path.as_ref();
     let text = serde_json::to_string_pretty(value).map_err(|e| Error::file(path, e))?;
@@ -225,7 +225,7 @@ pub fn write_json<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> R
 /// Writes a text file.
 ///
 /// # Errors
-/// [`Error::File`] where it cannot be written.
+/// [`Error::File`] if it cannot be written.
 pub fn write_text(path: impl AsRef<Path>, text: &str) -> Result<()> {
     write_bytes(path.as_ref(), text.as_bytes())
 }
@@ -233,8 +233,8 @@ pub fn write_text(path: impl AsRef<Path>, text: &str) -> Result<()> {
 /// Parses a TOML document in memory.
 ///
 /// # Errors
-/// [`Error::Value`] for what is not TOML, a key twice, a number that is not finite, and values that
-/// do not fit.
+/// [`Error::Value`] for anything that is not TOML, a duplicate key, a number that is not finite,
+/// and invalid values.
 pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
     let document = checked_toml(text)?;
     serde_path_to_error::deserialize(toml::Deserializer::from(document)).map_err(|e| {
@@ -243,7 +243,7 @@ pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
     })
 }
 
-/// Parses TOML; refuses numbers that are not finite and nesting that is too deep.
+/// Parses TOML; rejects numbers that are not finite and excessive nesting.
 fn checked_toml(text: &str) -> Result<Spanned<DeTable<'_>>> {
     let document = DeTable::parse(text)
         .map_err(|e| toml_mistake(text, e.span(), String::new(), e.message().into()))?;
@@ -261,7 +261,7 @@ fn toml_mistake(text: &str, span: Option<Range<usize>>, at: String, what: String
 /// Parses a JSON document in memory.
 ///
 /// # Errors
-/// As [`parse_toml`].
+/// Like [`parse_toml`].
 pub(crate) fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
     check_json(text, max_depth()).map_err(|e| json_mistake(&e, String::new()))?;
     deserialize_json(text)
@@ -280,12 +280,12 @@ fn deserialize_json<T: DeserializeOwned>(text: &str) -> Result<T> {
 fn json_mistake(e: &serde_json::Error, at: String) -> Error {
     let message = e.to_string();
     let what = message.split(" at line ").next().unwrap_or_default().into();
-    // A type that reads itself from a tree of values has no lines.
+    // Types that deserialize from an intermediate tree of values have no line numbers.
     let line = Some(e.line()).filter(|&line| line > 0);
     DocumentMistake { at, line, what }.into_error()
 }
 
-/// Levels that a document may be nested.
+/// Maximum nesting depth of a document.
 fn max_depth() -> u64 {
     ReadOptions::default().limits.document_depth
 }

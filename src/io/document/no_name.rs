@@ -1,16 +1,16 @@
-//! A value that is no name where one of several names belongs.
+//! A value of the wrong type where one of several names is expected.
 
 use serde::de::DeserializeOwned;
 use serde_path_to_error::{Error, Segment};
 use toml::Value;
 
-/// What toml says of it in a text and in a table: neither the value nor the names.
+/// toml's messages for it, for a text and for a table: they contain neither the value nor the names.
 const SAID: [&str; 2] = [
     "wanted string or table",
     "invalid type: unit variant, expected string only",
 ];
 
-/// What is wrong with a document that was read as a `T`.
+/// The message for a document that was read as a `T`.
 pub(super) fn message<T: DeserializeOwned>(
     error: &Error<toml::de::Error>,
     document: impl FnOnce() -> Option<Value>,
@@ -22,7 +22,7 @@ pub(super) fn message<T: DeserializeOwned>(
     named.unwrap_or_else(|| said.to_owned())
 }
 
-/// Names are told to whoever writes another one: so the value is read as if it were a name.
+/// The names are only listed for an unknown name: so the value is read again as if it were a name.
 fn name_expected<T: DeserializeOwned>(
     error: &Error<toml::de::Error>,
     mut document: Value,

@@ -1,4 +1,4 @@
-//! Single values of a document, given on a command line: `camera.focal_px=2900`,
+//! Single values of a document, set on the command line: `camera.focal_px=2900`,
 //! `objects[0].grade.hue_deg=30`.
 
 use crate::error::{Error, Result};
@@ -6,7 +6,7 @@ use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 use toml::Value;
 
-/// One value and its place in a document.
+/// A value and its path in a document.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Override {
     path: String,
@@ -16,8 +16,8 @@ pub struct Override {
 impl FromStr for Override {
     type Err = Error;
 
-    /// From `path=value`; the value is TOML (`3`, `[4, 12]`, `"text"`, `true`), or else text that
-    /// does not begin as a list or table.
+    /// From `path=value`; the value is TOML (`3`, `[4, 12]`, `"text"`, `true`), or otherwise text
+    /// that does not begin like a list or table.
     fn from_str(text: &str) -> Result<Self> {
         let Some((path, value)) = text.split_once('=') else {
             return Err(Error::value(text, "no value, expected KEY=VALUE"));
@@ -38,8 +38,8 @@ impl Display for Override {
     }
 }
 
-/// TOML, or text. A list without its end or with bare words is taken for no text: its reader would
-/// blame the document.
+/// Parses TOML or text. An unterminated list or one with bare words is not treated as text: its
+/// reader would blame the document.
 fn parse_value(text: &str) -> std::result::Result<Value, String> {
     let table = format!("value = {text}").parse::<toml::Table>();
     match table.ok().and_then(|mut table| table.remove("value")) {
@@ -61,13 +61,13 @@ fn is_finite(value: &Value) -> bool {
 }
 
 impl Override {
-    /// Where the value goes: `scene.objects`.
+    /// The path of the value: `scene.objects`.
     pub fn path(&self) -> &str {
         &self.path
     }
 
-    /// Puts the value into a document; tables on the way are made where they are missing, list
-    /// entries are not.
+    /// Sets the value in a document; missing tables on the way are created, missing list entries
+    /// are not.
     pub(super) fn apply(&self, document: &mut toml::Table) -> Result<()> {
         let place = self.place_in(document);
         *place.map_err(|what| Error::value(&self.path, what))? = self.value.clone();
@@ -87,7 +87,7 @@ impl Override {
     }
 }
 
-/// One level down.
+/// One step of a path.
 enum PathStep<'a> {
     Key(&'a str),
     Index(usize),
@@ -106,14 +106,14 @@ impl PathStep<'_> {
     }
 }
 
-/// The value of a key, a table where it is missing.
+/// The value of a key, a new table if it is missing.
 fn entry<'t>(table: &'t mut toml::Table, key: &str) -> &'t mut Value {
     table
         .entry(key)
         .or_insert_with(|| Value::Table(toml::Table::new()))
 }
 
-/// `objects[3]` is the key `objects`, then the index 3; what has another form is all one key.
+/// `objects[3]` is the key `objects`, then the index 3; anything in another form is a single key.
 fn split_indices(part: &str) -> Vec<PathStep<'_>> {
     let (key, rest) = part.split_at(part.find('[').unwrap_or(part.len()));
     let indices = rest.split_terminator(']').map(|index| {

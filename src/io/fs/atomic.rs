@@ -1,5 +1,6 @@
-//! Whole files or none: everything is written beside its place, put on the disk, and then moved
-//! there. Files of which a journal is kept may be moved first and put on the disk together.
+//! Complete files or none: everything is written to a temporary file next to its destination,
+//! synced, and then moved there. Files that are recorded in a journal may be moved first and synced
+//! together.
 
 use super::open::reason;
 use crate::error::{Error, Result};
@@ -9,13 +10,13 @@ use std::fs::{File, Permissions};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Component, Path, PathBuf};
 
-/// When files are put on the disk.
+/// When files are synced to disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Syncing {
-    /// Each before it gets its name: after a power cut there is the old one or the new one.
+    /// Each before it gets its name: after a power failure there is either the old one or the new one.
     Alone,
-    /// Many at once, by [`sync_file_system`]: after a power cut one that was not among them may be
-    /// torn, and whoever wrote it has to notice.
+    /// Many at once, by [`sync_file_system`]: after a power failure a file that was not yet synced
+    /// may be torn, and whoever wrote it must detect that.
     Together,
 }
 
@@ -24,15 +25,15 @@ thread_local! {
 }
 
 impl Syncing {
-    /// Runs a job; the files that it writes on this thread are put on the disk so.
+    /// Runs a job; the files that it writes on this thread are synced in this way.
     pub(crate) fn during<T>(self, job: impl FnOnce() -> T) -> T {
         let _before = SyncingBefore(SYNCING.replace(self));
         job()
     }
 }
 
-/// How a thread put files on the disk before a job, and does again when this is dropped: also where
-/// the job panics, which threads of a pool outlive.
+/// The mode of a thread before a job, restored when this is dropped, even if the job panics:
+/// threads of a pool survive that.
 struct SyncingBefore(Syncing);
 
 impl Drop for SyncingBefore {
@@ -41,7 +42,7 @@ impl Drop for SyncingBefore {
     }
 }
 
-/// Writes a file in one step: readers see the old one or the new one, never a part.
+/// Writes a file atomically: readers see the old one or the new one, never a part.
 pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     let alone = SYNCING.get() == Syncing::Alone;
     work::add_all([
@@ -51,10 +52,10 @@ pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write_through(path, |file| file.write_all(bytes))
 }
 
-/// Writes a file piece by piece: it does not appear before `fill` has written all of it.
+/// Writes a file piece by piece: it does not appear until `fill` has written all of it.
 ///
 /// # Errors
-/// [`Error::File`] with the error of `fill` or of the system.
+/// [`Error::File`] with the error of `fill` or of the operating system.
 pub(crate) fn write_through(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
@@ -70,7 +71,7 @@ pub(crate) fn write_through(
         .map_err(|e| not_written(path, &e))
 }
 
-/// A device or a pipe is no file that another one may take the place of.
+/// Rejects devices and pipes, which must not be replaced by a file.
 fn check_replaceable(path: &Path) -> Result<()> {
     let what = match path.metadata() {
         Ok(there) if there.is_dir() => "is a folder",
@@ -80,13 +81,13 @@ fn check_replaceable(path: &Path) -> Result<()> {
     Err(Error::file(path, format!("cannot be written: {what}")))
 }
 
-/// The folder that a file lies in; the working folder for a bare name.
+/// The folder of a file; the working folder for a bare name.
 fn folder_of(path: &Path) -> &Path {
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
     parent.unwrap_or(Path::new("."))
 }
 
-/// Fails on a file to write whose folder is not there, as writing it would.
+/// Fails if the folder of a file to write does not exist, as writing it would.
 ///
 /// # Errors
 /// [`Error::File`], naming both.
@@ -108,7 +109,7 @@ fn not_written(path: &Path, e: &std::io::Error) -> Error {
     Error::file(path, format!("cannot be written: {}", reason(e)))
 }
 
-/// Fills a new file, puts it on the disk if that is its turn, and moves it to its place.
+/// Fills a new file, syncs it if required, and moves it to its destination.
 fn fill_and_move(
     mut file: tempfile::NamedTempFile,
     path: &Path,
@@ -124,7 +125,7 @@ fn fill_and_move(
     Ok(())
 }
 
-/// A file has the permissions of the one that it replaces.
+/// Copies the permissions of the file that is replaced.
 #[cfg(unix)]
 fn keep_permissions(file: &File, path: &Path) -> std::io::Result<()> {
     match path.symlink_metadata() {
@@ -133,13 +134,13 @@ fn keep_permissions(file: &File, path: &Path) -> std::io::Result<()> {
     }
 }
 
-/// Other systems keep them in folders.
+/// On other systems permissions belong to folders.
 #[cfg(not(unix))]
 fn keep_permissions(_: &File, _: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Puts a file or the names in a folder on the disk, unless that is done for many at once.
+/// Syncs a file or folder, unless that is done for many at once.
 fn put_on_disk(file: &File) -> std::io::Result<()> {
     match SYNCING.get() {
         Syncing::Alone => file.sync_all(),
@@ -147,11 +148,11 @@ fn put_on_disk(file: &File) -> std::io::Result<()> {
     }
 }
 
-/// Puts the names in a folder on the disk.
+/// Syncs the names in a folder.
 #[cfg(unix)]
 fn sync_folder(folder: &Path) -> std::io::Result<()> {
     match File::open(folder).and_then(|folder| put_on_disk(&folder)) {
-        // Some file systems have no such thing, and some folders may be written but not read.
+        // Some file systems cannot do this, and some folders are writable but not readable.
         Err(e) if [ErrorKind::InvalidInput, ErrorKind::PermissionDenied].contains(&e.kind()) => {
             Ok(())
         }
@@ -159,17 +160,17 @@ fn sync_folder(folder: &Path) -> std::io::Result<()> {
     }
 }
 
-/// Other systems write names by themselves.
+/// Other systems write names on their own.
 #[cfg(not(unix))]
 fn sync_folder(_: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Puts everything on the disk that was written to a file's file system, so that it outlives a power
-/// cut; says whether the system can do that.
+/// Syncs everything that was written to the file system of a file, so that it survives a power
+/// failure; returns whether the system supports that.
 ///
 /// # Errors
-/// Where the disk does not take it.
+/// If the disk reports an error.
 pub(crate) fn sync_file_system(file: &File) -> std::io::Result<bool> {
     match sync_all_files(file) {
         Err(e) if e.kind() == ErrorKind::Unsupported => Ok(false),
@@ -177,7 +178,7 @@ pub(crate) fn sync_file_system(file: &File) -> std::io::Result<bool> {
     }
 }
 
-/// FUSE says that all is on the disk, and does not ask its server.
+/// FUSE reports success without asking its server.
 #[cfg(target_os = "linux")]
 const FUSE_SUPER_MAGIC: i64 = 0x6573_5546;
 
@@ -189,14 +190,14 @@ fn sync_all_files(file: &File) -> std::io::Result<()> {
     Ok(rustix::fs::syncfs(file)?)
 }
 
-/// Other systems have nothing that waits for the disk.
+/// Other systems have no equivalent.
 #[cfg(not(target_os = "linux"))]
 fn sync_all_files(_: &File) -> std::io::Result<()> {
     Err(ErrorKind::Unsupported.into())
 }
 
-/// A new file that vanishes if it is not moved to its place, readable like any other file of the
-/// user.
+/// A new file that is deleted unless it is moved to its destination, with the user's default
+/// permissions.
 fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".petcomp-").suffix(".tmp");
@@ -205,23 +206,23 @@ fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
-/// An absolute path, as it is named: links and `..` stay.
+/// Makes a path absolute without resolving links and `..`.
 ///
 /// # Errors
-/// [`Error::File`] for an empty path, and where the working folder is gone.
+/// [`Error::File`] for an empty path, and if the working folder no longer exists.
 pub fn absolute(path: &Path) -> Result<PathBuf> {
     std::path::absolute(path).map_err(|e| Error::file(path, e))
 }
 
-/// The same of a folder, of which an empty path is the working folder.
+/// The same for a folder, where an empty path is the working folder.
 ///
 /// # Errors
-/// Without a working folder.
+/// If there is no working folder.
 pub(crate) fn absolute_folder(path: &Path) -> Result<PathBuf> {
     absolute(&Path::new(".").join(path))
 }
 
-/// The relative path from a folder to a file or folder, both absolute; `.` to the folder itself.
+/// The relative path from a folder to a file or folder, both absolute; `.` for the folder itself.
 pub fn relative(to: &Path, from: &Path) -> PathBuf {
     if to == from {
         return ".".into();
@@ -235,17 +236,17 @@ pub fn relative(to: &Path, from: &Path) -> PathBuf {
     up.chain(to.components().skip(shared)).collect()
 }
 
-/// The relative path from a folder to a file or folder as the disk has them: the system climbs by
-/// `..` from where a link leads to, not from where it stands. A link that is the last step of `to`
-/// stays, unless it leads to a folder around `from`, and what is not there is taken as it is named.
+/// The relative path from a folder to a file or folder on disk: for the system, `..` leads up from
+/// the target of a link, not from its location. A link that is the last step of `to` is kept,
+/// unless it leads to a folder that contains `from`; parts that do not exist are used as named.
 ///
 /// # Errors
-/// As [`absolute`].
+/// Like [`absolute`].
 pub fn relative_on_disk(to: &Path, from: &Path) -> Result<PathBuf> {
     let (to, from) = (absolute(to)?, resolved(&absolute(from)?));
     let real = resolved(&to);
     let place = match (to.parent(), to.file_name()) {
-        // The way to a folder around `from` needs no link.
+        // The path to a folder that contains `from` needs no link.
         _ if from.starts_with(&real) => real,
         (Some(folder), Some(name)) => resolved(folder).join(name),
         _ => real,
@@ -253,7 +254,7 @@ pub fn relative_on_disk(to: &Path, from: &Path) -> Result<PathBuf> {
     Ok(relative(&place, &from))
 }
 
-/// A path from the root without links and `..`, step by step as the system walks it.
+/// An absolute path without links and `..`, resolved step by step as the system does.
 fn resolved(path: &Path) -> PathBuf {
     path.components().fold(PathBuf::new(), |mut place, step| {
         if step == Component::ParentDir {
@@ -265,8 +266,8 @@ fn resolved(path: &Path) -> PathBuf {
     })
 }
 
-/// A path with its last step of one name given another: `a/images/b/images/c.png` leads from images
-/// to labels at `a/images/b/labels/c.png`, as trainers have it. Without such a step it stays.
+/// Replaces the last path step of a given name: the labels of `a/images/b/images/c.png` are at
+/// `a/images/b/labels/c.png`, as trainers expect. Unchanged without such a step.
 pub(crate) fn with_last_step(path: &Path, from: &str, to: &str) -> PathBuf {
     let steps: Vec<_> = path.components().collect();
     let last = steps.iter().rposition(|step| step.as_os_str() == from);
@@ -277,10 +278,10 @@ pub(crate) fn with_last_step(path: &Path, from: &str, to: &str) -> PathBuf {
     swapped.collect()
 }
 
-/// Makes a folder and its parents; one that already exists is fine.
+/// Creates a folder and its parents; it may already exist.
 ///
 /// # Errors
-/// [`Error::File`] where a file is in the way or the folder may not be made.
+/// [`Error::File`] if a file is in the way or the folder cannot be created.
 pub fn create_folder(path: impl AsRef<Path>) -> Result<()> {
     let path = path.as_ref();
     if let Some(file) = path.ancestors().find(|p| p.is_file()) {
@@ -359,7 +360,7 @@ mod tests {
         }
     }
 
-    /// Whoever runs this as root may read every folder.
+    /// The superuser can read every folder.
     #[cfg(unix)]
     #[test]
     fn a_folder_that_may_be_written_need_not_be_readable() {

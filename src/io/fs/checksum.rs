@@ -1,4 +1,4 @@
-//! Copies of files that are as they were when they were written.
+//! Copies files only if they are unchanged since they were written.
 
 use super::atomic::write_through;
 use super::open::{open_regular, reason};
@@ -16,7 +16,7 @@ pub struct Checksum {
 }
 
 impl Checksum {
-    /// That of a regular file, which is read to its end.
+    /// The checksum of a regular file, which is read to its end.
     ///
     /// # Errors
     /// [`Error::File`] for one that cannot be read.
@@ -27,11 +27,11 @@ impl Checksum {
     }
 }
 
-/// Copies a file in one step, if it is as it was: of another length or with other bytes it is
-/// refused, and nothing is written.
+/// Copies a file atomically if it is unchanged: if its length or content differs, it is rejected
+/// and nothing is written.
 ///
 /// # Errors
-/// [`Error::File`] for the one that cannot be read or written.
+/// [`Error::File`] for the file that cannot be read or written.
 pub fn copy(from: impl AsRef<Path>, to: impl AsRef<Path>, expected: Checksum) -> Result<()> {
     let (from, to) = (from.as_ref(), to.as_ref());
     let (file, bytes) = open_regular(from, (u64::MAX, "file_bytes"), "file")?;
@@ -54,10 +54,10 @@ fn changed(path: &Path) -> Error {
     Error::file(path, "has changed since it was written")
 }
 
-/// Bytes that are moved at a time.
+/// Bytes copied at a time.
 const PIECE_BYTES: usize = 1 << 16;
 
-/// Moves everything from one to the other.
+/// Copies everything from one to the other.
 fn copy_bytes(mut from: impl Read, to: &mut dyn Write) -> std::io::Result<Checksum> {
     let (mut hasher, mut bytes) = (crc32fast::Hasher::new(), 0);
     let mut piece = vec![0; PIECE_BYTES];
@@ -74,7 +74,7 @@ fn copy_bytes(mut from: impl Read, to: &mut dyn Write) -> std::io::Result<Checks
     Ok(Checksum { bytes, crc32 })
 }
 
-/// Reads some bytes, whatever interrupts it; none at the end.
+/// Reads some bytes, retrying when interrupted; none at the end.
 fn read_some(from: &mut impl Read, piece: &mut [u8]) -> std::io::Result<usize> {
     loop {
         match from.read(piece) {

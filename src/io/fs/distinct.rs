@@ -1,13 +1,13 @@
-//! Files that are read and files that are written: never the same.
+//! Ensures that no file is both read and written.
 
 use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// No file is read and written, and none is written twice, under whatever names.
+/// Fails if a file is both read and written, or written twice, under whatever names.
 ///
 /// # Errors
-/// [`Error::File`] for the first file that would be.
+/// [`Error::File`] for the first such file.
 pub fn check_distinct(
     inputs: impl IntoIterator<Item = impl AsRef<Path>>,
     targets: impl IntoIterator<Item = impl AsRef<Path>>,
@@ -28,7 +28,7 @@ pub fn check_distinct(
     Ok(())
 }
 
-/// One path for every name of a file that is there.
+/// The same path for all names of an existing file.
 pub(crate) fn real_path(path: &Path) -> PathBuf {
     let real = path.canonicalize().or_else(|_| std::path::absolute(path));
     real.unwrap_or_else(|_| path.to_owned())

@@ -1,4 +1,4 @@
-//! What lies below a folder.
+//! The content of folders.
 
 use super::natural_order::compare_paths;
 use crate::error::{Error, Result};
@@ -6,10 +6,10 @@ use std::collections::BTreeSet;
 use std::fs::DirEntry;
 use std::path::{Path, PathBuf};
 
-/// What is in a folder, in the order of the disk.
+/// The entries of a folder, in disk order.
 ///
 /// # Errors
-/// A folder that cannot be listed to its end: what is missing would be taken for not there.
+/// A folder that cannot be listed completely: its missing entries would be treated as absent.
 pub fn entries(folder: &Path) -> Result<Vec<DirEntry>> {
     all_of(folder, std::fs::read_dir(folder))
 }
@@ -22,11 +22,11 @@ fn all_of<T>(
     all.map_err(|e| Error::file(folder, e))
 }
 
-/// The files of a kind below a folder, in natural order of path (`2.png` before `10.png`), without
-/// those that macOS puts beside others; each folder once, as links may lead in circles.
+/// The wanted files in a folder and its subfolders, in natural order of path (`2.png` before
+/// `10.png`), without the companion files of macOS; each folder once, since links may form circles.
 ///
 /// # Errors
-/// A folder that cannot be listed, or one with which there are more files than `most`.
+/// A folder that cannot be listed, or one that brings the number of files above `most`.
 pub(crate) fn files_below(
     folder: &Path,
     is_wanted: impl Fn(&Path) -> bool,
@@ -47,19 +47,20 @@ pub(crate) fn files_below(
     Ok(files)
 }
 
-/// Trainers pass over folders whose names begin with a dot.
+/// Trainers skip folders whose names begin with a dot.
 fn is_hidden(folder: &Path) -> bool {
     let name = folder.file_name().unwrap_or_default();
     name.as_encoded_bytes().starts_with(b".")
 }
 
-/// `._a.png` beside `a.png`: what macOS knows of a file, where the disk has no place for it.
+/// `._a.png` next to `a.png`: macOS metadata of a file, where the disk does not support it.
 pub(crate) fn is_apple_double(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default();
     name.as_encoded_bytes().starts_with(b"._")
 }
 
-/// What is in a folder, in order of name: of two names of a folder always the same one counts.
+/// The folders and files in a folder, sorted by name, so that of equivalent names the same one
+/// always counts.
 fn folders_and_files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     let entries = entries(folder)?;
     let mut paths: Vec<PathBuf> = entries.iter().map(DirEntry::path).collect();

@@ -1,5 +1,5 @@
-//! Files and folders: opened without waiting, written whole or not at all, never outside of their
-//! folder.
+//! Files and folders: opened without blocking, written completely or not at all, never outside
+//! their folder.
 
 mod atomic;
 mod checksum;

@@ -1,4 +1,4 @@
-//! Regular files, opened without waiting, and the system's reasons where that fails.
+//! Opens regular files without blocking, and explains system errors.
 
 use crate::error::{Error, Result};
 use crate::io::limits::{affordable, at_most};
@@ -7,8 +7,8 @@ use std::fs::{File, Metadata};
 use std::io::Read;
 use std::path::Path;
 
-/// Opens a regular file, and no other: a FIFO would block, a device never ends. Also gives its
-/// length. `most` is the largest length, and the name of that limit.
+/// Opens a regular file, and no other kind: a FIFO would block, a device never ends. Also returns
+/// its length. `most` is the maximum length, and the name of that limit.
 pub(crate) fn open_regular(path: &Path, most: (u64, &str), expected: &str) -> Result<(File, u64)> {
     open_checked(path, expected)
         .and_then(|(file, bytes)| {
@@ -18,8 +18,8 @@ pub(crate) fn open_regular(path: &Path, most: (u64, &str), expected: &str) -> Re
         .map_err(|e| Error::file(path, e))
 }
 
-/// A regular file and its length. Looked at before it is opened, because opening may wait, and
-/// after, because it may be another by then.
+/// A regular file and its length. Checked before it is opened, because opening may block, and again
+/// afterwards, because it may have been replaced.
 fn open_checked(path: &Path, expected: &str) -> std::result::Result<(File, u64), String> {
     let before = std::fs::metadata(path).map_err(|e| reason(&e))?;
     check_regular(&before, expected)?;
@@ -43,7 +43,7 @@ pub(crate) fn read_regular(path: &Path, most: (u64, &str), expected: &str) -> Re
     read_to_end(file, bytes, most.0).map_err(|e| Error::file(path, e))
 }
 
-/// The rest of a file that had `length` bytes when it was opened, and may have grown.
+/// The rest of a file that had `length` bytes when it was opened, and may have grown since.
 pub(crate) fn read_to_end(
     file: impl Read,
     length: u64,

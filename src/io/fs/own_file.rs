@@ -1,16 +1,16 @@
-//! Files of petcomp's own in an output folder: never a link to a file of somebody else's.
+//! Files that petcomp owns in an output folder: never links to other files.
 
 use super::open::reason;
 use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions};
 use std::path::Path;
 
-/// Opens a file of petcomp's own in an output folder, to be read and appended to; it is made where
-/// it is not there.
+/// Opens one of petcomp's own files in an output folder for reading and appending; creates it if it
+/// does not exist.
 ///
 /// # Errors
-/// [`Error::File`] for a link, which would lead to a file of somebody else's, and for anything but
-/// a regular file.
+/// [`Error::File`] for a link, which would lead to someone else's file, and for anything but a
+/// regular file.
 pub(crate) fn open_own(path: &Path) -> Result<File> {
     refuse_foreign(path)?;
     let file = own_options()
@@ -23,7 +23,7 @@ pub(crate) fn open_own(path: &Path) -> Result<File> {
     }
 }
 
-/// To read and to append, made where it is not there.
+/// For reading and appending, created if it does not exist.
 fn own_options() -> OpenOptions {
     let mut options = OpenOptions::new();
     options.read(true).append(true).create(true);
@@ -32,7 +32,7 @@ fn own_options() -> OpenOptions {
     options
 }
 
-/// Refuses what lies in the place of a file of petcomp's own and is none.
+/// Rejects anything in the place of one of petcomp's own files that is not a regular file.
 ///
 /// # Errors
 /// [`Error::File`] for a link and for anything but a regular file.
@@ -50,8 +50,7 @@ fn foreign(path: &Path) -> Error {
     )
 }
 
-/// A link that takes the file's place after it was looked at is not followed, and a FIFO is not
-/// waited for.
+/// Does not follow a link that replaces the file after the check, and does not wait for a FIFO.
 #[cfg(unix)]
 fn own_flags() -> i32 {
     (rustix::fs::OFlags::NOFOLLOW | rustix::fs::OFlags::NONBLOCK).bits() as i32

@@ -1,4 +1,4 @@
-//! Names and paths that come out of documents: nothing leads outside of a folder.
+//! Names and paths from documents: none may lead out of a folder.
 
 use super::listing::entries;
 use super::open::reason;
@@ -6,10 +6,10 @@ use crate::error::{Error, Result};
 use std::fs::{DirEntry, Metadata};
 use std::path::{Component, Path, PathBuf};
 
-/// A file that a document names: below the folder, by its path at least.
+/// Joins a path from a document to a folder; the path itself must stay below the folder.
 ///
 /// # Errors
-/// [`Error::Value`] for an empty, absolute or climbing (`..`) path.
+/// [`Error::Value`] for a path that is empty, absolute or contains `..`.
 pub fn below(folder: impl AsRef<Path>, file: impl AsRef<Path>) -> Result<PathBuf> {
     let file = file.as_ref();
     let mut parts = file.components().peekable();
@@ -23,22 +23,22 @@ pub fn below(folder: impl AsRef<Path>, file: impl AsRef<Path>) -> Result<PathBuf
     Ok(folder.as_ref().join(file))
 }
 
-/// The file below a folder that a document names: the one way from a path in a document to a file
+/// The file in a folder that a document names: the only way from a path in a document to a file
 /// that is read.
 ///
-/// Links are followed where they stay in the folder; the folder itself may be one.
+/// Links are followed if they stay in the folder; the folder itself may be one.
 ///
 /// # Errors
-/// [`Error::Value`] as [`below`]; [`Error::File`] for a link that leads out of the folder, for a
-/// file that is not there, and for anything but a regular file, which may block or never end.
+/// [`Error::Value`] as in [`below`]; [`Error::File`] for a link that leads out of the folder, for a
+/// missing file, and for anything but a regular file, which may block or never end.
 pub fn inside(folder: impl AsRef<Path>, file: impl AsRef<Path>) -> Result<PathBuf> {
     found_inside(folder.as_ref(), file.as_ref()).map(|(path, _)| path)
 }
 
-/// Length of a file below a folder that a document names.
+/// Length of the file in a folder that a document names.
 ///
 /// # Errors
-/// As [`inside`].
+/// Like [`inside`].
 pub(crate) fn length_inside(folder: impl AsRef<Path>, file: impl AsRef<Path>) -> Result<u64> {
     found_inside(folder.as_ref(), file.as_ref()).map(|(_, meta)| meta.len())
 }
@@ -62,7 +62,7 @@ fn leads_out(path: PathBuf, folder: &Path) -> Error {
     Error::file(path, what)
 }
 
-/// What a file is; none where one of the steps to it from the folder is a link.
+/// Metadata of a file; none if one of the steps to it from the folder is a link.
 fn without_links(folder: &Path, file: &Path) -> std::io::Result<Option<Metadata>> {
     let (mut path, mut last) = (folder.to_path_buf(), None);
     for step in file.components() {
@@ -76,7 +76,7 @@ fn without_links(folder: &Path, file: &Path) -> std::io::Result<Option<Metadata>
     Ok(last)
 }
 
-/// What a path with links leads to; none where that is outside of the folder.
+/// Metadata of the target of a path with links; none if it is outside the folder.
 fn through_links(folder: &Path, path: &Path) -> std::io::Result<Option<Metadata>> {
     let root = or_working_folder(folder).canonicalize()?;
     let target = path.canonicalize()?;
@@ -87,7 +87,7 @@ fn through_links(folder: &Path, path: &Path) -> std::io::Result<Option<Metadata>
     }
 }
 
-/// The empty path is the working folder.
+/// The folder; the working folder for an empty path.
 fn or_working_folder(folder: &Path) -> &Path {
     if folder.as_os_str().is_empty() {
         Path::new(".")
@@ -96,11 +96,11 @@ fn or_working_folder(folder: &Path) -> &Path {
     }
 }
 
-/// Refuses an output folder that holds symbolic links to folders, which would lead outside. The
+/// Rejects an output folder that contains symbolic links to folders, which would lead outside. The
 /// folder itself may be one.
 ///
 /// # Errors
-/// [`Error::File`] naming the link, or a folder that cannot be looked into.
+/// [`Error::File`] naming the link, or a folder that cannot be listed.
 pub(crate) fn refuse_links(folder: impl AsRef<Path>) -> Result<()> {
     let folder = folder.as_ref();
     entries(folder)?

@@ -1,12 +1,12 @@
-//! Names of files in lists and documents, which are text.
+//! File names in lists and documents, which are text.
 
 use crate::error::{Error, Result};
 use std::path::Path;
 
-/// A path as a list or a document names it.
+/// A path as text, for a list or a document.
 ///
 /// # Errors
-/// [`Error::File`] for one that is not UTF-8: with other letters it would be another file's.
+/// [`Error::File`] if it is not UTF-8: with replaced characters it would name another file.
 pub fn path_text(path: &Path) -> Result<&str> {
     path.to_str().ok_or_else(|| not_text(path))
 }
@@ -14,7 +14,7 @@ pub fn path_text(path: &Path) -> Result<&str> {
 /// The name of a file without folder and extension; the folders may have any names.
 ///
 /// # Errors
-/// As [`path_text`].
+/// Like [`path_text`].
 pub(crate) fn stem_text(path: &Path) -> Result<&str> {
     let stem = path.file_stem().unwrap_or_default();
     stem.to_str().ok_or_else(|| not_text(path))

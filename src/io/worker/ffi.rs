@@ -21,14 +21,14 @@ mod bridge {
         data_width: i64,
         data_height: i64,
         channels: Vec<String>,
-        /// Bytes of a sample as handed over: 1 and 2 are integers, or halves; 4 is float.
+        /// Bytes of a returned sample: 1 and 2 are integers, or halves; 4 is float.
         bytes: i32,
-        /// Reading: samples are halves. Writing: floats are to be stored as halves.
+        /// For reading: samples are halves. For writing: floats are to be stored as halves.
         half: bool,
-        /// Colours are multiplied by alpha; for writing.
+        /// Whether colours are premultiplied; for writing.
         premultiplied: bool,
-        /// What OpenImageIO makes of the file's colours; of a DPX of which it makes nothing, the
-        /// name of its transfer.
+        /// OpenImageIO's name for the colour space of the file; for a DPX without one, the name of
+        /// its transfer function.
         color_space: String,
     }
 
@@ -45,19 +45,19 @@ mod bridge {
 
         type Reader<'a>;
 
-        /// Sets what is set once for the whole process: one thread, no guessing of readers.
+        /// Applies process-wide settings: one thread, no guessing of readers.
         fn start() -> Result<()>;
         /// The version that the shim was compiled with.
         fn version() -> String;
         /// libheif, its version, and whether it has a decoder.
         fn heif_version() -> String;
-        /// Opens a file with the reader of a format, and no other: out of memory, or by its path
-        /// where the reader knows only files.
+        /// Opens a file with the reader of a format, and no other: from memory, or by its path if
+        /// the reader supports only files.
         fn open<'a>(path: &str, format: &str, bytes: &'a [u8]) -> Result<UniquePtr<Reader<'a>>>;
         /// The shape of the first picture in the file.
         fn layout(reader: &Reader<'_>) -> Result<Layout>;
-        /// Its samples, channels interleaved, native byte order; the buffer has to fit exactly, and
-        /// the layout is the file's.
+        /// Its samples, channels interleaved, native byte order; the buffer must have the exact
+        /// size, and the layout must be the file's.
         fn read(reader: &Reader<'_>, layout: &Layout, samples: &mut [u8]) -> Result<()>;
         /// Writes a picture with the writer of a format.
         fn write(
@@ -67,7 +67,7 @@ mod bridge {
             samples: &[u8],
             notes: &[Note],
         ) -> Result<()>;
-        /// Throws something that is no `std::exception`: proves that the border holds.
+        /// Throws something that is not a `std::exception`: proves that the boundary holds.
         fn throw_an_int() -> Result<()>;
     }
 }

@@ -1,4 +1,4 @@
-//! OpenImageIO and libheif, here and in processes of their own.
+//! OpenImageIO and libheif, in this process and in separate ones.
 
 mod ffi;
 pub(crate) mod openimageio;

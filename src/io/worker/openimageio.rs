@@ -1,4 +1,5 @@
-//! OpenImageIO and libheif in this process: shapes and samples of files in memory, and pictures to files.
+//! OpenImageIO and libheif in this process: shapes and samples of files in memory, and writing
+//! pictures.
 
 use super::ffi::{self, Layout};
 use super::protocol::{Request, Response, Shape};
@@ -16,7 +17,7 @@ use half::f16;
 use std::ops::Range;
 use std::sync::OnceLock;
 
-/// All libraries that it was built with, for people.
+/// All libraries that it was built with, for display.
 pub(crate) fn libraries() -> String {
     format!("OpenImageIO {}, {}", ffi::version(), ffi::heif_version())
 }
@@ -35,7 +36,7 @@ pub(crate) fn answer(
     }
 }
 
-/// Once for the process; what went wrong the first time is not tried again.
+/// Runs once per process; a failed start is not repeated.
 pub(crate) fn start() -> Result<(), Refusal> {
     static STARTED: OnceLock<Result<(), String>> = OnceLock::new();
     STARTED
@@ -50,8 +51,8 @@ pub(crate) fn shape(source: &SourceFile, limits: &Limits) -> Result<Shape, Refus
     Ok(layout.shape(&layout.channels))
 }
 
-/// Samples as the file has them, in the requested window; `prepare` gets their shape and the number
-/// of bytes that they take before they are read.
+/// Samples as stored in the file, in the requested window; `prepare` gets their shape and size in
+/// bytes before they are read.
 pub(crate) fn decode(
     source: &SourceFile,
     limits: &Limits,
@@ -64,14 +65,14 @@ pub(crate) fn decode(
         layout.show_data_window();
     }
     let mut picked = wanted.pick(&layout.channels)?;
-    // Grey is picked three times over for colour, but carried once.
+    // Grey is used three times for colour, but transferred once.
     picked.dedup();
     let shown = ShownChannels::new(&layout, picked, wanted);
     let (width, height) = (layout.width as usize, layout.height as usize);
     limits.check_memory(width, height, shown.names.len())?;
     let bytes = layout.larger_window_bytes(shown.names.len()) * working_copies(source.format);
     prepare(layout.shape(&shown.names), bytes)?;
-    // Not before: a worker has the memory for a picture only once it is prepared.
+    // Not earlier: a worker only has the memory for a picture once it is prepared.
     affordable(bytes)?;
     let samples = read_samples(source.format, &reader, &layout, &shown)?;
     let (samples, display_encoded) = interpret(samples, source.format, &layout.color_space)?;
@@ -85,8 +86,8 @@ pub(crate) fn decode(
     })
 }
 
-/// How many times the memory of a picture its decoder takes: libheif keeps what it converts from,
-/// and the curves of film scans make floats of bytes.
+/// How many times the memory of a picture its decoder needs: libheif keeps its source for the
+/// conversion, and the curves of film scans turn bytes into floats.
 fn working_copies(format: Format) -> u64 {
     match format {
         Format::Heif => 3,
@@ -100,7 +101,7 @@ fn open<'a>(
     limits: &Limits,
 ) -> Result<(UniquePtr<ffi::Reader<'a>>, Layout), Refusal> {
     start()?;
-    // Named in messages, and opened by the few readers that know only files.
+    // Used in messages, and opened by the few readers that support only files.
     let name = source.path.to_string_lossy();
     let refused = |e| refused(source.format, &e);
     let reader = ffi::open(&name, source.format.name(), &source.bytes).map_err(refused)?;
@@ -117,7 +118,7 @@ fn refused(format: Format, e: &cxx::Exception) -> Refusal {
 }
 
 impl Layout {
-    /// The shape of a picture of these channels, as far as it is known before they are decoded.
+    /// The shape of a picture with these channels, as far as known before decoding.
     fn shape(&self, names: &[String]) -> Shape {
         Shape {
             width: self.width as usize,
@@ -132,7 +133,7 @@ impl Layout {
         picked.iter().map(|&i| self.channels[i].clone()).collect()
     }
 
-    /// Nothing to cut, to pad or to leave out.
+    /// Whether nothing has to be cropped, padded or left out.
     fn is_shown_as_stored(&self, picked: &[usize]) -> bool {
         let data = (self.x, self.y, self.data_width, self.data_height);
         let shows_all = data == (0, 0, self.width, self.height);
@@ -152,7 +153,7 @@ impl Layout {
         Demand::new(size, channels, self.bytes.unsigned_abs(), file_bytes)
     }
 
-    /// Exchanges width and height where that makes them the known size.
+    /// Swaps width and height if that gives the known size.
     fn turn_to(&mut self, known: Option<[i64; 2]>) {
         if known == Some([self.height, self.width]) {
             [self.width, self.height] = [self.height, self.width];
@@ -169,19 +170,19 @@ impl Layout {
         }
     }
 
-    /// Makes the data window the one that is shown.
+    /// Makes the data window the visible one.
     fn show_data_window(&mut self) {
         (self.x, self.y) = (0, 0);
         (self.width, self.height) = (self.data_width, self.data_height);
     }
 
-    /// Samples of all channels in the data window.
+    /// Number of samples of all channels in the data window.
     fn data_samples(&self) -> usize {
         (self.data_width * self.data_height) as usize * self.channels.len()
     }
 
-    /// Bytes of all channels, or of those that are shown where they are more, in the larger of both
-    /// windows: one is cut or padded to the other.
+    /// Bytes of all channels, or of the visible ones if they are more, in the larger of the two
+    /// windows, since one is cropped or padded to the other.
     fn larger_window_bytes(&self, shown_channels: usize) -> u64 {
         let pixels = (self.data_width * self.data_height).max(self.width * self.height);
         let channels = self.channels.len().max(shown_channels) as u64;
@@ -204,14 +205,13 @@ impl Layout {
     }
 }
 
-/// The channels that a picture is shown with.
+/// The channels of a picture that are used.
 struct ShownChannels {
-    /// Indices of those that the file has.
+    /// Their indices in the file.
     picked: Vec<usize>,
-    /// Their names; those of colours without alpha that are not stored everywhere have one behind
-    /// them.
+    /// Their names; colours without alpha that are not stored everywhere have an alpha appended.
     names: Vec<String>,
-    /// Which are 1, and not 0, where nothing is stored.
+    /// Which of them are 1 instead of 0 where nothing is stored.
     ones: Vec<bool>,
 }
 
@@ -249,8 +249,8 @@ fn read_samples(
     })
 }
 
-/// The shown channels, cut or padded from the data window to the display window; `full` stands for
-/// 1.
+/// The used channels, cropped or padded from the data window to the display window; `full`
+/// represents 1.
 fn windowed<T: Copy + Default>(
     samples: Vec<T>,
     layout: &Layout,
@@ -271,7 +271,7 @@ fn windowed<T: Copy + Default>(
     for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {
         let pixel = &samples[layout.data_pixel(x, y) * stride..][..stride];
         let to = &mut out[(y * width + x) * count..][..count];
-        // An alpha that the file does not have is 1 where something is stored.
+        // An alpha that the file lacks is 1 where something is stored.
         to.fill(full);
         copy_picked(to, pixel, &shown.picked);
     }
@@ -286,8 +286,8 @@ fn copy_picked<T: Copy>(to: &mut [T], pixel: &[T], picked: &[usize]) {
 }
 
 /// Samples with their meaning, and whether they are display-encoded: the rule of [`io`](crate::io)
-/// for integers and floats, while film scans name the meaning of their codes themselves, in
-/// OpenImageIO's words.
+/// for integers and floats, whereas film scans declare the meaning of their codes themselves, in
+/// OpenImageIO's terms.
 fn interpret(samples: Samples, format: Format, space: &str) -> Result<(Samples, bool), Refusal> {
     let is_scan = matches!(format, Format::Dpx | Format::Cineon);
     let is_integer = !samples.are_float();
@@ -346,7 +346,7 @@ pub(crate) fn written_layout(
     }
 }
 
-/// Writes samples in native byte order.
+/// Writes samples given in native byte order.
 pub(crate) fn write_file(
     path: &str,
     format: Format,
@@ -363,8 +363,8 @@ pub(crate) fn write_file(
 mod tests {
     use super::*;
 
-    /// Channels, names joined, and samples of a picture of 2 x 1 pixels of which the first alone is
-    /// stored, each sample 7.
+    /// Channels, their names joined, and samples of a picture of 2 x 1 pixels of which only the
+    /// first is stored, each sample 7.
     fn padded(channels: &[&str], wanted: Wanted) -> (String, Vec<u8>) {
         let mut layout = written_layout((2, 1), channels, Bits::Eight);
         layout.data_width = 1;

@@ -1,9 +1,9 @@
-//! OpenImageIO and libheif in processes of their own: a file that crashes them ends such a process
-//! and is named, and programs that never meet such a file never load them.
+//! OpenImageIO and libheif in separate processes: a file that crashes them only ends such a process
+//! and is reported, and programs that never read such a file never load them.
 //!
-//! A worker lives as long as this program and answers one request at a time; there are as many as
-//! ever asked at once. One that dies is replaced and the file tried once more, one that takes too
-//! long is killed.
+//! A worker lives as long as this program and serves one request at a time; there are as many as
+//! were ever needed at once. One that dies is replaced and the file tried once more, one that takes
+//! too long is killed.
 
 use super::protocol::{
     Greeting, Request, Response, Shape, receive_line, receive_samples, receive_shape, send_request,
@@ -22,34 +22,35 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Name of the worker program, looked for beside the running one.
+/// Name of the worker program, which is searched next to the running one.
 const PROGRAM: &str = "petcomp-oiio-worker";
-/// Names the worker program where it lies elsewhere.
+/// Environment variable with the path of the worker program if it is elsewhere.
 const PROGRAM_VARIABLE: &str = "PETCOMP_OIIO_WORKER";
-/// What of the environment a worker sees: OpenImageIO and OpenColorIO take settings from the rest.
+/// The environment variables that a worker sees: OpenImageIO and OpenColorIO read settings from others.
 const ENVIRONMENT: [&str; 1] = ["LD_LIBRARY_PATH"];
 /// Time for loading 260 libraries on a busy machine.
 const START_TIMEOUT: Duration = Duration::from_secs(60);
-/// Pixels that earn a worker a further second.
+/// Number of pixels that give a worker one more second.
 const PIXELS_PER_SECOND: u64 = 10_000_000;
-/// How often a file is tried.
+/// How many times a file is tried.
 const MAX_ATTEMPTS: usize = 2;
-/// How often a worker is started that ends before it greets: it has seen no file yet, so none is to
-/// blame.
+/// How many times a worker is started if it ends before its greeting: it has not seen a file yet,
+/// so no file is to blame.
 const MAX_STARTS: usize = 3;
-/// A worker that closed its streams is ending, and is waited for so long before it is killed.
+/// How long to wait for a worker that closed its streams before it is killed.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
-/// A large pipe saves turns between the two processes; a larger one takes a privilege (`pipe(7)`).
+/// A large pipe saves switches between the two processes; an even larger one requires a privilege
+/// (`pipe(7)`).
 #[cfg(target_os = "linux")]
 const PIPE_BYTES: usize = 1 << 20;
 
-/// The workers of this program that have nothing to do.
+/// The idle workers of this program.
 static IDLE: WorkerPool = WorkerPool {
     idle: Mutex::new(Vec::new()),
 };
 
-/// A worker's response about a file. A strict request is sent to no worker that the system does not
-/// sandbox.
+/// A worker's response about a file. A strict request is never sent to a worker that the system
+/// does not sandbox.
 pub(crate) fn ask(
     source: &SourceFile,
     limits: &Limits,
@@ -62,10 +63,10 @@ pub(crate) fn ask(
     IDLE.ask(&program, source, limits, strict, request)
 }
 
-/// The libraries that the worker program links, as it reports itself.
+/// The libraries that the worker program links, as it reports them.
 ///
 /// # Errors
-/// [`Error::File`] where there is no worker program or it does not start.
+/// [`Error::File`] if there is no worker program or it does not start.
 pub fn worker_version() -> Result<String> {
     let program =
         find_program().ok_or_else(|| Error::file(PROGRAM, "not found next to this program"))?;
@@ -74,7 +75,7 @@ pub fn worker_version() -> Result<String> {
     Ok(worker.greeting.libraries.clone())
 }
 
-/// Beside the running program; one folder up serves test programs, which cargo puts below the
+/// Next to the running program; one folder up is for test programs, which cargo puts below the
 /// others.
 fn find_program() -> Option<PathBuf> {
     if let Some(named) = std::env::var_os(PROGRAM_VARIABLE) {
@@ -87,7 +88,7 @@ fn find_program() -> Option<PathBuf> {
     programs.find(|program| program.is_file())
 }
 
-/// Workers that wait for a request.
+/// Workers that are waiting for a request.
 struct WorkerPool {
     idle: Mutex<Vec<Worker>>,
 }
@@ -95,9 +96,9 @@ struct WorkerPool {
 /// Why a worker gave no response.
 #[derive(Debug)]
 enum WorkerFailure {
-    /// It ended, or its response was invalid: the next one may do better.
+    /// It ended, or its response was invalid: the next one may succeed.
     Died(String),
-    /// It, and so the file, had its time.
+    /// It exceeded the time limit, because of the file.
     TimedOut(Duration),
 }
 
@@ -129,8 +130,8 @@ impl WorkerPool {
         Err(format!("unreadable: {library} died on it {MAX_ATTEMPTS} times ({cause})").into())
     }
 
-    /// An idle one or a new one; the second attempt is for a worker that nothing has happened to
-    /// yet.
+    /// An idle worker or a new one; the second attempt gets a new one, which has seen no file
+    /// before.
     fn worker(
         &self,
         attempt: usize,
@@ -141,7 +142,7 @@ impl WorkerPool {
         idle.map_or_else(|| Worker::start(program, limits), Ok)
     }
 
-    /// One that was started with these limits.
+    /// A worker that was started with these limits.
     fn take(&self, limits: &Limits) -> Option<Worker> {
         let mut idle = self.idle();
         let at = idle.iter().rposition(|worker| worker.limits == *limits)?;
@@ -158,7 +159,7 @@ fn timed_out(library: &str, timeout: Duration) -> Refusal {
     format!("unreadable: {library} took longer than {seconds} s (Limits::seconds)").into()
 }
 
-/// A running worker program; killed when it is dropped.
+/// A running worker program, killed when dropped.
 struct Worker {
     child: Child,
     to: TimedStream,
@@ -169,7 +170,7 @@ struct Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // It may have already ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -192,7 +193,7 @@ impl Worker {
         Err(not_started(program, &cause))
     }
 
-    /// A process that has sent nothing yet.
+    /// Starts a process that has sent nothing yet.
     fn launch(program: &Path, limits: &Limits) -> std::io::Result<Self> {
         let (to, stdin) = UnixStream::pair()?;
         #[cfg(target_vendor = "apple")]
@@ -200,7 +201,7 @@ impl Worker {
         let mut child = spawn_program(program, limits, stdin.into())?;
         let stdout = child.stdout.take();
         let stdout = stdout.ok_or_else(|| std::io::Error::other("no pipe from it"))?;
-        // A smaller pipe is a slower one.
+        // With a smaller pipe it is only slower.
         #[cfg(target_os = "linux")]
         let _ = rustix::pipe::fcntl_setpipe_size(&stdout, PIPE_BYTES);
         Ok(Self {
@@ -288,12 +289,12 @@ impl Worker {
         }
     }
 
-    /// The signal that ended it, or what else went wrong. It does not run any more.
+    /// The signal that ended it, or what else went wrong. It is no longer running.
     fn cause_of_death(&mut self, e: &std::io::Error) -> String {
         let status = is_closed(e)
             .then(|| self.wait_for_exit(EXIT_TIMEOUT))
             .flatten();
-        // It may have ended by itself.
+        // It may have already ended.
         let _ = self.child.kill();
         match status {
             Some(status) => ending_of(status),
@@ -302,7 +303,7 @@ impl Worker {
         }
     }
 
-    /// How it ended, if it does so in time.
+    /// Its exit status, if it ends in time.
     fn wait_for_exit(&mut self, timeout: Duration) -> Option<ExitStatus> {
         let deadline = Instant::now() + timeout;
         loop {
@@ -342,7 +343,7 @@ fn not_started(program: &Path, how: &str) -> Refusal {
     format!("needs OpenImageIO, but {program} does not start: {how}").into()
 }
 
-/// The other end of a stream is gone.
+/// Whether the other end of a stream is gone.
 fn is_closed(e: &std::io::Error) -> bool {
     use ErrorKind::{BrokenPipe, ConnectionReset, UnexpectedEof};
     matches!(e.kind(), UnexpectedEof | BrokenPipe | ConnectionReset)
@@ -354,7 +355,7 @@ fn timeout_for_pixels(shape: &Shape) -> Duration {
     )
 }
 
-/// The sandbox that a worker could not have, once.
+/// Warns once about the missing parts of a worker's sandbox.
 fn warn_once(missing: &str) {
     static WARNED: Once = Once::new();
     WARNED.call_once(|| log::warn!("the OpenImageIO worker has no full sandbox: {missing}"));
@@ -369,9 +370,8 @@ mod tests {
     use crate::io::header::Window;
     use std::io::Write;
 
-    /// Written by a process of its own: a program that this one had open for writing cannot be
-    /// started while any other test's child, forked at that moment, still holds it open
-    /// (ETXTBSY).
+    /// Written by a separate process: a program that this process had open for writing cannot be
+    /// started while the child of another test, forked at that moment, still has it open (ETXTBSY).
     fn write_program(program: &Path, text: &str) {
         let mut shell = Command::new("/bin/sh");
         shell
@@ -394,12 +394,12 @@ mod tests {
         r#"","libraries":"none","missing":[]}'"#
     );
 
-    /// A worker that greets and then runs a shell script.
+    /// The result of a worker that sends a greeting and then runs a shell script.
     fn asked(script: &str, limits: &Limits) -> std::result::Result<Raster, String> {
         asked_of(&format!("{GREETING}\n{script}"), limits, false)
     }
 
-    /// A worker that is a shell script; `$n` counts how many were started in its folder.
+    /// The same for a worker that is a shell script; `$n` counts how many were started in its folder.
     fn asked_of(
         script: &str,
         limits: &Limits,
@@ -424,7 +424,7 @@ mod tests {
         }
     }
 
-    /// The answer of a program about a file of three bytes.
+    /// The response of a program about a file of three bytes.
     fn answer_of(
         program: &Path,
         limits: &Limits,
@@ -474,7 +474,7 @@ mod tests {
         assert!(e.contains("took longer than 0 s (Limits::seconds)"), "{e}");
     }
 
-    /// The first line is here together with the greeting, so that no time passes before it.
+    /// The first line arrives together with the greeting, so that no time passes before it.
     #[test]
     fn many_pixels_get_more_time_from_their_announcement_on() {
         let limits = Limits {

@@ -1,9 +1,9 @@
-//! What petcomp and its worker program send each other.
+//! The protocol between petcomp and its worker program.
 //!
 //! The worker is started with [`Limits`] as its argument and sends a greeting. A request is a line
-//! of JSON and the bytes of a file; a response is a line of JSON with the shape. Where pixels were
-//! requested, it is sent before they are decoded, and their own shape and the samples in native byte
-//! order follow. The side that asks trusts nothing: it checks every size itself.
+//! of JSON and the bytes of a file; a response is a line of JSON with the shape. If pixels were
+//! requested, it is sent before they are decoded, and their own shape and the samples in native
+//! byte order follow. The requesting side trusts nothing: it checks every size itself.
 
 use crate::io::codec::Wanted;
 use crate::io::codec::raster::{Raster, SampleKind, Samples};
@@ -16,26 +16,26 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, Error, ErrorKind, Read, Result, Write};
 
-/// No line is longer.
+/// Maximum length of a line.
 const LONGEST_LINE_BYTES: u64 = 64 << 10;
 
-/// What is asked about a file.
+/// What is requested about a file.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Request {
-    /// Its shape alone.
+    /// Only its shape.
     Header,
     /// These pixels.
     Pixels { wanted: Wanted, window: Window },
 }
 
-/// What OpenImageIO answers about a file, here or in a worker.
+/// OpenImageIO's response about a file, from this process or a worker.
 pub(crate) enum Response {
     Shape(Shape),
     Raster(Raster),
 }
 
-/// OpenImageIO linked into this program; [`in_process`](crate::io::oiio::in_process) makes it.
+/// OpenImageIO linked into this program, created by [`in_process`](crate::io::oiio::in_process).
 #[derive(Clone, Copy)]
 pub struct Linked(pub(in crate::io) LinkedAnswer);
 
@@ -50,11 +50,11 @@ impl std::fmt::Debug for Linked {
 /// The first line that a worker sends.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Greeting {
-    /// Version of the program it belongs to.
+    /// Version of the program that it belongs to.
     pub(super) petcomp: String,
     /// The libraries that it links, with their versions.
     pub(super) libraries: String,
-    /// Parts of the sandbox that the system could not give it.
+    /// Parts of the sandbox that the system could not provide.
     pub(super) missing: Vec<String>,
 }
 
@@ -72,7 +72,7 @@ pub(super) struct RequestHead {
 pub(super) enum ResponseHead {
     /// A picture that can be decoded, or one whose samples follow.
     Picture(Shape),
-    /// Why there is none.
+    /// Why there is no picture.
     Refused(String),
 }
 
@@ -87,7 +87,7 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    /// What a picture of this shape asks for.
+    /// The demand of a picture with this shape.
     fn demand(&self, file_bytes: u64) -> Demand {
         let size = [self.width as u64, self.height as u64];
         let channels = self.names.len() as u64;
@@ -107,7 +107,7 @@ impl From<&Raster> for Shape {
     }
 }
 
-/// Sends something as a line.
+/// Sends a value as a line of JSON.
 pub(super) fn send_line(to: &mut impl Write, what: &impl Serialize) -> Result<()> {
     let mut line = serde_json::to_vec(what)?;
     line.push(b'\n');
@@ -141,7 +141,7 @@ pub(super) fn send_request(
     to.flush()
 }
 
-/// Says what shape a picture has that is going to be decoded.
+/// Announces the shape of a picture that is about to be decoded.
 pub(super) fn send_shape(to: &mut impl Write, shape: Shape) -> Result<()> {
     send_line(to, &ResponseHead::Picture(shape))?;
     to.flush()
@@ -154,7 +154,7 @@ pub(super) fn send_raster(to: &mut impl Write, raster: &Raster) -> Result<()> {
     to.flush()
 }
 
-/// Receives a line of a response. A shape beyond the limits, which the worker knows too, is
+/// Receives a line of a response. A shape beyond the limits, which the worker also knows, is
 /// invalid.
 pub(crate) fn receive_shape(
     from: &mut impl BufRead,
@@ -171,7 +171,7 @@ pub(crate) fn receive_shape(
     Ok(Ok(shape))
 }
 
-/// Receives the samples of a shape that was checked.
+/// Receives the samples of a checked shape.
 pub(crate) fn receive_samples(from: &mut impl Read, shape: Shape) -> Result<Raster> {
     let count = shape.width * shape.height * shape.names.len();
     let mut samples = Samples::zeroed(shape.sample, count);

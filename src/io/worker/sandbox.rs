@@ -1,46 +1,46 @@
-//! What the worker program gives up before it looks at a file: it gets bytes and gives bytes, so it
-//! needs nothing else.
+//! What the worker program gives up before it processes a file: it receives and returns bytes, so
+//! it needs nothing else.
 //!
-//! Whatever of this the system cannot do is named, and the worker goes on with the rest.
+//! Anything that the system does not support is reported, and the worker continues with the rest.
 
 use crate::io::limits::Limits;
 use rustix::process::{Resource, Rlimit, setrlimit};
 
-/// Address space beyond what is mapped at the start and what a file may ask for: the decoders' own
+/// Address space beyond what is mapped at the start and what a file may demand: the decoders' own
 /// needs.
 const HEADROOM_BYTES: u64 = 256 << 20;
-/// Copies of a picture that exist at a time: in the decoder, as handed over, and cut to its window.
+/// Copies of a picture that exist at a time: in the decoder, as returned, and cropped to its window.
 const PICTURE_COPIES: u64 = 3;
-/// CPU time of one worker, seconds: an honest one is replaced after this, one that spins was killed
-/// long before.
+/// CPU time of one worker, seconds: a regular one is replaced after this, one in an endless loop
+/// was killed long before.
 const CPU_SECONDS: u64 = 600;
-/// Open files; it opens none itself.
+/// Maximum number of open files; it opens none itself.
 const MAX_OPEN_FILES: u64 = 64;
 
-/// Bounds on this process's memory, as tight as the current file allows.
+/// Limits on this process's memory, as tight as the current file allows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MemoryLimit {
-    /// Mapped when the program had loaded its libraries.
+    /// Mapped after the program had loaded its libraries.
     at_start: u64,
     most: u64,
 }
 
 impl MemoryLimit {
-    /// Fixes what may never be exceeded under these limits.
+    /// Fixes the maximum for these limits.
     pub(super) fn new(limits: &Limits) -> Self {
         let at_start = mapped_bytes().unwrap_or(ASSUMED_MAPPED_BYTES);
         let most = needed_bytes(at_start, limits.file_bytes, limits.decoded_bytes);
         Self { at_start, most }
     }
 
-    /// Allows the memory for a file of this size and this many decoded bytes.
+    /// Allows the memory for a file of this size with this many decoded bytes.
     pub(super) fn allow(&self, file_bytes: u64, decoded_bytes: u64) {
         let current = needed_bytes(self.at_start, file_bytes, decoded_bytes).min(self.most);
         limit_resource(Resource::As, current, self.most);
     }
 }
 
-/// Address space of a worker that had mapped some at its start, for a file.
+/// Address space that a worker needs for a file, given what it had mapped at its start.
 fn needed_bytes(at_start: u64, file_bytes: u64, decoded_bytes: u64) -> u64 {
     let pictures = decoded_bytes.saturating_mul(PICTURE_COPIES);
     [HEADROOM_BYTES, pictures, file_bytes]
@@ -48,10 +48,10 @@ fn needed_bytes(at_start: u64, file_bytes: u64, decoded_bytes: u64) -> u64 {
         .fold(at_start, u64::saturating_add)
 }
 
-/// Where the system does not report it: what OpenImageIO 2.4 maps on Debian 12.
+/// Used if the system does not report it: what OpenImageIO 2.4 maps on Debian 12.
 const ASSUMED_MAPPED_BYTES: u64 = 768 << 20;
 
-/// Address space in use, by the system's account of it.
+/// Address space in use, as reported by the system.
 fn mapped_bytes() -> Option<u64> {
     let pages: u64 = std::fs::read_to_string("/proc/self/statm")
         .ok()?
@@ -63,8 +63,8 @@ fn mapped_bytes() -> Option<u64> {
 }
 
 fn limit_resource(resource: Resource, current: u64, maximum: u64) {
-    // Lowering one's own limits is always allowed; a system without one of them has no such danger
-    // either.
+    // Lowering its own limits is always allowed for a process; a system without one of them does
+    // not have the corresponding risk either.
     let _ = setrlimit(
         resource,
         Rlimit {
@@ -74,8 +74,8 @@ fn limit_resource(resource: Resource, current: u64, maximum: u64) {
     );
 }
 
-/// Gives up everything but memory, the streams that are open, and some CPU time. Returns what the
-/// system could not do.
+/// Gives up everything except memory, the open streams, and some CPU time. Returns what the system
+/// does not support.
 pub(super) fn enter_sandbox(limits: &Limits) -> (MemoryLimit, Vec<String>) {
     let memory = MemoryLimit::new(limits);
     memory.allow(0, 0);
@@ -117,10 +117,10 @@ mod linux {
         Ok(rustix::thread::set_no_new_privs(true)?)
     }
 
-    /// No file or folder may be opened, no socket connected, no other process signalled: a rule set
-    /// without a rule.
+    /// Forbids opening files and folders, connecting sockets and signalling other processes: a rule
+    /// set without rules.
     fn forbid_files() -> Outcome {
-        // What a kernel does not know of this is left out.
+        // Features that the kernel does not support are left out.
         let abi = ABI::V6;
         let rules = Ruleset::default()
             .handle_access(AccessFs::from_all(abi))?
@@ -132,10 +132,10 @@ mod linux {
         }
     }
 
-    /// What a decoder that opens nothing calls: its own memory, its streams, the clock, and its
-    /// end. And what a thread calls before its first line (`rseq`, `set_robust_list`): libraries
-    /// start theirs when they are loaded, and on a busy machine those have not run yet when the
-    /// filter falls; the C library ends the process where `rseq` is refused.
+    /// The calls of a decoder that opens nothing: for its own memory, its streams, the clock, and
+    /// its exit. Also those that a thread makes before its first line (`rseq`, `set_robust_list`):
+    /// libraries start their threads when they are loaded, and on a busy machine these may not have
+    /// run yet when the filter takes effect; the C library ends the process if `rseq` is refused.
     const ALLOWED_CALLS: [i64; 36] = [
         libc::SYS_read,
         libc::SYS_readv,
@@ -179,10 +179,10 @@ mod linux {
         allow_only(call_rules()?)
     }
 
-    /// Every other call fails with EPERM, among them all that open, execute, connect, trace and
+    /// Every other call fails with EPERM, including all that open, execute, connect, trace and
     /// start.
     fn allow_only(rules: BTreeMap<i64, Vec<SeccompRule>>) -> Outcome {
-        // The strictest word of both filters holds: `clone3` is unknown.
+        // The stricter of the two filters applies: `clone3` is unknown.
         apply_filter(
             BTreeMap::from([(libc::SYS_clone3, Vec::new())]),
             SeccompAction::Allow,
@@ -203,20 +203,20 @@ mod linux {
         let arch = std::env::consts::ARCH.try_into()?;
         let filter = SeccompFilter::new(rules, otherwise, matched, arch)?;
         let program: BpfProgram = filter.try_into()?;
-        // OpenImageIO's libraries have started threads of their own by now.
+        // OpenImageIO's libraries have already started threads.
         Ok(seccompiler::apply_filter_all_threads(&program)?)
     }
 
     fn call_rules() -> Result<BTreeMap<i64, Vec<SeccompRule>>, seccompiler::BackendError> {
         let allowed = ALLOWED_CALLS.into_iter();
         let mut rules: BTreeMap<_, _> = allowed.map(|call| (call, Vec::new())).collect();
-        // Its own limits, and a signal to itself (abort), are its own business.
+        // Its own limits, and a signal to itself (abort), are allowed.
         let own = first_argument_is(std::process::id().into())?;
         rules.insert(libc::SYS_prlimit64, vec![first_argument_is(0)?]);
         rules.insert(libc::SYS_tgkill, vec![own]);
-        // The decoder of HEIC starts a thread for each tile. What makes a thread and no process is
-        // among the flags of `clone`, where a filter sees it; of `clone3` it does not, and the C
-        // library takes the former where the latter is unknown.
+        // The HEIC decoder starts a thread for each tile. For `clone` a filter can see the flags
+        // that make it a thread rather than a process; for `clone3` it cannot, and the C library
+        // falls back to `clone` if `clone3` is unknown.
         rules.insert(libc::SYS_clone3, Vec::new());
         rules.insert(
             libc::SYS_clone,
@@ -247,12 +247,12 @@ mod linux {
         use super::*;
         use std::process::Command;
 
-        /// What [`threads_start_and_processes_do_not`] runs in a process of its own.
+        /// Run by [`threads_start_and_processes_do_not`] in a separate process.
         #[test]
         #[ignore = "gives up what other tests need"]
         fn restricted() {
-            // Programs may be run, and Landlock, which would refuse their files, is left out: what
-            // is refused is a process to run them in.
+            // Programs may be run, and Landlock, which would refuse their files, is left out: only
+            // a process to run them in is refused.
             let mut rules = call_rules().unwrap();
             rules.insert(libc::SYS_execve, Vec::new());
             set_no_new_privileges().unwrap();

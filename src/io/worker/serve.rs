@@ -1,4 +1,4 @@
-//! The worker program: responds to requests about files until there are no more.
+//! The worker program: responds to requests about files until there are none left.
 
 use super::openimageio;
 use super::protocol::{
@@ -17,7 +17,7 @@ use std::io::{BufRead, BufReader, Error, Read, Result, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// The whole of the worker program; its argument is the [`Limits`] as JSON.
+/// The entire worker program; its argument is the [`Limits`] as JSON.
 pub fn serve(mut arguments: impl Iterator<Item = OsString>) -> ExitCode {
     let argument = arguments.next().unwrap_or_default();
     let Ok(limits) = serde_json::from_str(&argument.to_string_lossy()) else {
@@ -36,7 +36,7 @@ pub fn serve(mut arguments: impl Iterator<Item = OsString>) -> ExitCode {
 
 fn respond_to_all(limits: Limits, from: &mut impl BufRead, to: &mut impl Write) -> Result<()> {
     openimageio::start().map_err(|e| Error::other(e.to_string()))?;
-    // Asked while files can be opened.
+    // Queried while files can still be opened.
     machine_bytes();
     let (memory, missing) = enter_sandbox(&limits);
     greet(missing, to)?;
@@ -58,7 +58,7 @@ fn greet(missing: Vec<String>, to: &mut impl Write) -> Result<()> {
     to.flush()
 }
 
-/// What holds for every request.
+/// The state shared by all requests.
 struct Responder {
     limits: Limits,
     memory: MemoryLimit,
@@ -105,7 +105,7 @@ impl Responder {
         }
     }
 
-    /// The pixels, in as much memory as they need; their shape is sent first.
+    /// Decodes the pixels, with as much memory as they need; their shape is sent first.
     fn decode(
         &self,
         source: &SourceFile,

@@ -1,4 +1,4 @@
-//! Pipes and sockets that are waited for until a deadline.
+//! Pipes and sockets with a deadline.
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
@@ -8,17 +8,17 @@ use std::io::{Error, ErrorKind, Read, Result, Write};
 use std::os::fd::{AsFd, OwnedFd};
 use std::time::Instant;
 
-/// No SIGPIPE where nobody reads any more; on Apple's systems the socket has that option.
+/// No SIGPIPE if nobody reads any more; on Apple's systems this is a socket option.
 #[cfg(not(target_vendor = "apple"))]
 const SEND_FLAGS: SendFlags = SendFlags::NOSIGNAL;
 #[cfg(target_vendor = "apple")]
 const SEND_FLAGS: SendFlags = SendFlags::empty();
 
-/// One end of a pipe that is read, or of a socket that is written. Both fail with
-/// [`ErrorKind::TimedOut`] past the deadline.
+/// The reading end of a pipe, or the writing end of a socket. Both fail with
+/// [`ErrorKind::TimedOut`] after the deadline.
 ///
-/// What is written to a pipe that nobody reads any more ends the process where it did not ask for
-/// anything else (SIGPIPE), as a program in C; what is sent to a socket need not.
+/// Writing to a pipe that nobody reads any more ends a process that does not handle SIGPIPE, such
+/// as a program in C; sending to a socket need not.
 pub(super) struct TimedStream {
     file: File,
     pub(super) deadline: Instant,
@@ -43,7 +43,7 @@ impl TimedStream {
         }
     }
 
-    /// Does it as soon as it can be done.
+    /// Acts as soon as that is possible.
     fn when_ready<T>(&self, what: PollFlags, mut act: impl FnMut(&File) -> Result<T>) -> Result<T> {
         loop {
             match act(&self.file) {

@@ -1,17 +1,17 @@
-//! Attributes of an EXR's headers, as bytes and as texts.
+//! Attributes of an EXR's headers, as bytes and as text.
 
 use exr::meta::attribute::AttributeValue;
 use exr::prelude::{LayerAttributes, Text};
 
-/// Start of the first attribute: behind the magic number and the version.
+/// Start of the first attribute: after the magic number and the version.
 pub(super) const FIRST_ATTRIBUTE: usize = 8;
 
-/// A text as OpenEXR's own library takes it: UTF-8, where the `exr` crate would write Latin-1.
+/// A text as expected by OpenEXR's own library: UTF-8, where the `exr` crate would write Latin-1.
 pub(super) fn utf8_text(text: &str) -> Text {
     Text::from_slice_unchecked(text.as_bytes())
 }
 
-/// What a text of a file says: Latin-1 where it is not UTF-8.
+/// Decodes a text of a file: as Latin-1 if it is not UTF-8.
 pub(super) fn string_of(text: &Text) -> String {
     let utf8 = std::str::from_utf8(text.as_slice());
     utf8.map_or_else(|_| text.to_string(), str::to_owned)
@@ -25,20 +25,20 @@ pub(super) fn add_texts(attributes: &mut LayerAttributes, metadata: &[(String, S
     }
 }
 
-/// An attribute among the bytes of a file: name, kind, length and value.
+/// An attribute in the bytes of a file: name, type, length and value.
 pub(super) struct RawAttribute<'a> {
-    /// With the zero behind it.
+    /// With the terminating zero.
     pub(super) name: &'a [u8],
-    /// With the zero behind it.
+    /// With the terminating zero.
     pub(super) kind: &'a [u8],
     /// Start of the value in the file.
     pub(super) value: usize,
-    /// End of the value in the file, which may be shorter.
+    /// End of the value, which may be beyond the end of the file.
     pub(super) end: usize,
 }
 
 impl<'a> RawAttribute<'a> {
-    /// The one that starts at a byte; none where the file ends before its value.
+    /// The attribute that starts at a byte; none if the file ends before its value.
     pub(super) fn read(file: &'a [u8], at: usize) -> Option<Self> {
         let kind = end_of_text(file, at)?;
         let length = end_of_text(file, kind)?;
@@ -53,14 +53,14 @@ impl<'a> RawAttribute<'a> {
     }
 }
 
-/// The byte behind the zero that ends a text.
+/// The position after the zero that ends a text.
 pub(super) fn end_of_text(file: &[u8], at: usize) -> Option<usize> {
     Some(at + file.get(at..)?.iter().position(|&b| b == 0)? + 1)
 }
 
-/// Puts the attributes of the header that starts at `start` in the order of their names, as
-/// OpenEXR's own library does: the `exr` crate keeps them in a hash map, whose order differs from
-/// run to run. Returns where they end.
+/// Sorts the attributes of the header that starts at `start` by name, as OpenEXR's own library
+/// does: the `exr` crate keeps them in a hash map, whose order differs from run to run. Returns the
+/// position after them.
 pub(super) fn sort_attributes(file: &mut [u8], start: usize) -> Option<usize> {
     let mut attributes = Vec::new();
     let mut at = start;

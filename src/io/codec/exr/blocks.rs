@@ -1,4 +1,4 @@
-//! The samples of an EXR part, block by block: only those of the channels that are wanted are kept.
+//! The samples of an EXR part, read block by block; only those of the wanted channels are kept.
 
 use super::chroma::Sampling;
 use super::samples::{SampleLine, to_floats};
@@ -13,27 +13,27 @@ use exr::prelude::{IntegerBounds, Vec2};
 use rayon::prelude::*;
 use std::io::Cursor;
 
-/// Decoded bytes that are in memory at a time, in blocks, beside what is kept of them.
+/// Decoded bytes in memory at a time, in blocks, in addition to the samples that are kept.
 const BATCH_BYTES: usize = 16 << 20;
 
-/// How samples of several channels lie in memory.
+/// Memory order of the samples of several channels.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum SampleOrder {
-    /// All of a pixel side by side.
+    /// All channels of a pixel together.
     Interleaved,
-    /// One channel behind the other.
+    /// One channel after the other.
     Planar,
 }
 
-/// The part of a file that is read, and what of it.
+/// The part of a file to read, and the region and channels.
 pub(super) struct PartReader<'a> {
     /// The whole file.
     pub(super) bytes: &'a [u8],
     pub(super) meta: &'a MetaData,
     pub(super) part: usize,
-    /// Indices of channels in the part, each once.
+    /// Indices of the part's channels, without duplicates.
     pub(super) picked: &'a [usize],
-    /// The pixels that come out: what the part has of them, zeros elsewhere.
+    /// The window to return: the part's pixels inside it, zeros elsewhere.
     pub(super) window: IntegerBounds,
     pub(super) order: SampleOrder,
     /// Channels with fewer samples than pixels.
@@ -45,7 +45,7 @@ impl PartReader<'_> {
         &self.meta.headers[self.part]
     }
 
-    /// The samples, halves and integers as floats.
+    /// Reads the samples; halves and integers become floats.
     pub(super) fn read(&self) -> Result<Vec<f32>, Refusal> {
         let mut out = SampleBuffer::new(self);
         let largest = Vec2(0, 0);
@@ -66,7 +66,7 @@ impl PartReader<'_> {
         Ok(out.finish(self.sampling))
     }
 
-    /// Blocks that are decoded at a time.
+    /// Blocks decoded at a time.
     fn batch_blocks(&self) -> usize {
         let block_bytes = self.header().max_block_byte_size().max(1);
         (BATCH_BYTES / block_bytes).max(rayon::current_num_threads())
@@ -85,7 +85,7 @@ impl PartReader<'_> {
             return Ok(DecodedBlock::Lines(lines));
         }
         let block = UncompressedBlock::decompress_chunk(chunk, self.meta, false)?;
-        // The table of blocks may lie.
+        // The table of blocks may be wrong.
         if block.index.layer != self.part || block.index.level != Vec2(0, 0) {
             return Err("damaged EXR: a block of another part".into());
         }
@@ -98,13 +98,13 @@ pub(super) fn offset(to: Vec2<i32>, from: Vec2<i32>) -> [i64; 2] {
     [(to.x(), from.x()), (to.y(), from.y())].map(|(to, from)| i64::from(to) - i64::from(from))
 }
 
-/// What came out of a piece of the file.
+/// The decoded content of a block.
 enum DecodedBlock {
     Pixels(UncompressedBlock),
     Lines(Vec<SampleLine>),
 }
 
-/// The pixels that come out.
+/// The pixels to return.
 struct SampleBuffer<'a> {
     picked: &'a [usize],
     width: usize,
@@ -112,7 +112,7 @@ struct SampleBuffer<'a> {
     /// Column and row of the part's first pixel.
     left: i64,
     top: i64,
-    /// Rows of the part.
+    /// Number of rows of the part.
     rows: usize,
     order: SampleOrder,
     samples: Vec<f32>,
@@ -157,7 +157,7 @@ impl<'a> SampleBuffer<'a> {
         }
     }
 
-    /// All samples, those between rows made from them.
+    /// All samples; rows between stored samples are interpolated.
     fn finish(mut self, sampling: Option<&Sampling>) -> Vec<f32> {
         if let Some(sampling) = sampling {
             self.interpolate_rows(sampling);
@@ -165,7 +165,7 @@ impl<'a> SampleBuffer<'a> {
         self.samples
     }
 
-    /// A run of samples of a channel, cut to the window.
+    /// Stores a run of samples of a channel, clipped to the window.
     fn put(&mut self, channel: usize, [x, y]: [usize; 2], samples: &[f32]) {
         let Some(slot) = self.picked.iter().position(|&c| c == channel) else {
             return;
@@ -179,14 +179,14 @@ impl<'a> SampleBuffer<'a> {
         }
     }
 
-    /// Samples of a channel from a pixel of the window on.
+    /// Stores samples of a channel, starting at a pixel of the window.
     fn put_run(&mut self, slot: usize, [x, y]: [usize; 2], samples: &[f32]) {
         let (at, step) = self.row_offset(slot, y);
         let out = self.samples[at + x * step..].iter_mut().step_by(step);
         out.zip(samples).for_each(|(to, &from)| *to = from);
     }
 
-    /// Where the samples of a row begin, and how far apart they are.
+    /// Start and stride of the samples of a row.
     fn row_offset(&self, slot: usize, row: usize) -> (usize, usize) {
         let n = self.picked.len();
         match self.order {
@@ -195,8 +195,7 @@ impl<'a> SampleBuffer<'a> {
         }
     }
 
-    /// Rows that lie between samples, interpolated linearly from one to the next; the last is
-    /// repeated.
+    /// Linearly interpolates the rows between stored samples; the last stored row is repeated.
     fn interpolate_rows(&mut self, sampling: &Sampling) {
         let stored = overlap(self.top, self.rows, self.height);
         for (slot, &channel) in self.picked.iter().enumerate() {
@@ -211,7 +210,7 @@ impl<'a> SampleBuffer<'a> {
         }
     }
 
-    /// Makes the row in the middle of three.
+    /// Interpolates the middle one of three rows.
     fn interpolate_row(&mut self, slot: usize, rows: [usize; 3]) {
         let share = (rows[1] - rows[0]) as f32 / (rows[2] - rows[0]) as f32;
         let [(before, step), (row, _), (next, _)] = rows.map(|row| self.row_offset(slot, row));

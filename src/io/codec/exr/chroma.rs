@@ -1,11 +1,10 @@
-//! EXR channels with fewer samples than pixels: colour of half the size beside luminance (`Y`,
-//! `RY`, `BY`).
+//! EXR channels with fewer samples than pixels: luminance with subsampled chroma (`Y`, `RY`, `BY`).
 //!
 //! # Method
 //! OpenEXR's technical introduction, "Luminance/Chroma Images": `RY = (R - Y) / Y`, `BY = (B - Y) /
-//! Y`, and `Y` is the sum of the colours by the weights of their primaries. Samples of colour lie
-//! on the first of the pixels they stand for; between them it is interpolated linearly, where
-//! OpenEXR has a longer filter.
+//! Y`, and `Y` is the sum of the colours weighted by the luminance of their primaries. Chroma
+//! samples are located at the first of the pixels that they cover; between them chroma is
+//! interpolated linearly, where OpenEXR uses a longer filter.
 
 use super::attributes::{FIRST_ATTRIBUTE, RawAttribute, end_of_text};
 use super::samples::{SampleLine, to_floats};
@@ -16,23 +15,22 @@ use exr::meta::header::Header;
 use exr::prelude::{Compression, IntegerBounds, Vec2};
 use std::ops::Range;
 
-/// Names of luminance and the two differences.
+/// Names of luminance and the two chroma channels.
 pub(super) const LUMINANCE_CHROMA: [&str; 3] = ["Y", "RY", "BY"];
-/// Pixels for a sample, along each axis, at the most.
+/// Maximum number of pixels per sample, along each axis.
 const MAX_SAMPLING: u32 = 4;
-/// The sampling of a channel with a sample for each pixel, as bytes.
+/// The sampling of a channel with one sample per pixel, as bytes.
 const FULL_SAMPLING: [u8; 8] = [1, 0, 0, 0, 1, 0, 0, 0];
-/// Bytes between the name of a channel and its sampling: the kind of its samples, a flag, and three
-/// that mean nothing.
+/// Bytes between the name of a channel and its sampling: the sample type, a flag, and three
+/// reserved bytes.
 const BEFORE_SAMPLING: usize = 4 + 1 + 3;
 
-/// Pixels for a sample of each channel, along x and y.
+/// Pixels per sample of each channel, along x and y.
 pub(super) struct Sampling(Vec<[usize; 2]>);
 
 impl Sampling {
-    /// The sampling of a file's first part, and the file as if it had a sample for each pixel,
-    /// which the decoder can take in. None for a file that has one, or that is not what it
-    /// should be.
+    /// The sampling of a file's first part, and the file modified to declare one sample per pixel,
+    /// which the decoder accepts. None for a file that already has one per pixel, or is malformed.
     pub(super) fn find(file: &[u8]) -> Option<(Self, Vec<u8>)> {
         let offsets = sampling_offsets(file)?;
         let pairs = offsets
@@ -49,7 +47,7 @@ impl Sampling {
         Some((Self(pairs), even))
     }
 
-    /// Whether the part is one that is read: rows, with a window that every sampling divides.
+    /// Checks that the part is supported: scan lines, with a window divisible by every sampling.
     pub(super) fn check(&self, header: &Header) -> Result<(), Refusal> {
         let divides = self.0.iter().all(|&pair| divides(pair, header));
         match header.blocks {
@@ -58,12 +56,12 @@ impl Sampling {
         }
     }
 
-    /// Rows of pixels for a sample of a channel.
+    /// Rows of pixels per sample of a channel.
     pub(super) fn rows(&self, channel: usize) -> usize {
         self.0[channel][1]
     }
 
-    /// The samples of a block of rows, enlarged along x; rows that lie between samples repeat those
+    /// The samples of a block of rows, enlarged along x; rows between stored samples repeat the one
     /// before them.
     pub(super) fn decode_lines(
         &self,
@@ -80,7 +78,7 @@ impl Sampling {
         self.split_lines(header, &lines, &data)
     }
 
-    /// The lines that a block of rows has, in the order of the file.
+    /// The stored lines in a block of rows, in file order.
     fn stored_lines(&self, header: &Header, rows: Range<usize>) -> Vec<StoredLine> {
         let mut lines = Vec::new();
         for y in rows {
@@ -98,7 +96,7 @@ impl Sampling {
         lines
     }
 
-    /// The bytes of a block, which the decoder takes as pixels of equally many bytes each.
+    /// Decompresses a block; the decoder treats it as pixels with equally many bytes each.
     fn decompress(
         &self,
         header: &Header,
@@ -117,7 +115,7 @@ impl Sampling {
         let section = IntegerBounds::new(Vec2(0, rows.start as i32), Vec2(width, rows.len()));
         let data = block.compressed_pixels_le;
         let compression = header.compression;
-        // What would not become smaller is stored as it is.
+        // A block that does not compress is stored uncompressed.
         if data.len() != bytes {
             check_decodable(compression)?;
         }
@@ -134,7 +132,7 @@ impl Sampling {
         declared
     }
 
-    /// The lines out of the bytes of a block, each repeated for the rows that it stands for.
+    /// Splits the bytes of a block into lines, each repeated for the rows that it covers.
     fn split_lines(
         &self,
         header: &Header,
@@ -152,7 +150,7 @@ impl Sampling {
         Ok(out)
     }
 
-    /// A stored line, enlarged, for each of the rows that it stands for.
+    /// A stored line, enlarged, once for each row that it covers.
     fn repeated_line(
         &self,
         header: &Header,
@@ -173,7 +171,7 @@ impl Sampling {
     }
 }
 
-/// Refuses B44, whose decoder panics at channels with fewer samples than pixels.
+/// Rejects B44, whose decoder panics on channels with fewer samples than pixels.
 fn check_decodable(compression: Compression) -> Result<(), Refusal> {
     let name = match compression {
         Compression::B44 => "B44",
@@ -193,7 +191,7 @@ struct StoredLine {
     bytes: usize,
 }
 
-/// Whether a sampling divides position and size of a part.
+/// Whether a sampling divides the position and size of a part.
 fn divides([x, y]: [usize; 2], header: &Header) -> bool {
     let (at, size) = (header.own_attributes.layer_position, header.layer_size);
     at.x().rem_euclid(x as i32) == 0
@@ -202,7 +200,7 @@ fn divides([x, y]: [usize; 2], header: &Header) -> bool {
         && size.y() % y == 0
 }
 
-/// Rows of the part that a block holds.
+/// The rows of the part in a block.
 fn block_rows(header: &Header, block: &CompressedScanLineBlock) -> Result<Range<usize>, Refusal> {
     let top = i64::from(block.y_coordinate) - i64::from(header.own_attributes.layer_position.y());
     let height = header.layer_size.y();
@@ -213,7 +211,7 @@ fn block_rows(header: &Header, block: &CompressedScanLineBlock) -> Result<Range<
     }
 }
 
-/// `n` values for each, interpolated linearly to the next; the last is repeated.
+/// `n` values per sample, linearly interpolated to the next one; the last is repeated.
 fn enlarged(samples: &[f32], n: usize) -> Vec<f32> {
     let next = samples.iter().skip(1).chain(samples.last());
     samples
@@ -223,7 +221,7 @@ fn enlarged(samples: &[f32], n: usize) -> Vec<f32> {
         .collect()
 }
 
-/// Offsets of the sampling of each channel of the first part.
+/// Byte offsets of the samplings of the first part's channels.
 fn sampling_offsets(file: &[u8]) -> Option<Vec<usize>> {
     let mut at = FIRST_ATTRIBUTE;
     while *file.get(at)? != 0 {
@@ -236,7 +234,7 @@ fn sampling_offsets(file: &[u8]) -> Option<Vec<usize>> {
     None
 }
 
-/// The same in the list of channels: each has a name, some bytes, and its sampling.
+/// The same within the channel list: each channel has a name, some bytes, and its sampling.
 fn offsets_in_list(file: &[u8], mut at: usize) -> Option<Vec<usize>> {
     let mut offsets = Vec::new();
     while *file.get(at)? != 0 {
@@ -247,14 +245,14 @@ fn offsets_in_list(file: &[u8], mut at: usize) -> Option<Vec<usize>> {
     Some(offsets)
 }
 
-/// Pixels for a sample; none for a number that no file has.
+/// Pixels per sample; none for an implausible number.
 fn read_sampling(file: &[u8], at: usize) -> Option<usize> {
     let n = u32::from_le_bytes(*file.get(at..)?.first_chunk()?);
     (1..=MAX_SAMPLING).contains(&n).then_some(n as usize)
 }
 
-/// Turns luminance and differences, the first three of `n` interleaved channels, into red, green
-/// and blue of a space.
+/// Converts luminance and chroma, the first three of `n` interleaved channels, to red, green and
+/// blue of a colour space.
 pub(super) fn to_rgb(samples: &mut [f32], n: usize, space: &RgbSpace) {
     let weights = xyz_from_rgb(space);
     let [wr, wg, wb] = [0, 1, 2].map(|c| weights[(1, c)] as f32);

@@ -1,7 +1,7 @@
 //! OpenEXR: scene-linear half or float in named channels, premultiplied alpha, text attributes.
 //!
-//! The header is read and checked first: the decoder allocates what a header asks for, and an
-//! allocation that fails cannot be caught.
+//! The header is read and checked first: the decoder allocates as much as a header declares, and a
+//! failed allocation cannot be caught.
 
 mod attributes;
 mod blocks;

@@ -1,4 +1,4 @@
-//! EXR files of several parts: pictures of one size, each with channels of its own.
+//! Multi-part EXR files: pictures of one size, each with its own channels.
 
 use super::attributes::{FIRST_ATTRIBUTE, add_texts, sort_attributes, utf8_text};
 use super::write::channel_list;
@@ -11,12 +11,11 @@ use std::io::Cursor;
 /// A part of an EXR file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// Its name, different from every other part's.
+    /// Its name, which must be unique.
     pub name: String,
-    /// Channels, in any order; each has as many samples as the picture has pixels, row by row from
-    /// the top.
+    /// Channels, in any order; each has one sample per pixel, row by row from the top.
     pub channels: Vec<(String, ChannelSamples)>,
-    /// Texts to store with it, by name.
+    /// Text attributes to store with it, by name.
     pub metadata: Vec<(String, String)>,
 }
 
@@ -38,8 +37,8 @@ impl ChannelSamples {
     }
 }
 
-/// A whole file of parts of one size (width, height), losslessly compressed; the same parts give
-/// the same bytes.
+/// A complete file with parts of one size (width, height), losslessly compressed; the same parts
+/// give the same bytes.
 pub(crate) fn encode_parts(size: (usize, usize), parts: &[Part]) -> Result<Vec<u8>, String> {
     check_parts(size, parts)?;
     let layers = parts.iter().map(|part| part_layer(size, part));
@@ -54,7 +53,7 @@ pub(crate) fn encode_parts(size: (usize, usize), parts: &[Part]) -> Result<Vec<u
     Ok(bytes)
 }
 
-/// At least one part with at least one pixel, and no name twice.
+/// Checks that there is at least one part and one pixel, and that names are unique.
 fn check_parts((width, height): (usize, usize), parts: &[Part]) -> Result<(), String> {
     if parts.is_empty() || width == 0 || height == 0 {
         return Err(format!(
@@ -83,12 +82,12 @@ fn part_layer(
     Ok(Layer::new(size, attributes, encoding, channels))
 }
 
-/// The byte of the version that holds the kind of file, and its bit for several parts.
+/// The byte of the version field with the file type flags, and the multi-part flag.
 const FLAGS_BYTE: usize = 5;
 const SEVERAL_PARTS_FLAG: u8 = 0x10;
 
-/// Puts the attributes of every header in the order of their names. One header ends with a zero,
-/// the list of several with another.
+/// Sorts the attributes of every header by name. A header ends with a zero, and the list of headers
+/// of a multi-part file with another one.
 fn sort_headers(bytes: &mut [u8]) -> Option<()> {
     let mut at = FIRST_ATTRIBUTE;
     while *bytes.get(at)? != 0 {

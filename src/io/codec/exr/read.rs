@@ -31,12 +31,12 @@ impl From<exr::error::Error> for Refusal {
     }
 }
 
-/// A channel of an EXR file by its full name, cropped or padded to the display window.
+/// A channel of an EXR file under its full name, cropped or padded to the display window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
     /// `R`, `diffuse.G`, `Z`, ...
     pub name: String,
-    /// Samples row by row from the top, as many as the picture has pixels.
+    /// Samples row by row from the top, one per pixel.
     pub samples: Vec<f32>,
 }
 
@@ -61,7 +61,7 @@ pub(crate) fn channels(
     Ok(((width, height), channels.collect()))
 }
 
-/// A file whose headers were checked.
+/// A file with checked headers.
 struct CheckedFile<'a> {
     bytes: Cow<'a, [u8]>,
     meta: MetaData,
@@ -90,7 +90,7 @@ impl<'a> CheckedFile<'a> {
         picked.iter().map(|&i| string_of(&list[i].name)).collect()
     }
 
-    /// What all parts are shown in.
+    /// The display window of all parts.
     fn window(&self) -> IntegerBounds {
         self.meta.headers[0].shared_attributes.display_window
     }
@@ -113,7 +113,7 @@ impl<'a> CheckedFile<'a> {
         ]
     }
 
-    /// The primaries that are named, or ours.
+    /// The primaries in the file, or Rec. 709.
     fn space(&self) -> RgbSpace {
         self.meta.headers[0]
             .shared_attributes
@@ -142,7 +142,7 @@ impl<'a> CheckedFile<'a> {
     }
 }
 
-/// The parts whose pixels have one sample for each channel.
+/// The parts with one sample per pixel and channel (not deep).
 fn flat_parts(meta: &MetaData) -> impl Iterator<Item = usize> {
     let parts = meta.headers.iter().enumerate();
     parts
@@ -150,8 +150,8 @@ fn flat_parts(meta: &MetaData) -> impl Iterator<Item = usize> {
         .map(|(part, _)| part)
 }
 
-/// The part that has the wanted channels under the best names, of colours the finished picture
-/// first, and their indices, each once.
+/// The part whose wanted channels have the best names, for colours preferably the finished picture,
+/// and their indices without duplicates.
 fn best_part(meta: &MetaData, wanted: Wanted) -> Result<(usize, Vec<usize>), Refusal> {
     let choices = flat_parts(meta).map(|part| {
         let names = listed_names(&meta.headers[part].channels);
@@ -167,18 +167,18 @@ fn best_part(meta: &MetaData, wanted: Wanted) -> Result<(usize, Vec<usize>), Ref
     Ok((part, picked))
 }
 
-/// The part's own name says that it is the finished picture.
+/// Whether the part's name identifies it as the finished picture.
 fn is_finished_part(header: &exr::meta::header::Header) -> bool {
     is_finished(&part_name(header))
 }
 
-/// A part's own name; empty where it has none.
+/// A part's name; empty if it has none.
 fn part_name(header: &exr::meta::header::Header) -> String {
     let name = header.own_attributes.layer_name.as_ref();
     name.map(string_of).unwrap_or_default()
 }
 
-/// Parts without the channels come last: their error is given where no part has them.
+/// Parts without the channels come last: their error is returned if no part has the channels.
 fn rank_of(choice: &Result<Choice, String>) -> (bool, Option<ChannelMatch>) {
     match choice {
         Ok((quality, _)) => (false, Some(*quality)),
@@ -210,8 +210,8 @@ fn window_size(window: IntegerBounds) -> (usize, usize) {
     (window.size.x(), window.size.y())
 }
 
-/// The headers alone, checked against the limits: data and display window of every part, and their
-/// sum.
+/// The headers alone, checked against the limits: the data and display window of every part, and
+/// their sum.
 fn read_meta(file: impl Read, file_bytes: u64, limits: &Limits) -> Result<MetaData, Refusal> {
     let meta = read_limited_meta(file, file_bytes, limits)?;
     at_most(meta.headers.len() as u64, limits.parts, "parts", "parts")?;
@@ -228,7 +228,7 @@ fn read_meta(file: impl Read, file_bytes: u64, limits: &Limits) -> Result<MetaDa
     Ok(meta)
 }
 
-/// The headers, read from no more bytes than metadata may have.
+/// The headers, read from at most as many bytes as the metadata limit allows.
 fn read_limited_meta(
     file: impl Read,
     file_bytes: u64,
@@ -242,7 +242,7 @@ fn read_limited_meta(
     Ok(meta?)
 }
 
-/// Decoded bytes of a part within the limits.
+/// Decoded bytes of a part, checked against the limits.
 fn checked_part_bytes(
     header: &exr::meta::header::Header,
     file_bytes: u64,
@@ -266,10 +266,10 @@ fn checked_part_bytes(
     Ok(header.layer_size.area() as u64 * bytes_per_pixel)
 }
 
-/// Bytes of a sample as it is kept.
+/// Bytes of a sample in memory.
 const FLOAT_BYTES: u64 = 4;
 
-/// More than the attributes take of a file whose channels have fewer samples than pixels.
+/// More than the attributes take in a file whose channels have fewer samples than pixels.
 const FIRST_BYTES: u64 = 1 << 16;
 
 pub(crate) fn header(
@@ -298,7 +298,7 @@ pub(crate) fn header(
     })
 }
 
-/// The names of several parts, one of them before the others.
+/// The names of the parts of a multi-part file, starting with that of part `before`.
 fn names_of_several(meta: &MetaData, before: usize) -> Vec<String> {
     let mut names: Vec<String> = match &meta.headers[..] {
         [_] => Vec::new(),
@@ -310,7 +310,7 @@ fn names_of_several(meta: &MetaData, before: usize) -> Vec<String> {
     names
 }
 
-/// The first bytes, as if every channel had a sample for each pixel.
+/// The first bytes, modified to declare one sample per pixel for every channel.
 fn read_start(file: &mut impl Read) -> Result<Vec<u8>, Refusal> {
     let mut start = Vec::new();
     let read = file.take(FIRST_BYTES).read_to_end(&mut start);
@@ -323,7 +323,7 @@ fn listed_names(channels: &ChannelList) -> Vec<String> {
     list.map(|channel| string_of(&channel.name)).collect()
 }
 
-/// Bytes of the largest kind of sample.
+/// Bytes of the largest sample type.
 fn widest_sample(channels: &ChannelList) -> usize {
     let list = channels.list.iter();
     let bytes = list.map(|channel| channel.sample_type.bytes_per_sample());
@@ -344,7 +344,7 @@ fn canvas(header: &exr::meta::header::Header) -> Canvas {
     }
 }
 
-/// Files with an aspect that cannot be written have square pixels.
+/// A file whose pixel aspect cannot be written is treated as having square pixels.
 fn writable_aspect(aspect: f32) -> f32 {
     if (1e-6..=1e6).contains(&aspect) {
         aspect
@@ -383,7 +383,7 @@ fn text_attributes(header: &exr::meta::header::Header) -> Notes {
     notes
 }
 
-/// The wanted channels of the part that has them under the best names.
+/// The wanted channels of the part in which they have the best names.
 pub(crate) fn decode(
     bytes: &[u8],
     limits: &Limits,
@@ -427,7 +427,7 @@ pub(crate) fn decode(
     })
 }
 
-/// Makes the channels that are to be `ones` 1 outside the stored columns and rows.
+/// Sets the channels marked in `ones` to 1 outside the stored columns and rows.
 fn fill_empty(
     samples: &mut [f32],
     ones: &[bool],
@@ -442,7 +442,7 @@ fn fill_empty(
     }
 }
 
-/// Puts an alpha behind the samples of each pixel: 1 in the stored columns and rows, 0 elsewhere.
+/// Appends an alpha to the samples of each pixel: 1 in the stored columns and rows, 0 elsewhere.
 fn add_alpha(
     samples: &[f32],
     channels: usize,
@@ -458,8 +458,7 @@ fn add_alpha(
     out
 }
 
-/// Luminance with its differences where there are those, and what is chosen of other channels
-/// elsewhere.
+/// Luminance and chroma if present, otherwise the channels that `wanted` chooses.
 fn choose_channels(wanted: Wanted, names: &[String]) -> Result<Choice, String> {
     match (wanted, luminance_chroma(names)) {
         (Wanted::Color | Wanted::Film, Some(picked)) => Ok((ChannelMatch::Named, picked)),
@@ -467,7 +466,7 @@ fn choose_channels(wanted: Wanted, names: &[String]) -> Result<Choice, String> {
     }
 }
 
-/// Luminance, its differences, and alpha if present.
+/// Luminance, chroma, and alpha if present.
 fn luminance_chroma(names: &[String]) -> Option<Vec<usize>> {
     let [y, ry, by] = LUMINANCE_CHROMA.map(|name| index_of(names, name));
     let alpha = index_of(names, "A");
@@ -478,7 +477,7 @@ fn index_of(names: &[String], name: &str) -> Option<usize> {
     names.iter().position(|other| other == name)
 }
 
-/// Makes the first three channels red, green and blue of Rec. 709.
+/// Converts the first three channels to red, green and blue of Rec. 709.
 fn convert_colors(
     samples: &mut [f32],
     names: &mut Vec<String>,
@@ -682,7 +681,7 @@ mod tests {
 
     type FilePart = Layer<AnyChannels<FlatSamples>>;
 
-    /// A part of one value, stored in so many pixels from the first of the display window on.
+    /// A part with a single value, stored in this many pixels from the first of the display window on.
     fn part(name: &str, channels: &[&str], (width, height): (usize, usize)) -> FilePart {
         let plane = || FlatSamples::F32(vec![0.5; width * height]);
         let planes = channels.iter().map(|&name| AnyChannel::new(name, plane()));
@@ -723,7 +722,7 @@ mod tests {
         assert_eq!(grey, ("Y A".into(), vec![half, 1.0, 0.0, 0.0]));
         let layer = read(&["d.R", "d.G", "d.B"], (1, 1), display);
         assert!(layer.0.ends_with("d.A"), "{}", layer.0);
-        // Nothing is missing, or alpha is there, or no other channel is.
+        // Either nothing is missing, or there is already an alpha, or no other channel.
         assert_eq!(read(&["R", "G", "B"], (2, 1), display).1, [half; 6]);
         assert_eq!(read(&["R", "G", "B"], (1, 1), data).1, [half; 3]);
         assert_eq!(read(&["Y", "A"], (1, 1), display).1, [half, half, 0.0, 0.0]);

@@ -13,7 +13,8 @@ pub(super) struct SampleLine {
     pub(super) samples: Vec<f32>,
 }
 
-/// Native bytes of samples as floats. Halves all at once: one by one takes five times as long.
+/// Converts native bytes of samples to floats. Halves are converted together: one by one takes five
+/// times as long.
 pub(super) fn to_floats(bytes: &[u8], kind: SampleType, floats: &mut Vec<f32>) {
     match kind {
         SampleType::F16 => {
@@ -30,8 +31,8 @@ pub(super) fn to_floats(bytes: &[u8], kind: SampleType, floats: &mut Vec<f32>) {
     }
 }
 
-/// Floats to be stored as halves, rounded to nearest; what is finite stays so, 65504 at most:
-/// programs blur and scale what they read, and one infinite pixel would take its neighbours along.
+/// Floats for storage as halves, rounded to nearest; finite values stay finite, at most 65504:
+/// programs blur and scale what they read, and one infinite pixel would spoil its neighbours.
 pub(crate) fn half_samples(samples: &[f32]) -> FlatSamples {
     let mut out = vec![f16::ZERO; samples.len()];
     out.as_mut_slice().convert_from_f32_slice(samples);

@@ -1,4 +1,4 @@
-//! EXR files of one part.
+//! Single-part EXR files.
 
 use super::attributes::{FIRST_ATTRIBUTE, add_texts, sort_attributes, utf8_text};
 use crate::io::header::Canvas;
@@ -9,10 +9,10 @@ use exr::prelude::{
 };
 use std::io::Cursor;
 
-/// How an EXR is compressed; all of them lossless.
+/// Compression of an EXR; all kinds are lossless.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compression {
-    /// Not at all.
+    /// Uncompressed.
     None,
     /// Deflate over 16 rows: small for rendered pictures.
     #[default]
@@ -31,7 +31,7 @@ impl Compression {
     }
 }
 
-/// A whole file; the same input gives the same bytes.
+/// A complete file; the same input gives the same bytes.
 pub(crate) fn encode(
     size: (usize, usize),
     canvas: Canvas,
@@ -64,7 +64,7 @@ pub(crate) fn encode(
     Ok(bytes)
 }
 
-/// Channels by name; fails where there is not one sample for each pixel.
+/// Channels by name; fails unless there is one sample per pixel.
 pub(super) fn channel_list<'a>(
     (width, height): (usize, usize),
     planes: impl IntoIterator<Item = (&'a str, FlatSamples)>,
