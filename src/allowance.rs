@@ -8,23 +8,23 @@ use crate::error::{Error, Result};
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A flag that nobody raises.
+/// A flag that is never set.
 static NEVER_STOPPED: AtomicBool = AtomicBool::new(false);
 
-/// What is left of the work that one picture may take, and a flag that ends it.
+/// The work left for one picture, and a flag that stops it.
 ///
-/// Work is counted, not timed: whether a picture is refused must not depend on the machine.
+/// Work is counted, not timed: whether a picture is rejected must not depend on the machine.
 #[derive(Debug)]
 pub struct Allowance<'a> {
     most: u64,
     left: Cell<u64>,
-    /// Attempts that took all of their time.
+    /// Attempts that ran out of time.
     timed_out: Cell<u32>,
     stop: &'a AtomicBool,
 }
 
 impl Allowance<'static> {
-    /// So much work.
+    /// An allowance of this much work.
     pub fn new(most: u64) -> Self {
         Self {
             most,
@@ -36,12 +36,12 @@ impl Allowance<'static> {
 }
 
 impl<'a> Allowance<'a> {
-    /// The same, ended by a flag that turns true.
+    /// The same, stopped when the flag becomes true.
     pub fn stopped_by(self, stop: &'a AtomicBool) -> Self {
         Self { stop, ..self }
     }
 
-    /// Takes some work from what is left.
+    /// Subtracts some work from what is left.
     ///
     /// # Errors
     /// [`Error::Interrupted`] once the flag is true; [`Error::Unsettled`] where less is left.
@@ -56,10 +56,10 @@ impl<'a> Allowance<'a> {
         left.map(|_| ()).ok_or_else(|| self.spent())
     }
 
-    /// Fails where more work is sure to come than is left.
+    /// Fails if the work still to come certainly exceeds what is left.
     ///
     /// # Errors
-    /// [`Error::Unsettled`], and nothing is left.
+    /// [`Error::Unsettled`]; nothing is left then.
     pub(crate) fn check(&self, work: f64) -> Result<()> {
         if work <= self.left.get() as f64 {
             return Ok(());
@@ -68,12 +68,12 @@ impl<'a> Allowance<'a> {
         Err(self.spent())
     }
 
-    /// How much was taken.
+    /// How much work was done.
     pub fn taken(&self) -> u64 {
         self.most - self.left.get()
     }
 
-    /// Counts an attempt that took all of its time.
+    /// Counts an attempt that ran out of time.
     pub(crate) fn add_timed_out(&self) {
         self.timed_out.set(self.timed_out.get() + 1);
     }
@@ -83,7 +83,7 @@ impl<'a> Allowance<'a> {
         self.left.get() == 0
     }
 
-    /// The error of a picture that takes too much.
+    /// The error for a picture that needs too much work.
     pub(crate) fn spent(&self) -> Error {
         let what = format!(
             "no rest within the work of one picture, {} (settle.most_work): expected fewer objects, a larger surface or \
@@ -94,7 +94,7 @@ impl<'a> Allowance<'a> {
         Error::Unsettled { what }
     }
 
-    /// The rest of a message, where time was what attempts lacked.
+    /// The rest of a message where attempts ran out of time.
     fn told_timed_out(&self) -> String {
         match self.timed_out.get() {
             0 => String::new(),

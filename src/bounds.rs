@@ -1,4 +1,4 @@
-//! Which numbers a setting may have, and why no others.
+//! Which numbers a setting may have, and why.
 
 use crate::error::{Error, Result};
 
@@ -19,35 +19,35 @@ pub(crate) const WIDTH: Bounds = Bounds::metres(1e-4, 5.0, "objects are 5 mm to 
 pub(crate) const THICKNESS: Bounds = Bounds::metres(1e-5, 1.0, "from a film to a box");
 /// Mass of an object, kilograms.
 pub(crate) const MASS: Bounds = Bounds::new(1e-6, 1e6, "kilograms");
-/// Pixels of a photo for a metre: of objects of such lengths that fill some of it.
+/// Pixels of a photo per metre: for objects of such lengths that fill part of it.
 pub(crate) const PX_PER_METRE: Bounds = Bounds::new(1.0, 1e7, "pixels for a metre");
 /// Side of the surface that objects lie on, metres.
 pub(crate) const SURFACE: Bounds = Bounds::metres(0.01, 50.0, "objects of 5 mm to 5 m lie on it");
 /// Height of walls over the surface, metres.
 pub(crate) const WALL_HEIGHT: Bounds = Bounds::metres(0.0, 50.0, "0 is a table without walls");
-/// How far they lean.
+/// How far the walls lean.
 pub(crate) const SLOPE: Bounds = Bounds::new(0.0, 80.0, "degrees from upright, outwards");
 /// Share of the light that a surface reflects.
 pub(crate) const ALBEDO: Bounds = Bounds::new(0.001, 1.0, "a share of the light");
 /// Distance of a camera from the surface's centre, metres.
 pub(crate) const CAMERA: Bounds = Bounds::metres(0.001, 50.0, "farther off no object is seen");
-/// What a picture shows with fewer pixels has no outline to be labelled.
+/// Anything smaller in the picture has no outline to label.
 pub(crate) const LEAST_OBJECT_PX: f64 = 8.0;
 
-/// Longest side of a picture that is made, pixels: what shadows and coverage are tested to.
+/// Longest side of a generated picture, pixels: the limit up to which shadows and coverage are tested.
 pub(crate) const LONGEST_SIDE_PX: u32 = 16_384;
-/// Most pixels of a picture that is made: a thread takes about 100 bytes for each.
+/// Maximum number of pixels of a generated picture: a thread needs about 100 bytes for each.
 pub(crate) const MOST_PIXELS: u64 = 64 << 20;
 
 /// Millimetres and centimetres in a metre, with their names.
 const SMALLER_UNITS: [(f64, &str); 2] = [(1000.0, "millimetre"), (100.0, "centimetre")];
-/// From so many on a length that should be in metres is more likely in millimetres than in
-/// centimetres.
+/// A length given instead of metres is more likely in millimetres than in centimetres from this
+/// value on.
 const MIN_LIKELY_MILLIMETRES: f64 = 100.0;
 
 impl Bounds {
-    /// From `lowest` to `highest`; `why` ends a message, and may be empty where the range is the
-    /// quantity's own.
+    /// From `lowest` to `highest`; `why` ends a message, and may be empty where the range is
+    /// inherent in the quantity.
     pub(crate) const fn new(lowest: f64, highest: f64, why: &'static str) -> Self {
         Self {
             lowest,
@@ -57,7 +57,8 @@ impl Bounds {
         }
     }
 
-    /// Lengths, metres: a value that would do in millimetres or centimetres is asked about.
+    /// Lengths, metres: if a value would be valid in millimetres or centimetres, the message asks
+    /// about the unit.
     pub(crate) const fn metres(lowest: f64, highest: f64, why: &'static str) -> Self {
         Self {
             lowest,
@@ -67,13 +68,13 @@ impl Bounds {
         }
     }
 
-    /// The number is one of them; NaN is not.
+    /// Whether the number is within the bounds; NaN is not.
     pub(crate) fn contains(&self, value: f64) -> bool {
         (self.lowest..=self.highest).contains(&value)
     }
 
     /// # Errors
-    /// [`Error::Value`] for a number that is none of them.
+    /// [`Error::Value`] for a number out of bounds.
     pub(crate) fn check(&self, at: &str, value: f64) -> Result<()> {
         if self.contains(value) {
             return Ok(());
@@ -81,12 +82,12 @@ impl Bounds {
         Err(Error::value(at, self.refusal(value)))
     }
 
-    /// What is said of a number that is none of them.
+    /// The message for a number out of bounds.
     pub(crate) fn refusal(&self, value: f64) -> String {
         format!("{}, expected {self}{}", number(value), self.question(value))
     }
 
-    /// Asks about the unit where another one would make sense of a length.
+    /// Asks about the unit where a length would be valid in another one.
     pub(crate) fn question(&self, value: f64) -> String {
         match self.unit_meant(value) {
             Some(unit) if !self.unit.is_empty() => format!("; is it in {unit}s?"),
@@ -127,7 +128,7 @@ impl std::fmt::Display for Bounds {
     }
 }
 
-/// A number above a limit, with one decimal: it is not told as the limit itself.
+/// A number above a limit, with one decimal, never printed as the limit itself.
 pub(crate) fn above(value: impl Into<f64>, limit: impl Into<f64>) -> String {
     let [value, limit]: [f64; 2] = [value.into(), limit.into()];
     format!("{:.1}", value.max(limit + 0.1))
@@ -138,19 +139,19 @@ pub(crate) fn below(value: f64, limit: f64) -> String {
     format!("{:.2}", value.min(limit - 0.01))
 }
 
-/// An offset to the right and down, as [`above`] tells it along each axis where it is more than a
+/// An offset to the right and down, printed as by [`above`] along each axis where it exceeds the
 /// limit.
 pub(crate) fn offset_above(offset: [f64; 2], limit: f64) -> String {
     let told = |v: f64| match v.abs() > limit {
         true => v.signum() * v.abs().max(limit + 0.1),
         false => v,
     };
-    // What rounds to 0 has no sign.
+    // A value that rounds to 0 has no sign.
     let [x, y] = offset.map(|v| (10.0 * told(v)).round() / 10.0 + 0.0);
     format!("({x:.1}, {y:.1})")
 }
 
-/// A number without hundreds of zeros.
+/// A number, with an exponent where it would otherwise have many zeros.
 pub(crate) fn number(value: f64) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-4..1e7).contains(&value.abs());
     if plain {

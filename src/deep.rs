@@ -11,47 +11,47 @@ use std::ops::Range;
 
 /// What one object contributes to one pixel, averaged over the pixel.
 ///
-/// `light` and `visible` are already attenuated by what lies in front, so a picture is their plain
-/// sum and a label can never disagree with it.
+/// `light` and `visible` are already attenuated by what is in front, so a picture is their plain
+/// sum and a label can never contradict it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DeepSample {
-    /// Whose it is.
+    /// The object.
     pub object: ObjectId,
-    /// Distance of the object at the pixel, metres along the optical axis; of a curved card that of
-    /// the flat one.
+    /// Distance of the object at the pixel, metres along the optical axis; for a curved card that
+    /// of the flat one.
     pub depth: Depth,
-    /// Light that reaches the eye from it: held out by what is in front, exposure applied.
+    /// Light that reaches the camera from it: held out by what is in front, exposure applied.
     pub light: LinearRgb,
     /// Its own coverage of the pixel, as if alone (amodal).
     pub alpha: f32,
-    /// The part of `alpha` that is seen through what lies in front.
+    /// The part of `alpha` that is seen through what is in front.
     pub visible: f32,
 }
 
-/// What of the place itself stands in front of objects in one pixel; the default is nothing.
+/// The part of the photographed place in front of objects in one pixel; the default is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HoldoutSample {
     /// Share of the pixel that it fills.
     pub coverage: Coverage,
-    /// How far away it is, metres along the optical axis: what is nearer is in front of it. 0 is in
+    /// Its distance, metres along the optical axis: nearer objects are in front of it. 0 is in
     /// front of everything.
     pub depth: Depth,
 }
 
 impl HoldoutSample {
-    /// Whether it hides anything of what is this far away.
+    /// Whether it hides anything of an object at this distance.
     #[inline]
     pub(crate) fn hides(&self, depth: f64) -> bool {
         self.coverage.0 > 0.0 && depth > f64::from(self.depth.0)
     }
 }
 
-/// What lies behind an object in a pixel, or by how much that is another one where it is displaced.
+/// The light from behind an object in a pixel, or how much it changes where it is displaced.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct SeenBehind {
-    /// All the light that comes from there.
+    /// All the light from there.
     pub(crate) light: LinearRgb,
-    /// The plate, of which objects and shadows have taken nothing yet.
+    /// The plate's part, before objects and shadows attenuate it.
     pub(crate) plate: LinearRgb,
 }
 
@@ -65,14 +65,15 @@ impl Mix for SeenBehind {
     }
 }
 
-/// A picture of deep samples, and what the shadows leave of the surface's light.
+/// A picture of deep samples, and the share of the surface's light that its shadows leave.
 ///
-/// Film hides another share in each channel: pictures with film have [`tints`](Self::tints) beside
-/// the samples, whose `alpha` and `visible` are then the mean over channels. Pictures without film
-/// have none and pay for none.
+/// Film hides a different share in each channel: pictures with film have [`tints`](Self::tints) in
+/// addition to the samples, whose `alpha` and `visible` are then the mean over channels. Pictures
+/// without film have none, at no cost.
 #[derive(Clone, Debug, Default)]
 pub struct DeepImage {
-    /// Squares of `1 << tile_bits` pixels a side, row by row; smaller ones at the picture's ends.
+    /// Squares of `1 << tile_bits` pixels a side, row by row; smaller ones at the right and bottom
+    /// ends.
     tiles: Vec<DeepTile>,
     tile_bits: u32,
     shadow: Image<LinearRgb>,
@@ -81,10 +82,10 @@ pub struct DeepImage {
 impl DeepImage {
     /// Assembles a picture from its pixels' samples, row by row, each front to back.
     ///
-    /// `shadow` has the picture's size: the factor on the plate, 1 where nothing is in the way.
+    /// `shadow` has the picture's size: the factor on the plate, 1 where nothing casts a shadow.
     ///
     /// # Panics
-    /// When there is not one list per pixel of `shadow`.
+    /// When the number of lists is not the number of pixels of `shadow`.
     pub fn from_pixels(
         shadow: Image<LinearRgb>,
         pixels: impl IntoIterator<Item = Vec<DeepSample>>,
@@ -103,7 +104,7 @@ impl DeepImage {
         }
     }
 
-    /// Puts a picture together from squares of `side` pixels, a power of two, row by row.
+    /// Assembles a picture from squares of `side` pixels, a power of two, row by row.
     ///
     /// `shadow` has the picture's size.
     ///
@@ -124,13 +125,12 @@ impl DeepImage {
         }
     }
 
-    /// The same picture with what each sample hides, channel by channel: `visible`, of which that
-    /// is the mean.
+    /// The same picture with what each sample hides in each channel; `visible` is their mean.
     ///
-    /// In the order of the samples, pixel by pixel; none at all for a picture without film.
+    /// One per sample, in the order of the samples, pixel by pixel; empty for a picture without film.
     ///
     /// # Panics
-    /// When there is neither none nor one for each sample.
+    /// When `tints` is neither empty nor one per sample.
     pub fn with_tints(mut self, tints: Vec<LinearRgb>) -> Self {
         let count: usize = self.tiles.iter().map(|tile| tile.samples.len()).sum();
         assert!(
@@ -140,7 +140,7 @@ impl DeepImage {
         for tile in &mut self.tiles {
             tile.tints.clear();
         }
-        // Row by row is the order of each tile too.
+        // Row by row is also the order within each tile.
         let mut tints = tints.into_iter();
         for y in 0..self.height() {
             for x in 0..self.width() {
@@ -177,7 +177,7 @@ impl DeepImage {
             .map(|(x, tile, range)| (x, &tile.samples[range]))
     }
 
-    /// The same pixels, and all that objects do to each, as [`flat`](Self::flat) says.
+    /// The same pixels with the combined effect of all objects on each, as in [`flat`](Self::flat).
     pub(crate) fn row_films(&self, y: usize) -> impl Iterator<Item = (usize, Film)> {
         self.row_places(y).map(|(x, tile, range)| {
             let tints = tile.tints.get(range.clone()).unwrap_or_default();
@@ -185,7 +185,7 @@ impl DeepImage {
         })
     }
 
-    /// The same pixels: the tile of each, and where its samples are there.
+    /// The same pixels: the tile of each, and the range of its samples there.
     fn row_places(&self, y: usize) -> impl Iterator<Item = (usize, &DeepTile, Range<usize>)> {
         let side = 1 << self.tile_bits;
         let across = self.width().div_ceil(side);
@@ -199,17 +199,17 @@ impl DeepImage {
         })
     }
 
-    /// What each sample of a pixel hides of what is behind, per channel, as far as it is itself
-    /// seen; empty where no object of the picture is film: every channel is the sample's
-    /// `visible` then.
+    /// What each sample of a pixel hides of the light from behind, per channel, as far as the
+    /// sample itself is visible; empty where no object of the picture is film: every channel is
+    /// then the sample's `visible`.
     #[inline(always)]
     pub fn tints(&self, x: usize, y: usize) -> &[LinearRgb] {
         let (tile, range) = self.place(x, y);
         self.tiles[tile].tints.get(range).unwrap_or_default()
     }
 
-    /// The samples of a pixel, and what each hides of what is behind, per channel, as far as it is
-    /// itself seen.
+    /// The samples of a pixel, and what each hides of the light from behind, per channel, as far as
+    /// the sample itself is visible.
     pub(crate) fn hiding(
         &self,
         x: usize,
@@ -219,14 +219,14 @@ impl DeepImage {
         self.tiles[tile].hiding(range)
     }
 
-    /// All that the objects do to one pixel: their light, and what they hide of what is behind, per
-    /// channel.
+    /// The combined effect of all objects on one pixel: their light, and what they hide of the
+    /// light from behind, per channel.
     #[inline(always)]
     pub fn flat(&self, x: usize, y: usize) -> Film {
         flat_of(self.at(x, y), self.tints(x, y))
     }
 
-    /// The same of the objects that are in front of what of the place stands there.
+    /// The same for only the objects in front of the place's holdout sample.
     pub(crate) fn in_front(&self, x: usize, y: usize, place: &HoldoutSample) -> Film {
         let samples = self.at(x, y);
         let count = samples.partition_point(|s| !place.hides(s.depth.0.into()));
@@ -234,7 +234,7 @@ impl DeepImage {
         flat_of(&samples[..count], &tints[..count.min(tints.len())])
     }
 
-    /// The tile of a pixel, and where its samples are there.
+    /// The tile of a pixel, and the range of its samples there.
     #[inline(always)]
     fn place(&self, x: usize, y: usize) -> (usize, Range<usize>) {
         let side = 1 << self.tile_bits;
@@ -254,9 +254,9 @@ impl DeepImage {
         Self { shadow, ..self }
     }
 
-    /// The same picture behind what of the place stands in front: the objects are as they were
-    /// (`alpha`), less of them is seen, and the plate shows in their place, without the shadows of
-    /// what it hides.
+    /// The same picture with the holdout in front: `alpha` of the objects is unchanged, less of
+    /// them is visible, and the plate shows in their place, without the shadows on what the holdout
+    /// hides.
     ///
     /// # Panics
     /// When the sizes differ.
@@ -293,7 +293,7 @@ impl DeepImage {
                 }
             }
         }
-        // Past the place less of the plate shows than where it is in front of objects, and only
+        // Less of the plate shows past the holdout than where it is in front of objects, and only
         // what shows past it is in shadow.
         let share = ratio(free, self.flat(x, y).transmittance());
         let shadow = &mut self.shadow[(x, y)];
@@ -316,11 +316,11 @@ impl DeepImage {
         self.flat(x, y).over_color(behind)
     }
 
-    /// The same picture with more or less light from behind some objects: what `extra` says for an
-    /// object at a column and row, as far as the object and all in front of it let it pass. No more
-    /// is taken away than shows there, over this plate.
+    /// The same picture with more or less light from behind some objects: `extra` gives it for an
+    /// object at a column and row, attenuated by the object and all in front of it. No more is
+    /// subtracted than is visible there, over this plate.
     ///
-    /// What of it is the plate's is known from then on: [`displaced_plate`](Self::displaced_plate).
+    /// The plate's part of it is recorded for [`displaced_plate`](Self::displaced_plate).
     pub(crate) fn with_light_from_behind(
         mut self,
         plate: Option<&Image<LinearRgb>>,
@@ -337,8 +337,8 @@ impl DeepImage {
         self
     }
 
-    /// Adds light to the samples of a pixel, back to front: what is behind a sample has what samples
-    /// there have gained.
+    /// Adds light to the samples of a pixel, back to front: what a sample gains also counts as
+    /// light behind the samples in front of it.
     fn add_from_behind(
         &mut self,
         [x, y]: [usize; 2],
@@ -362,15 +362,15 @@ impl DeepImage {
         }
     }
 
-    /// What objects and their shadows leave of the plate at a pixel.
+    /// The share of the plate that objects and their shadows leave at a pixel.
     fn plate_share(&self, x: usize, y: usize) -> LinearRgb {
         self.flat(x, y).transmittance() * self.shadow[(x, y)]
     }
 
-    /// A plate as it is seen past the objects and through them: displaced where they bend light.
+    /// The plate as seen past the objects and through them: displaced where they bend light.
     ///
-    /// Under [`undisplaced`](Self::undisplaced) it gives the same picture as the plate gives under
-    /// this one.
+    /// Composed under [`undisplaced`](Self::undisplaced), it gives the same picture as `plate`
+    /// under this one.
     pub(crate) fn displaced_plate<'a>(
         &self,
         plate: &'a Image<LinearRgb>,
@@ -384,7 +384,7 @@ impl DeepImage {
         }))
     }
 
-    /// The same at a pixel.
+    /// The same for one pixel.
     pub(crate) fn displaced_plate_at(
         &self,
         x: usize,
@@ -401,10 +401,10 @@ impl DeepImage {
         seen.map(|v| v.max(0.0))
     }
 
-    /// The same picture without what of the plate is seen displaced; none where nothing is.
+    /// The same picture without displaced light of the plate; none where nothing is displaced.
     ///
-    /// What lens and shutter make of objects is made of this, since the plate is a photo and has
-    /// their blur already.
+    /// Lens and motion blur of objects are computed from this, since the plate is a photo and
+    /// already has its blur.
     pub(crate) fn undisplaced(&self) -> Option<Self> {
         self.displaces().then(|| {
             let mut straight = self.clone();
@@ -423,10 +423,10 @@ impl DeepImage {
     }
 }
 
-/// All that samples do to a pixel, with their tints where there are any.
+/// The combined effect of all samples on a pixel, with their tints if any.
 #[inline(always)]
 fn flat_of(samples: &[DeepSample], tints: &[LinearRgb]) -> Film {
-    // A sum of shares that make up a whole may miss it by a rounding.
+    // Rounding may push a sum of shares slightly above 1.
     let hidden = match tints {
         [] => LinearRgb::grey(samples.iter().map(|s| s.visible).sum()),
         tints => tints.iter().fold(LinearRgb::BLACK, |sum, &t| sum + t),
@@ -439,7 +439,7 @@ fn flat_of(samples: &[DeepSample], tints: &[LinearRgb]) -> Film {
     }
 }
 
-/// What is left per channel, and no less than nothing.
+/// What is left per channel, at least 0.
 pub(crate) fn less(all: LinearRgb, part: LinearRgb) -> LinearRgb {
     all.add_scaled(-1.0, part).map(|left| left.max(0.0))
 }
@@ -450,7 +450,7 @@ fn ratio(a: LinearRgb, b: LinearRgb) -> LinearRgb {
     LinearRgb::new(of(a.r, b.r), of(a.g, b.g), of(a.b, b.b))
 }
 
-/// A change of some light that leaves none of it negative.
+/// A change of some light, limited so that no channel becomes negative.
 fn at_least_none(light: LinearRgb, change: LinearRgb) -> LinearRgb {
     let left = (light + change).map(|left| left.max(0.0));
     left.add_scaled(-1.0, light)
@@ -462,7 +462,7 @@ mod tests {
 
     const SIZE: [usize; 2] = [5, 3];
 
-    /// As many samples as the remainder of its number by three, each with a depth of its own.
+    /// As many samples as the pixel's number modulo three, each with its own depth.
     fn samples_of(x: usize, y: usize) -> Vec<DeepSample> {
         let number = y * SIZE[0] + x;
         let sample = |k| DeepSample {
@@ -472,7 +472,7 @@ mod tests {
         (0..number % 3).map(sample).collect()
     }
 
-    /// The samples of a tile, those of its last pixel first.
+    /// The samples of a tile, starting with those of its last pixel.
     fn tile(columns: Range<usize>, y: usize) -> DeepTile {
         let width = columns.len();
         let pixels = columns.enumerate().rev();
@@ -552,7 +552,7 @@ mod tests {
         ];
         let straight = DeepImage::from_pixels(grey(shadow), [samples]);
         assert!(straight.undisplaced().is_none());
-        // Seen through the first object the plate is darker by 0.4, and so is all there by 0.2.
+        // Seen through the first object, the plate is darker by 0.4, and everything there by 0.2.
         let change = SeenBehind {
             light: LinearRgb::grey(-0.2),
             plate: LinearRgb::grey(-0.4),
@@ -591,7 +591,7 @@ mod tests {
 
     #[test]
     fn tints_find_their_samples_in_any_tile() {
-        // One row, so that tiles of four pixels are as high as it is.
+        // A single row, so that tiles of four pixels are as high as the picture.
         let row = Image::filled(SIZE[0], 1, LinearRgb::WHITE);
         let deep = DeepImage::from_tiles(row, 4, vec![tile(0..4, 0), tile(4..5, 0)]);
         let in_order = (0..SIZE[0]).flat_map(|x| samples_of(x, 0));

@@ -1,4 +1,4 @@
-//! What a stage noticed that a person should know: one shape for all of them, as compilers have it.
+//! What a stage noticed that a person should know: one form for all of them, as in compilers.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -9,7 +9,7 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Diagnostic {
-    /// What kind of thing it is.
+    /// The kind of problem.
     pub code: Code,
     /// How much it matters.
     pub severity: Severity,
@@ -45,7 +45,7 @@ impl Diagnostic {
         Self::new(code, Severity::Error, message)
     }
 
-    /// One of this severity.
+    /// One with the given severity.
     pub fn new(code: Code, severity: Severity, message: impl fmt::Display) -> Self {
         let message = message.to_string();
         Self {
@@ -55,20 +55,20 @@ impl Diagnostic {
         }
     }
 
-    /// A person should look at what it is about.
+    /// Whether a person should look at what it concerns.
     pub fn needs_review(&self) -> bool {
         self.severity > Severity::Note
     }
 }
 
-/// The message alone, as it stands behind the name of a file.
+/// The message alone, to follow the name of a file.
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message)
     }
 }
 
-/// Declares [`Code`] as a table: a name in Rust, the name in files, what it means.
+/// Declares [`Code`] as a table: its name in Rust, its name in files, its meaning.
 macro_rules! codes {
     ($($variant:ident $name:literal $meaning:literal)*) => {
         /// The kind of a [`Diagnostic`]: `stage.what_is_odd`.
@@ -82,7 +82,7 @@ macro_rules! codes {
             /// All of them, by stage.
             pub const ALL: &[Self] = &[$(Self::$variant),*];
 
-            /// As files and messages spell it.
+            /// As written in files and messages.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$variant => $name,)* }
             }
@@ -173,7 +173,7 @@ codes! {
 }
 
 impl Code {
-    /// Concerns the colour and the transmittance inside the outline, not the outline itself.
+    /// Whether it concerns the colour and the transmittance inside the outline, not the outline itself.
     pub const fn is_about_color(self) -> bool {
         matches!(
             self,

@@ -8,8 +8,8 @@ use noto_sans_mono_bitmap::{
 };
 use std::ops::Range;
 
-/// Colours of classes: Okabe and Ito, "Color Universal Design" (2008), distinct for every kind of
-/// colour vision; in an order in which the first ones stand out most on photos.
+/// Class colours: Okabe and Ito, "Color Universal Design" (2008), distinguishable with every kind
+/// of colour vision; ordered so that the first ones stand out most in photos.
 const CLASS_PALETTE: [Srgb8; 7] = [
     rgb(0xE6, 0x9F, 0x00),
     rgb(0x56, 0xB4, 0xE9),
@@ -20,18 +20,18 @@ const CLASS_PALETTE: [Srgb8; 7] = [
     rgb(0x00, 0x72, 0xB2),
 ];
 
-/// What is drawn around lines, so that they show on a background of their own colour.
+/// Drawn around lines so that they show on a background of their own colour.
 const HALO: Srgb8 = rgb(0, 0, 0);
 
-/// Share of the halo over the picture.
+/// Opacity of the halo.
 const HALO_ALPHA: f32 = 0.45;
 
-/// A colour from its codes.
+/// A colour from its 8-bit values.
 pub(crate) const fn rgb(r: u8, g: u8, b: u8) -> Srgb8 {
     Srgb8 { r, g, b }
 }
 
-/// The colour of a class; the palette starts over after its last.
+/// The colour of a class; the palette repeats after its last colour.
 pub(crate) fn class_color(class: u32) -> Srgb8 {
     CLASS_PALETTE[class as usize % CLASS_PALETTE.len()]
 }
@@ -45,12 +45,12 @@ pub(crate) fn ink_on(paper: Srgb8) -> Srgb8 {
     }
 }
 
-/// Luma of Rec. 601 on the codes, times 1000: close to how light a colour looks.
+/// Luma of Rec. 601 on the encoded values, times 1000: close to how light a colour looks.
 fn luma(color: Srgb8) -> u32 {
     299 * u32::from(color.r) + 587 * u32::from(color.g) + 114 * u32::from(color.b)
 }
 
-/// Mixes a colour into a pixel, where there is one.
+/// Blends a colour into a pixel; ignored outside the canvas.
 fn blend(canvas: &mut Image<Srgb8>, x: isize, y: isize, color: Srgb8, alpha: f32) {
     let (w, h) = canvas.size();
     let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else {
@@ -77,7 +77,7 @@ fn mixed(under: u8, over: u8, alpha: f32) -> u8 {
     (f32::from(under) + alpha * (f32::from(over) - f32::from(under)) + 0.5) as u8
 }
 
-/// A filled rectangle; what lies outside the canvas is left out.
+/// A filled rectangle, clipped to the canvas.
 pub(crate) fn fill(
     canvas: &mut Image<Srgb8>,
     [x, y]: [isize; 2],
@@ -91,7 +91,7 @@ pub(crate) fn fill(
     }
 }
 
-/// A picture laid onto the canvas; what lies outside is left out.
+/// A picture pasted onto the canvas, clipped to it.
 pub(crate) fn paste(canvas: &mut Image<Srgb8>, [x, y]: [usize; 2], picture: &Image<Srgb8>) {
     let (width, height) = canvas.size();
     let columns = picture.width().min(width.saturating_sub(x));
@@ -100,7 +100,7 @@ pub(crate) fn paste(canvas: &mut Image<Srgb8>, [x, y]: [usize; 2], picture: &Ima
     }
 }
 
-/// The border of a box, `thick` whole pixels wide and inside the canvas, with a halo of one pixel
+/// The border of a box, `thick` whole pixels wide and inside the canvas, with a halo one pixel wide
 /// on either side.
 pub(crate) fn border(canvas: &mut Image<Srgb8>, b: &BBox, color: Srgb8, thick: isize) {
     let (w, h) = canvas.size();
@@ -118,7 +118,7 @@ pub(crate) fn border(canvas: &mut Image<Srgb8>, b: &BBox, color: Srgb8, thick: i
     }
 }
 
-/// Of the edges between the pixels of a side.
+/// The nearest pixel edge along a side.
 fn nearest_edge(at: f64, length: usize) -> isize {
     libm::round(at.clamp(0.0, length as f64)) as isize
 }
@@ -127,7 +127,7 @@ fn pixel_within(at: f64, length: usize) -> isize {
     at.clamp(0.0, length as f64) as isize
 }
 
-/// A closed line of one pixel's width through points, smooth, with a halo.
+/// A closed antialiased line through points, one pixel wide, with a halo.
 pub(crate) fn outline(canvas: &mut Image<Srgb8>, ring: &[Point2<f64>], color: Srgb8) {
     for (radius, color, alpha) in [(1.5, HALO, HALO_ALPHA), (0.5, color, 1.0)] {
         for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
@@ -150,7 +150,7 @@ impl Segment {
         Self { from, to, radius }
     }
 
-    /// The pixels of a canvas that it touches, row by row, and which share of each it covers.
+    /// The pixels of a canvas that it touches, row by row, and its coverage of each.
     fn pixels(&self, (w, h): (usize, usize)) -> impl Iterator<Item = (isize, isize, f32)> {
         let columns = self.pixel_range(self.from.x, self.to.x, w);
         self.pixel_range(self.from.y, self.to.y, h)
@@ -165,7 +165,7 @@ impl Segment {
         pixel_within(a.min(b) - reach, length)..pixel_within(a.max(b) + reach + 1.0, length)
     }
 
-    /// A ramp over one pixel by the distance of its middle from the line.
+    /// A ramp over one pixel by the distance of its centre from the line.
     fn coverage(&self, x: isize, y: isize) -> f32 {
         let p = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
         let along = self.to - self.from;
@@ -184,13 +184,13 @@ pub(crate) fn text_width(text: &str) -> usize {
     text.chars().count() * get_raster_width(FontWeight::Regular, RASTER_HEIGHT)
 }
 
-/// A letter of the font, which has those of European languages with Latin script.
+/// A letter of the font, which covers European languages in Latin script.
 fn glyph(letter: char) -> Option<RasterizedChar> {
     get_raster(letter, FontWeight::Regular, RASTER_HEIGHT)
 }
 
-/// The lines of a text that has room for `width` pixels, broken between words, and within those
-/// that are longer.
+/// The lines of a text wrapped to `width` pixels, broken between words, and within words that are
+/// longer.
 pub(crate) fn wrapped(text: &str, width: usize) -> Vec<String> {
     let room = (width / text_width("m").max(1)).max(1);
     let mut lines = vec![String::new()];
@@ -206,7 +206,7 @@ pub(crate) fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// Appends a word to a line; `false` where there is no room for it.
+/// Appends a word to a line; `false` where it does not fit.
 fn append_word(line: &mut String, word: &[char], room: usize) -> bool {
     let used = line.chars().count();
     if used + usize::from(used > 0) + word.len() > room {
@@ -296,7 +296,7 @@ mod tests {
             .pixels((40, 40))
             .map(|(.., coverage)| f64::from(coverage))
             .sum();
-        // A ramp from full to nothing over one pixel on either side integrates to a width of 1; the
+        // A ramp from full to zero over one pixel on either side integrates to a width of 1; the
         // two round ends add about one more.
         let length = (b - a).norm();
         assert!(ink > length && ink < length + 2.0, "{ink} {length}");

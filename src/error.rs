@@ -111,7 +111,7 @@ impl Error {
     }
 }
 
-/// A message as the field that it begins with, and what is wrong there.
+/// Splits a message into the field that it begins with and what is wrong there.
 fn field_and_rest(message: &str) -> (String, String) {
     let (at, what) = message.split_once(": ").unwrap_or(("surface", message));
     (at.into(), what.into())
@@ -123,7 +123,7 @@ fn without_number(message: &str) -> String {
         return message.into();
     };
     let behind = rest.split_once(')').map_or("", |(_, behind)| behind);
-    // The system's own words are the last of the message, and the only ones that begin with a
+    // The system's own text comes last in the message, and is the only part that begins with a
     // capital.
     let start = front.rfind(": ").map_or(0, |colon| colon + 2);
     let (before, words) = front.split_at(start);
@@ -135,13 +135,14 @@ fn without_number(message: &str) -> String {
     format!("{before}{first}{}{behind}", letters.as_str())
 }
 
-/// A file as a message names it: on one line, whatever its name holds.
+/// A file as messages name it: on one line, whatever characters its name contains.
 fn named(path: &Path) -> String {
     printable(&path.to_string_lossy())
 }
 
 /// Text that is safe to show on a line of a terminal or in a document: what would move the cursor,
-/// change colours, begin a line or reverse the order of letters is written out, a line feed as `\\n` and an escape as `\\x1b`.
+/// change colours, begin a line or reverse the order of letters is written out, a line feed as
+/// `\\n` and an escape as `\\x1b`.
 pub fn printable(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {
@@ -156,11 +157,11 @@ pub fn printable(text: &str) -> String {
     shown
 }
 
-/// Letters of a foreign message that are shown; a damaged file may make a decoder list thousands of
-/// numbers.
+/// How many characters of a foreign message are shown; a damaged file may make a decoder list
+/// thousands of numbers.
 const SHOWN_LETTERS: usize = 300;
 
-/// The beginning of a text of any form on one line.
+/// The beginning of any text on one line.
 pub(crate) fn one_line(text: &str) -> String {
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     match line.char_indices().nth(SHOWN_LETTERS) {

@@ -1,21 +1,22 @@
-//! Entry points of the fuzzers in `fuzz/`: each takes any bytes and must return, and says whether
+//! Entry points of the fuzzers in `fuzz/`: each takes any bytes, must return, and reports whether
 //! they could be read. Not part of the library's interface.
 
 use crate::{camera, dataset, eval, io};
 
-/// A label file, solved where it can be read.
+/// A label file, solved if readable.
 pub fn label(bytes: &[u8]) -> bool {
     let label = text(bytes).and_then(|text| io::parse_json::<camera::Label>(text).ok());
     label.is_some_and(|label| camera::solve(&label, &camera::SolveOptions::default()).is_ok())
 }
 
-/// A recipe, checked where it can be read.
+/// A recipe, checked if readable.
 pub fn recipe(bytes: &[u8]) -> bool {
     let config = text(bytes).and_then(|text| io::parse_toml::<dataset::DatasetConfig>(text).ok());
     config.is_some_and(|config| config.scene.check().is_ok())
 }
 
-/// The journal of a dataset of before lines had checksums, which no fuzzer would find.
+/// A dataset's journal in the old format without line checksums, since no fuzzer would find a valid
+/// one.
 pub fn journal(bytes: &[u8]) -> bool {
     let lines = dataset::journal_lines(bytes, true);
     lines.is_ok_and(|lines| lines.iter().any(|(_, line)| line.is_ok()))
@@ -42,10 +43,10 @@ pub fn data_yaml(bytes: &[u8]) -> bool {
     yaml.class_count().is_some() && problems.is_empty()
 }
 
-/// What stands between the truth and the detections that the functions below take.
+/// Separates the truth from the detections in the input of the functions below.
 pub const BETWEEN: &str = "\n===\n";
 
-/// A file of YOLO labels and one of detections, scored where they can be read.
+/// A file of YOLO labels and one of detections, scored if readable.
 pub fn yolo_labels(bytes: &[u8]) -> bool {
     let sheet = two(bytes).and_then(|(truth, found)| {
         let sheet = eval::yolo_sheet(truth, found, [640, 480]);
@@ -54,7 +55,7 @@ pub fn yolo_labels(bytes: &[u8]) -> bool {
     sheet.map(|sheet| score(&[sheet])).is_some()
 }
 
-/// COCO documents of truth and detections, scored where they can be read.
+/// COCO documents of truth and detections, scored if readable.
 pub fn coco(bytes: &[u8]) -> bool {
     let sheets = two(bytes).and_then(|(truth, found)| eval::coco_sheets(truth, found).ok());
     sheets.map(|sheets| score(&sheets)).is_some()
@@ -68,7 +69,7 @@ fn text(bytes: &[u8]) -> Option<&str> {
     std::str::from_utf8(bytes).ok()
 }
 
-/// Everything that is made of truth and detections.
+/// Everything computed from truth and detections.
 fn score(sheets: &[eval::EvalImage]) {
     let options = eval::ConfusionOptions::default();
     let all = eval::coco(sheets, &[]);

@@ -1,8 +1,8 @@
 //! A rectangle of pixels of one kind.
 //!
 //! Row 0 is the top row, pixel `(x, y)` covers `[x, x+1) x [y, y+1)` and has its centre at `+0.5`.
-//! Pixels lie row by row in one allocation without padding; work goes over whole rows so that the
-//! compiler can vectorise it.
+//! Pixels are stored row by row in one allocation without padding; functions process whole rows so
+//! that the compiler can vectorise them.
 
 use crate::pixel::Coverage;
 use rayon::prelude::*;
@@ -70,7 +70,7 @@ impl<'a, P> ImageView<'a, P> {
     }
 }
 
-/// Yes or no for every pixel; label files hold it as an [`RleMask`](crate::label::RleMask).
+/// A boolean for every pixel; label files hold it as an [`RleMask`](crate::label::RleMask).
 pub type Mask = Image<bool>;
 
 /// A region of interest: a half-open rectangle of whole pixels.
@@ -114,17 +114,17 @@ impl Roi {
 }
 
 impl<P: Copy + Default> Image<P> {
-    /// An image of default pixels (black, transparent, nothing).
+    /// An image of default pixels (black, transparent, 0).
     ///
     /// # Panics
-    /// When `width * height` does not fit in memory arithmetic.
+    /// When `width * height` overflows.
     pub fn new(width: usize, height: usize) -> Self {
         Self::filled(width, height, P::default())
     }
 }
 
 impl<P: Copy> Image<P> {
-    /// An image of one value.
+    /// An image filled with one value.
     pub fn filled(width: usize, height: usize, pixel: P) -> Self {
         let len = width.checked_mul(height).expect("image area overflows");
         Self {
@@ -134,7 +134,7 @@ impl<P: Copy> Image<P> {
         }
     }
 
-    /// An image over pixels that are already in memory, row by row.
+    /// An image from existing pixels, row by row.
     ///
     /// # Panics
     /// When `pixels.len() != width * height`.
@@ -156,7 +156,7 @@ impl<P: Copy> Image<P> {
     where
         P: Send + Sync,
     {
-        // One division a task and not one a pixel.
+        // One division per task, not one per pixel.
         let pixels = (0..width * height)
             .into_par_iter()
             .with_min_len(width.max(1))
@@ -204,13 +204,13 @@ impl<P: Copy> Image<P> {
         &self.pixels
     }
 
-    /// All pixels, row by row, to change.
+    /// All pixels, row by row, mutable.
     #[inline(always)]
     pub fn pixels_mut(&mut self) -> &mut [P] {
         &mut self.pixels
     }
 
-    /// The same pixels, to be read.
+    /// A borrowed view of the pixels.
     #[doc(hidden)]
     pub fn view(&self) -> ImageView<'_, P> {
         ImageView {
@@ -220,7 +220,7 @@ impl<P: Copy> Image<P> {
         }
     }
 
-    /// The pixels without the picture.
+    /// The pixels alone.
     pub fn into_vec(self) -> Vec<P> {
         self.pixels
     }
@@ -234,7 +234,7 @@ impl<P: Copy> Image<P> {
         &self.pixels[y * self.width..][..self.width]
     }
 
-    /// One row, to change.
+    /// One row, mutable.
     ///
     /// # Panics
     /// When `y >= height`.
@@ -248,7 +248,7 @@ impl<P: Copy> Image<P> {
         self.pixels.chunks_exact(self.width.max(1))
     }
 
-    /// The rows from the top, to change, in parallel.
+    /// The rows from the top, mutable, in parallel.
     pub fn par_rows_mut(&mut self) -> impl IndexedParallelIterator<Item = &mut [P]>
     where
         P: Send,
@@ -256,7 +256,7 @@ impl<P: Copy> Image<P> {
         self.pixels.par_chunks_exact_mut(self.width.max(1))
     }
 
-    /// A picture of the same size, pixel by pixel, rows in parallel.
+    /// A picture of the same size, computed pixel by pixel, rows in parallel.
     pub fn map<Q: Copy + Send>(&self, f: impl Fn(P) -> Q + Sync) -> Image<Q>
     where
         P: Sync,
@@ -274,7 +274,7 @@ impl<P: Copy> Image<P> {
         }
     }
 
-    /// A picture of the same size from two, pixel by pixel, rows in parallel.
+    /// A picture of the same size computed from two, pixel by pixel, rows in parallel.
     ///
     /// # Panics
     /// When the sizes differ.
@@ -299,7 +299,7 @@ impl<P: Copy> Image<P> {
         }
     }
 
-    /// A picture of the same size from three, pixel by pixel, rows in parallel.
+    /// A picture of the same size computed from three, pixel by pixel, rows in parallel.
     ///
     /// # Panics
     /// When the sizes differ.
@@ -327,7 +327,7 @@ impl<P: Copy> Image<P> {
         }
     }
 
-    /// A copy of a part.
+    /// A copy of a region.
     ///
     /// # Panics
     /// When `roi` reaches outside the picture.
@@ -343,7 +343,7 @@ impl<P: Copy> Image<P> {
         }
     }
 
-    /// A part, reusing the memory of the whole.
+    /// A region, reusing the memory of the whole.
     ///
     /// # Panics
     /// When `roi` reaches outside the picture.
@@ -362,7 +362,7 @@ impl<P: Copy> Image<P> {
         }
     }
 
-    /// The nearest pixel inside the picture.
+    /// The pixel at the nearest position inside the picture.
     ///
     /// # Panics
     /// When the picture is empty.

@@ -12,10 +12,10 @@
 //! | [`Exposure::MatchPlate`](scene::Exposure) and its like | [`light`] | the photo of the place |
 //! | names of textures and of the plate | [`Scene::resolve`] | a [`Library`](asset::Library) and the photo |
 //!
-//! A generator of its own may begin anywhere: with a scene, or with a shot built in code and one
-//! call to [`composite::picture`]. `examples/` has five programs. Conventions of axes and pixels
-//! are in [`geom`], the kinds of pixels and what may be done with them at [`Image`]. What is public
-//! but not listed here serves petcomp's own programs and may change in any version.
+//! A generator may start anywhere: with a scene, or with a shot built in code and one call to
+//! [`composite::picture`]. `examples/` has five programs. Conventions of axes and pixels are in
+//! [`geom`], the kinds of pixels and what may be done with them in [`Image`]. Public items not
+//! listed here serve petcomp's own programs and may change in any version.
 //!
 //! ```
 //! use petcomp::geom::{Pose, Quad};

@@ -1,13 +1,13 @@
-//! A cache that keeps what was used last, within a number of bytes.
+//! A least-recently-used cache with a limit in bytes.
 
 use std::fmt::Debug;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-/// Processes that keep the same in memory, this one among them.
+/// Processes that cache the same values, including this one.
 static PROCESSES: AtomicUsize = AtomicUsize::new(1);
 
-/// Lets every cache of this process keep its share alone, where so many processes keep the same.
+/// Limits every cache of this process to its share, where this many processes cache the same values.
 pub fn share_memory(processes: usize) {
     PROCESSES.store(processes.max(1), Ordering::Relaxed);
 }
@@ -16,22 +16,22 @@ fn own_share(bytes: usize) -> usize {
     bytes / PROCESSES.load(Ordering::Relaxed)
 }
 
-/// A value whose clones share what is large in it.
+/// A value whose clones share its large parts.
 pub(crate) trait Shared: Clone {
-    /// What finds the value again while a clone of it lives.
+    /// A weak reference that finds the value again while a clone of it exists.
     type Weak: Debug;
 
-    /// Bytes that it takes at most; always the same.
+    /// Maximum number of bytes it uses; always the same.
     fn bytes(&self) -> usize;
 
-    /// A reference that keeps nothing.
+    /// A reference that keeps nothing alive.
     fn downgrade(&self) -> Self::Weak;
 
-    /// The value, while a clone of it lives.
+    /// The value, if a clone of it still exists.
     fn upgrade(weak: &Self::Weak) -> Option<Self>;
 }
 
-/// What knows how much memory it takes.
+/// A type that knows how much memory it uses.
 pub(crate) trait InMemory {
     /// Bytes, always the same.
     fn bytes(&self) -> usize;
@@ -53,19 +53,19 @@ impl<T: InMemory> Shared for Arc<T> {
     }
 }
 
-/// Values by name: those used last stay while they take no more than some bytes, and one of any
-/// size; so do those that somebody else holds, which take no more memory by this.
+/// Values by name: the most recently used ones are kept within a limit in bytes, but at least one
+/// of any size; values that are held elsewhere are also kept, since they use no additional memory.
 #[derive(Debug)]
 pub(crate) struct LruCache<V: Shared> {
     most_bytes: usize,
-    /// In the order in which they were used last.
+    /// From least to most recently used.
     entries: Mutex<Vec<Cached<V>>>,
 }
 
 #[derive(Debug)]
 struct Cached<V: Shared> {
     name: String,
-    /// None where somebody else has to hold it.
+    /// None where it is kept alive elsewhere.
     kept: Option<V>,
     weak: V::Weak,
 }
@@ -77,7 +77,7 @@ impl<V: Shared> Cached<V> {
 }
 
 impl<V: Shared> LruCache<V> {
-    /// An empty one that keeps so many bytes.
+    /// An empty cache that keeps this many bytes.
     pub(crate) fn of_bytes(most_bytes: usize) -> Self {
         Self {
             most_bytes,
@@ -85,7 +85,7 @@ impl<V: Shared> LruCache<V> {
         }
     }
 
-    /// The value of a name, which is now the one used last.
+    /// The value of a name, which becomes the most recently used one.
     pub(crate) fn get(&self, name: &str) -> Option<V> {
         let mut entries = self.entries();
         let value = used(&mut entries, name)?;
@@ -93,9 +93,9 @@ impl<V: Shared> LruCache<V> {
         Some(value)
     }
 
-    /// Keeps a value, unless another thread was faster: then that one's. It is made before it comes
-    /// here, not under the lock, since the work may be parallel, and a thread that waits may come
-    /// back here.
+    /// Keeps a value and returns it, or the one that another thread inserted first. Values are
+    /// computed before the call, not under the lock, since the work may be parallel and a waiting
+    /// thread may re-enter the cache.
     pub(crate) fn insert(&self, name: &str, value: V) -> V {
         let mut entries = self.entries();
         if let Some(known) = used(&mut entries, name) {
@@ -111,8 +111,8 @@ impl<V: Shared> LruCache<V> {
         value
     }
 
-    /// Keeps no more than its bytes. Large memory is given back without the lock: others wait for
-    /// it, and a fork would for ever.
+    /// Drops values beyond its limit. Large memory is freed outside the lock: other threads wait
+    /// for it, and a forked process would wait for ever.
     fn drop_oldest(&self, mut entries: MutexGuard<'_, Vec<Cached<V>>>) {
         let oldest = take_oldest(&mut entries, own_share(self.most_bytes));
         drop(entries);
@@ -120,12 +120,12 @@ impl<V: Shared> LruCache<V> {
     }
 
     fn entries(&self) -> MutexGuard<'_, Vec<Cached<V>>> {
-        // Every change is whole, even where a thread panicked afterwards.
+        // Every change is complete, even if a thread panicked afterwards.
         self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The value of a name, which is now the one used last.
+/// The value of a name, which becomes the most recently used one.
 fn used<V: Shared>(entries: &mut [Cached<V>], name: &str) -> Option<V> {
     let place = entries.iter().position(|entry| entry.name == name)?;
     let value = entries[place].value()?;
@@ -134,7 +134,7 @@ fn used<V: Shared>(entries: &mut [Cached<V>], name: &str) -> Option<V> {
     Some(value)
 }
 
-/// Takes out the values that were used longest ago, until the others take little enough memory.
+/// Removes the least recently used values until the others fit the limit.
 fn take_oldest<V: Shared>(entries: &mut [Cached<V>], most_bytes: usize) -> Vec<V> {
     let mut taken = Vec::new();
     let bytes = |entry: &Cached<V>| entry.kept.as_ref().map_or(0, V::bytes);
@@ -150,7 +150,7 @@ fn take_oldest<V: Shared>(entries: &mut [Cached<V>], most_bytes: usize) -> Vec<V
     taken
 }
 
-/// What [`Shared::upgrade`] is for a reference that is there or not.
+/// [`Shared::upgrade`] for an optional reference.
 pub(crate) fn upgrade_optional<T>(weak: &Option<Weak<T>>) -> Option<Option<Arc<T>>> {
     match weak {
         Some(weak) => weak.upgrade().map(Some),

@@ -1,12 +1,12 @@
 //! The kinds of pixel, one type each, so that a wrong mix of colour or alpha does not compile.
 //!
-//! Geometry errors are loud, colour and alpha errors are silent: that is why geometry gets names
+//! Geometry errors are loud, colour and alpha errors are silent; hence geometry gets names
 //! (`world_from_camera`) and pixels get types. Everything inside the library is *scene-linear*,
 //! Rec. 709 primaries, `f32`, values above 1 kept. Display-encoded types ([`Srgb8`], [`Srgba8`])
 //! stop at [`io`](crate::io).
 //!
-//! Averaging identifiers, depths, straight alpha or display values is meaningless, and refused by
-//! the compiler:
+//! Averaging identifiers, depths, straight alpha or display values is meaningless, and the compiler
+//! rejects it:
 //!
 //! ```compile_fail
 //! use petcomp::{Image, StraightRgba, filter};
@@ -40,8 +40,7 @@ pub struct LinearRgb {
     pub b: f32,
 }
 
-/// Scene-linear colour already multiplied by its alpha (associated alpha): the form in which pixels
-/// add up.
+/// Scene-linear colour multiplied by its alpha (associated alpha): the form in which pixels add up.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PremulRgba {
@@ -55,7 +54,7 @@ pub struct PremulRgba {
     pub a: f32,
 }
 
-/// Scene-linear colour beside its alpha (unassociated alpha): the form in which colours are edited.
+/// Scene-linear colour with separate alpha (unassociated alpha): the form in which colours are edited.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct StraightRgba {
@@ -69,21 +68,21 @@ pub struct StraightRgba {
     pub a: f32,
 }
 
-/// Tinted see-through film: the light that a pixel adds, and the share of what is behind that each
-/// channel loses.
+/// Tinted see-through film: the light that a pixel adds, and the share of the light from behind
+/// that each channel loses.
 ///
-/// What [`PremulRgba`] is with an alpha of its own for each channel; zero is nothing at all. Stored
+/// A [`PremulRgba`] with a separate alpha for each channel; all zeros is fully transparent. Stored
 /// as opacity, which averages like alpha; [`Film::transmittance`] is 1 minus that.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Film {
-    /// Light that the film reflects: already multiplied by how much of the pixel it covers.
+    /// Light that the film reflects, multiplied by how much of the pixel it covers.
     pub color: LinearRgb,
     /// 1 minus the transmittance, per channel, 0 to 1.
     pub opacity: LinearRgb,
 }
 
-/// Display-encoded sRGB, 8 bits a channel.
+/// Display-encoded sRGB, 8 bits per channel.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Srgb8 {
@@ -95,7 +94,7 @@ pub struct Srgb8 {
     pub b: u8,
 }
 
-/// Display-encoded sRGB with straight alpha, 8 bits a channel.
+/// Display-encoded sRGB with straight alpha, 8 bits per channel.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Srgba8 {
@@ -138,7 +137,7 @@ pub struct Depth(pub f32);
 )]
 pub struct ObjectId(pub u32);
 
-/// Pixels whose weighted sums mean something: what may be blurred, resampled and averaged.
+/// Pixels whose weighted sums are meaningful: they may be blurred, resampled and averaged.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` pixels cannot be averaged",
     note = "premultiply straight alpha and decode display values first"
@@ -219,7 +218,7 @@ impl LinearRgb {
         Self::new(v, v, v)
     }
 
-    /// Channel by channel function.
+    /// Applies a function to every channel.
     #[inline(always)]
     pub fn map(self, mut f: impl FnMut(f32) -> f32) -> Self {
         Self::new(f(self.r), f(self.g), f(self.b))
@@ -249,13 +248,13 @@ impl LinearRgb {
         self.r.max(self.g).max(self.b)
     }
 
-    /// No channel is NaN or infinite.
+    /// Whether no channel is NaN or infinite.
     #[inline(always)]
     pub fn is_finite(self) -> bool {
         self.r.is_finite() && self.g.is_finite() && self.b.is_finite()
     }
 
-    /// The colour as a fully covering pixel.
+    /// The colour as an opaque pixel.
     #[inline(always)]
     pub fn opaque(self) -> PremulRgba {
         PremulRgba::new(self.r, self.g, self.b, 1.0)
@@ -272,7 +271,7 @@ impl std::ops::Add for LinearRgb {
 
 impl std::ops::Mul for LinearRgb {
     type Output = Self;
-    /// Channel by channel: a filter, a tint, a shadow factor.
+    /// Multiplies channel by channel: a filter, a tint, a shadow factor.
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
         Self::new(self.r * o.r, self.g * o.g, self.b * o.b)
@@ -292,10 +291,10 @@ impl From<LinearRgb> for [f32; 3] {
 }
 
 impl PremulRgba {
-    /// Nothing at all.
+    /// Fully transparent.
     pub const TRANSPARENT: Self = Self::new(0.0, 0.0, 0.0, 0.0);
 
-    /// A pixel from colour that is already multiplied by `a`.
+    /// A pixel from colour already multiplied by `a`.
     #[inline(always)]
     pub const fn new(r: f32, g: f32, b: f32, a: f32) -> Self {
         Self { r, g, b, a }
@@ -319,7 +318,7 @@ impl PremulRgba {
         }
     }
 
-    /// Every channel is finite and alpha is between 0 and 1: what a texture may hold.
+    /// Whether every channel is finite and alpha is between 0 and 1, as required of a texture.
     #[inline(always)]
     pub fn is_sound(self) -> bool {
         self.color().is_finite() && (0.0..=1.0).contains(&self.a)
@@ -346,7 +345,7 @@ impl StraightRgba {
 }
 
 impl Film {
-    /// A film from the light it adds and the share of what is behind that passes, per channel.
+    /// A film from the light it adds and the share of the light from behind that passes, per channel.
     #[inline(always)]
     pub fn new(color: LinearRgb, transmittance: LinearRgb) -> Self {
         Self {
@@ -355,7 +354,7 @@ impl Film {
         }
     }
 
-    /// The share of what is behind that passes, per channel.
+    /// The share of the light from behind that passes, per channel.
     #[inline(always)]
     pub fn transmittance(self) -> LinearRgb {
         self.opacity.map(|o| 1.0 - o)
@@ -367,14 +366,13 @@ impl Film {
         self.color + self.transmittance() * behind
     }
 
-    /// A film that also hides what lies in its shadow, of which that is the factor.
+    /// A film that also darkens what is behind it by the factor `shadow`.
     #[inline(always)]
     pub(crate) fn shaded(self, shadow: LinearRgb) -> Self {
         Self::new(self.color, self.transmittance() * shadow)
     }
 
-    /// The same with one alpha for all channels, their mean: what a program without film makes of
-    /// it.
+    /// The same with one alpha for all channels, their mean, for programs that do not support film.
     #[inline(always)]
     pub fn to_rgba(self) -> PremulRgba {
         let LinearRgb { r, g, b } = self.opacity;
@@ -382,14 +380,14 @@ impl Film {
         PremulRgba::new(self.color.r, self.color.g, self.color.b, a)
     }
 
-    /// Every channel loses the same share.
+    /// Whether every channel loses the same share.
     #[inline(always)]
     pub fn is_grey(self) -> bool {
         self.opacity.r == self.opacity.g && self.opacity.g == self.opacity.b
     }
 
-    /// The same with every opacity held between 0 and 1: the weights of a filter add up to 1 only up
-    /// to rounding.
+    /// The same with every opacity clamped to 0 to 1, since the weights of a filter add up to 1
+    /// only up to rounding.
     #[inline(always)]
     pub(crate) fn clamped(self) -> Self {
         Self {
@@ -398,7 +396,7 @@ impl Film {
         }
     }
 
-    /// Every channel is finite and every opacity between 0 and 1: what a texture may hold.
+    /// Whether every channel is finite and every opacity between 0 and 1, as required of a texture.
     #[inline(always)]
     pub fn is_sound(self) -> bool {
         let mut opacities = self.opacity.channels().into_iter();

@@ -1,4 +1,4 @@
-//! One word for how much work goes into everything that is approximate.
+//! One setting for how much work goes into everything that is approximate.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quality {
-    /// For a look: right in what there is and where, rough in shadows and edges.
+    /// For previews: right in which objects there are and where, rough in shadows and edges.
     Draft,
     /// For training pictures: every stage's default.
     #[default]
     Normal,
-    /// For comparisons: as near to each stage's definition as it gets, at tens of times the work.
+    /// For comparisons: as close to each stage's definition as possible, at tens of times the work.
     Reference,
 }
 
@@ -19,7 +19,7 @@ impl Quality {
     /// All of them, the quickest first.
     pub const ALL: [Self; 3] = [Self::Draft, Self::Normal, Self::Reference];
 
-    /// What it is called.
+    /// Its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Draft => "draft",
@@ -28,7 +28,7 @@ impl Quality {
         }
     }
 
-    /// The one of three values that belongs to it, given for draft, normal and reference.
+    /// Selects one of three values, given for draft, normal and reference.
     pub(crate) fn of<T>(self, [draft, normal, reference]: [T; 3]) -> T {
         match self {
             Self::Draft => draft,

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-/// The value in the middle; of an even number the higher of the two, none of none.
+/// The median; the higher of the two middle values for an even number, none for an empty list.
 pub(crate) fn median<T: Copy>(
     values: impl Iterator<Item = T>,
     order: impl FnMut(&T, &T) -> Ordering,
@@ -10,7 +10,7 @@ pub(crate) fn median<T: Copy>(
     quantile(values.collect(), 0.5, order)
 }
 
-/// The value that a share, 0 to 1, of the others lies below; none where there is none.
+/// The value below which a share, 0 to 1, of the others lies; none for an empty list.
 pub(crate) fn quantile<T: Copy>(
     mut values: Vec<T>,
     share: f64,

@@ -1,10 +1,10 @@
-//! Where the time of a job goes, for the log: `petcomp -vv asset add ...` and `petcomp -vv dataset
-//! generate ...` show it.
+//! Where the time of a job goes, for the log: shown by `petcomp -vv asset add ...` and `petcomp -vv
+//! dataset generate ...`.
 
 use std::fmt;
 use std::time::{Duration, Instant};
 
-/// Takes the time of a job's stages, one after the other. It decides nothing.
+/// Measures the time of a job's stages, one after the other. It affects no result.
 pub(crate) struct Stopwatch {
     stages: Vec<(&'static str, Duration)>,
     last: Instant,
@@ -18,21 +18,21 @@ impl Stopwatch {
         }
     }
 
-    /// A stage is over; the next one begins.
+    /// Ends a stage; the next one begins.
     pub(crate) fn lap(&mut self, stage: &'static str) {
         let now = Instant::now();
         self.stages.push((stage, now - self.last));
         self.last = now;
     }
 
-    /// What a stage took that is over.
+    /// The time of a finished stage.
     #[cfg(feature = "pipeline")]
     pub(crate) fn took(&self, stage: &str) -> Duration {
         let laps = self.stages.iter().filter(|(name, _)| *name == stage);
         laps.map(|(_, took)| *took).sum()
     }
 
-    /// Logs what the stages of a job took.
+    /// Logs the times of a job's stages.
     pub(crate) fn log(&self, job: impl fmt::Display) {
         log::debug!("{job}: {self}");
     }

@@ -1,8 +1,8 @@
-//! Work: what a scene made the stages do, counted and not timed.
+//! Work: what a scene made the stages do, counted, not timed.
 //!
-//! The stages count by themselves, once per row, tile or call, with numbers that they have anyway.
-//! Without the feature `counters` a count is nothing at all; with it, `counted` runs a job and
-//! returns what it did.
+//! The stages count once per row, tile or call, with numbers that they have anyway. Without the
+//! feature `counters` counting compiles to nothing; with it, `counted` runs a job and returns the
+//! work it did.
 #![cfg_attr(
     not(feature = "counters"),
     allow(dead_code, unreachable_pub, reason = "nothing is counted")
@@ -26,7 +26,7 @@ pub(crate) fn add(_: Kind, _: u64) {}
 #[inline]
 pub(crate) fn add_all<const N: usize>(_: [(Kind, u64); N]) {}
 
-/// A pool of so many threads.
+/// A pool of this many threads.
 #[cfg(not(feature = "counters"))]
 pub(crate) fn pool(threads: usize) -> std::io::Result<rayon::ThreadPool> {
     rayon::ThreadPoolBuilder::new()
@@ -49,7 +49,7 @@ macro_rules! kinds {
             /// All of them.
             pub const ALL: [Self; [$($name),*].len()] = [$(Self::$kind),*];
 
-            /// What it is called in tables.
+            /// Its name in tables.
             pub const fn name(self) -> &'static str {
                 [$($name),*][self as usize]
             }

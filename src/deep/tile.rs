@@ -12,15 +12,15 @@ pub(crate) struct DeepTile {
     /// Where each pixel's samples start, and where the last ones end; empty where there are none.
     starts: Vec<u32>,
     pub(super) samples: Vec<DeepSample>,
-    /// One for each sample where there is film; else empty.
+    /// One per sample where there is film; otherwise empty.
     pub(super) tints: Vec<LinearRgb>,
-    /// What of each sample's light is the plate's, seen displaced, less what of the plate is seen
-    /// there straight on; empty where no object bends light.
+    /// The plate's displaced part of each sample's light, minus the plate's light seen there
+    /// undisplaced; empty where no object bends light.
     pub(super) displaced: Vec<LinearRgb>,
 }
 
 impl DeepTile {
-    /// Of the pixels' samples, row by row.
+    /// From the pixels' samples, row by row.
     pub(super) fn from_pixels(
         width: usize,
         pixels: impl IntoIterator<Item = Vec<DeepSample>>,
@@ -39,8 +39,8 @@ impl DeepTile {
         }
     }
 
-    /// Of samples in any order of pixels, each with the number of its pixel; those of one pixel come
-    /// front to back. `tints` has one for each sample, or none at all.
+    /// From samples in any order of pixels, each with the number of its pixel; those of one pixel
+    /// are given front to back. `tints` has one per sample, or is empty.
     pub(crate) fn from_samples(
         [width, height]: [usize; 2],
         unordered: &[(u32, DeepSample)],
@@ -49,7 +49,7 @@ impl DeepTile {
         if unordered.is_empty() {
             return Self::default();
         }
-        // Starts become ends as each pixel's samples take their places.
+        // Starts become ends as each pixel's samples are placed.
         let mut ends = pixel_starts(width * height, unordered);
         let mut samples = vec![DeepSample::default(); unordered.len()];
         let mut ordered_tints = vec![LinearRgb::BLACK; tints.len()];
@@ -84,14 +84,14 @@ impl DeepTile {
         self.starts[i] as usize..self.starts[i + 1] as usize
     }
 
-    /// Where the samples of each pixel of a row of the tile are; of none where the tile has none.
+    /// The range of samples of each pixel of a row of the tile; empty where the tile has none.
     pub(super) fn row(&self, y: usize) -> impl Iterator<Item = Range<usize>> {
         let starts = self.starts.get(y * self.width..).unwrap_or_default();
         let ends = starts.windows(2).take(self.width);
         ends.map(|ends| ends[0] as usize..ends[1] as usize)
     }
 
-    /// Takes what of the plate is seen displaced out of the samples' light.
+    /// Subtracts the displaced light of the plate from the samples' light.
     pub(super) fn take_displaced(&mut self) {
         let displaced = std::mem::take(&mut self.displaced);
         for (sample, displaced) in self.samples.iter_mut().zip(displaced) {
@@ -99,8 +99,8 @@ impl DeepTile {
         }
     }
 
-    /// Of each sample of a pixel of which `all` is the light: the light of what is behind it, and
-    /// the share of that which it and all in front of it let pass.
+    /// For each sample of a pixel whose light is `all`: the light from behind it, and the share of
+    /// that which it and all in front of it let pass.
     pub(super) fn backdrops(
         &self,
         samples: Range<usize>,
@@ -115,7 +115,7 @@ impl DeepTile {
         backdrops.collect()
     }
 
-    /// Samples, and what each hides of what is behind, per channel.
+    /// Samples, and what each hides of the light from behind, per channel.
     pub(super) fn hiding(
         &self,
         samples: Range<usize>,
@@ -128,7 +128,7 @@ impl DeepTile {
     }
 }
 
-/// Where each pixel's samples start, and after the last one where they end.
+/// Where each pixel's samples start, and finally where the last ones end.
 fn pixel_starts(pixels: usize, samples: &[(u32, DeepSample)]) -> Vec<u32> {
     let mut starts = vec![0_u32; pixels + 1];
     for (pixel, _) in samples {

@@ -1,14 +1,14 @@
-//! Pictures that are looked at some rows at a time, so that large ones need not be there as pixels.
+//! Pictures processed some rows at a time, so that large ones never need to be in memory whole.
 
 use crate::image::{Image, Roi};
 use std::ops::Range;
 
-/// Pixels of a band; wider pictures have bands of [`MIN_BAND_ROWS`].
+/// Pixels per band; wider pictures have bands of [`MIN_BAND_ROWS`].
 const BAND_PIXELS: usize = 1 << 18;
-/// Rows of a band at least: what is read beside it should not be more than it.
+/// Minimum rows per band: the extra rows read around it should not outnumber its own.
 const MIN_BAND_ROWS: usize = 64;
 
-/// A picture that makes the pixels of some rows when they are asked for.
+/// A picture that produces the pixels of some rows on request.
 pub trait RowSource<P>: Sync {
     /// Width and height.
     fn size(&self) -> (usize, usize);
@@ -27,11 +27,11 @@ impl<P: Copy + Sync> RowSource<P> for Image<P> {
     }
 }
 
-/// A picture of given size by a function that makes rows.
+/// A picture of given size whose rows a function produces.
 pub struct RowsFromFn<F> {
     /// Width and height.
     pub size: (usize, usize),
-    /// Makes rows.
+    /// Produces the pixels of some rows.
     pub make: F,
 }
 
@@ -45,7 +45,7 @@ impl<P, F: Fn(Range<usize>) -> Image<P> + Sync> RowSource<P> for RowsFromFn<F> {
     }
 }
 
-/// The rows of a picture in bands.
+/// The rows of a picture, split into bands.
 pub(super) fn bands((width, height): (usize, usize)) -> impl Iterator<Item = Range<usize>> {
     let rows = (BAND_PIXELS / width.max(1)).max(MIN_BAND_ROWS);
     (0..height)
@@ -53,12 +53,12 @@ pub(super) fn bands((width, height): (usize, usize)) -> impl Iterator<Item = Ran
         .map(move |start| start..(start + rows).min(height))
 }
 
-/// A band with rows beside it, as far as there are any.
+/// A band extended by rows above and below it, within the picture.
 pub(super) fn grown(band: &Range<usize>, by: usize, height: usize) -> Range<usize> {
     band.start.saturating_sub(by)..(band.end + by).min(height)
 }
 
-/// Rows as an image counts them that begins with the row `first`.
+/// Rows relative to an image that begins at row `first`.
 pub(super) fn rows_from(first: usize, rows: &Range<usize>) -> Range<usize> {
     rows.start - first..rows.end - first
 }

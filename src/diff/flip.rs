@@ -5,7 +5,7 @@ use crate::image::Image;
 use flip_rs::{DEFAULT_PPD, FlipError, RgbImage, ldr_flip};
 use std::ops::Range;
 
-/// Rows above and below a pixel that its difference depends on: the radius of the widest filter,
+/// Rows above and below a pixel that influence its difference: the radius of the widest filter,
 /// three of its standard deviations, at 67 pixels per degree.
 pub(super) const REACH_ROWS: usize = 10;
 

@@ -1,4 +1,4 @@
-//! How alike two pictures are, in the numbers that pictures are judged by.
+//! How similar two pictures are.
 
 use super::bands::{RowSource, bands, grown, rows_from};
 use super::{flip, ssim};
@@ -8,22 +8,22 @@ use crate::pixel::LinearRgb;
 use std::fmt;
 use std::ops::Range;
 
-/// Error in scene-linear light, and likeness as it is displayed.
+/// Error in scene-linear light, and similarity of the pictures as displayed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Likeness {
     /// Root of the mean squared difference over all channels, scene-linear.
     pub rmse: f64,
     /// Mean difference, scene-linear: positive where the picture is brighter than the reference.
     pub bias: f64,
-    /// Structural similarity of the displayed pictures ([`ssim`](super::ssim())); 1 is equal. None
-    /// for pictures smaller than its window of 11 x 11 pixels.
+    /// Structural similarity of the displayed pictures ([`ssim`](super::ssim())); 1 for equal ones.
+    /// None for pictures smaller than its window of 11 x 11 pixels.
     pub ssim: Option<f64>,
-    /// LDR-FLIP of the displayed pictures ([`flip`](super::flip())); 0 is equal.
+    /// LDR-FLIP of the displayed pictures ([`flip`](super::flip())); 0 for equal ones.
     pub flip: f64,
 }
 
 impl Likeness {
-    /// Compares a scene-linear picture with what it should be.
+    /// Compares a scene-linear picture with its reference.
     ///
     /// Displayed means clipped to 0 to 1 and sRGB-encoded. None for pictures of different size or
     /// without pixels.
@@ -53,13 +53,13 @@ impl Likeness {
     }
 }
 
-/// The rows of a band in which windows of [`ssim`] have their centres.
+/// The rows of a band in which windows of [`ssim`] are centred.
 fn window_rows(band: &Range<usize>, height: usize) -> Range<usize> {
     let centers = ssim::window_centers(height);
     band.start.max(centers.start)..band.end.min(centers.end)
 }
 
-/// Over the rows so far.
+/// Sums over the rows processed so far.
 #[derive(Default)]
 struct LikenessSums {
     errors: f64,
@@ -69,7 +69,7 @@ struct LikenessSums {
 }
 
 impl LikenessSums {
-    /// Adds a band; the two pictures begin at row `first`, above it.
+    /// Adds a band; the two pictures begin at row `first`, at or above its start.
     fn add_band(
         &mut self,
         [picture, reference]: &[Image<LinearRgb>; 2],
@@ -112,7 +112,7 @@ impl LikenessSums {
     }
 }
 
-/// Values as a screen gets them.
+/// Values as sent to a screen.
 fn displayed(image: &Image<LinearRgb>) -> Image<[f32; 3]> {
     image.map(|c| <[f32; 3]>::from(c).map(|v| linear_to_srgb(v.clamp(0.0, 1.0))))
 }
@@ -144,7 +144,7 @@ mod tests {
         assert!(likeness.ssim.unwrap() < 1.0 && likeness.flip > 0.1);
     }
 
-    /// What is seen of a row depends on the rows around it, of which a band has enough.
+    /// What a row contributes depends on the rows around it, and a band includes enough of them.
     #[test]
     fn bands_are_alike_as_the_whole_is() {
         let noise = |x: usize, y: usize| ((x * 7919 + y * 104_729) % 97) as f32 / 97.0;

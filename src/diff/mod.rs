@@ -37,19 +37,19 @@ use report::DifferenceTally;
 
 /// How much two pictures may differ: the options of `idiff`, by the same names.
 ///
-/// A pixel fails where any of its channels does, and is counted once.
+/// A pixel fails if any of its channels does, and counts once.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Thresholds {
     /// A channel fails when it differs by more than this. Default: 1e-6.
     pub fail: f32,
-    /// And by more than this part of the mean of both magnitudes. Default: 0.
+    /// And by more than this fraction of the mean of both magnitudes. Default: 0.
     pub fail_relative: f32,
-    /// So many pixels in a hundred may fail. Default: 0.
+    /// Percentage of pixels that may fail. Default: 0.
     pub fail_percent: f32,
     /// No channel may differ by more than this, however few fail. Default: infinite.
     pub hard_fail: f32,
-    /// So many pixels may fail by any amount. Default: 0.
+    /// Number of pixels that may fail by any amount. Default: 0.
     pub allow_failures: usize,
     /// As `fail`, for a warning. Default: 1e-6.
     pub warn: f32,
@@ -77,10 +77,10 @@ impl Default for Thresholds {
     }
 }
 
-/// Pixels that are a few floats, each with a name.
+/// Pixels that consist of a few floats, each with a name.
 #[doc(hidden)]
 pub trait NamedChannels: bytemuck::Pod + Send + Sync {
-    /// The names, in order of memory.
+    /// The names, in memory order.
     const NAMES: &'static [&'static str];
 }
 
@@ -102,7 +102,7 @@ impl NamedChannels for f32 {
 impl NamedChannels for Depth {
     const NAMES: &'static [&'static str] = &["Z"];
 }
-/// Values of no stated meaning: encoded ones, say.
+/// Values without a defined meaning, such as encoded ones.
 impl NamedChannels for [f32; 4] {
     const NAMES: &'static [&'static str] = &["R", "G", "B", "A"];
 }
@@ -110,15 +110,15 @@ impl NamedChannels for [f32; 4] {
 /// Compares two pictures channel by channel.
 ///
 /// Pictures of different size are [`Verdict::Incomparable`]. Takes [`Image`](crate::Image)s, or
-/// anything else that has [`RowSource`].
+/// anything else that implements [`RowSource`].
 ///
 /// # Method
-/// The counts and the verdict of `idiff` 2.4.7: up to `allow_failures` failing pixels the pictures
-/// match, whatever else is asked; beyond that they fail by `fail_percent` or `hard_fail`, or else
-/// warn by `warn_percent` or `hard_warn`. Departs from it where it would let a broken picture pass:
-/// a NaN or an infinity that the other picture does not have in the same place and sign differs by
-/// infinity and counts (`idiff` passes over the first one), and pictures of different size are not
-/// compared (`idiff` continues the smaller one with zeros).
+/// The counts and the verdict of `idiff` 2.4.7: with up to `allow_failures` failing pixels the
+/// pictures match, whatever the other thresholds; beyond that they fail by `fail_percent` or
+/// `hard_fail`, or else warn by `warn_percent` or `hard_warn`. Departs from it where it would let a
+/// broken picture pass: a NaN or an infinity that the other picture does not have in the same place
+/// and with the same sign counts as an infinite difference (`idiff` skips the first one), and
+/// pictures of different size are not compared (`idiff` pads the smaller one with zeros).
 pub fn compare<P: NamedChannels>(
     a: &impl RowSource<P>,
     b: &impl RowSource<P>,
@@ -153,7 +153,7 @@ fn compare_rows<P: NamedChannels>(
     tally
 }
 
-/// Whether two channels are no different: NaN is like NaN.
+/// Whether two channels are equal; NaN equals NaN.
 #[inline]
 fn is_same(u: f32, v: f32) -> bool {
     u == v || (u.is_nan() && v.is_nan())

@@ -1,4 +1,4 @@
-//! What a comparison found, and its verdict.
+//! The result of a comparison.
 
 use super::{Thresholds, is_same};
 use std::fmt;
@@ -6,7 +6,7 @@ use std::fmt;
 /// The outcome of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// No difference that matters.
+    /// No significant difference.
     Match,
     /// Differences above the warning thresholds.
     Warning,
@@ -14,8 +14,8 @@ pub enum Verdict {
     Failure,
     /// Not pictures of the same size.
     Incomparable,
-    /// A file could not be read; never the outcome of a comparison, here so that all exit codes
-    /// stand in one place.
+    /// A file could not be read; never the outcome of a comparison, listed here to keep all exit
+    /// codes in one place.
     Unreadable,
 }
 
@@ -42,17 +42,16 @@ impl fmt::Display for Verdict {
 /// lines that `idiff` prints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
-    /// What they amount to.
+    /// The overall verdict.
     pub verdict: Verdict,
-    /// Mean absolute difference of all channels of all pixels; non-finite differences are left
-    /// out.
+    /// Mean absolute difference of all channels of all pixels, without non-finite differences.
     pub mean_error: f64,
-    /// Root of the mean squared difference, likewise.
+    /// Root of the mean squared difference, also without non-finite ones.
     pub rms_error: f64,
     /// Peak signal to noise ratio in decibels; the peak is the largest value of both pictures, at
     /// least 1.
     pub psnr: f64,
-    /// The largest difference; infinite where a value is not finite in one picture only.
+    /// The largest difference; infinite where a value is non-finite in only one picture.
     pub max_error: f64,
     /// Where it is; `None` where nothing differs.
     pub largest: Option<Largest>,
@@ -62,11 +61,11 @@ pub struct Comparison {
     pub failed: usize,
     /// Number of pixels.
     pub pixels: usize,
-    /// What they were compared with.
+    /// The thresholds used.
     pub thresholds: Thresholds,
 }
 
-/// The place of the largest difference, the first in reading order.
+/// The largest difference, the first one in reading order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Largest {
     /// Column.
@@ -80,7 +79,7 @@ pub struct Largest {
 }
 
 impl Comparison {
-    /// Of pictures that differ in size.
+    /// For pictures that differ in size.
     pub(super) fn incomparable() -> Self {
         let nothing = Self::new(DifferenceTally::default(), &[], 0, &Thresholds::default());
         Self {
@@ -142,7 +141,7 @@ impl Default for DifferenceTally {
 }
 
 impl DifferenceTally {
-    /// Adds the channels of one pixel of both pictures.
+    /// Adds one pixel of both pictures.
     #[inline]
     pub(super) fn add_pixel(
         &mut self,
@@ -167,7 +166,7 @@ impl DifferenceTally {
         self.failed += usize::from(failed);
     }
 
-    /// Adds one value of both pictures and gives their distance.
+    /// Adds one value of both pictures and returns their distance.
     #[inline(always)]
     fn add_error(&mut self, u: f32, v: f32) -> f64 {
         if is_same(u, v) {
@@ -204,7 +203,7 @@ impl DifferenceTally {
         })
     }
 
-    /// This part followed by the next in reading order.
+    /// This part followed by the next one in reading order.
     pub(super) fn then(self, next: Self) -> Self {
         let (largest, values, max_error) = if next.max_error > self.max_error {
             (next.largest, next.values, next.max_error)
@@ -244,13 +243,12 @@ impl DifferenceTally {
     }
 }
 
-/// A count is more than so many percent of the pixels.
+/// Whether a count is more than this percentage of the pixels.
 fn exceeds(count: usize, percent: f32, pixels: usize) -> bool {
     count as f64 > f64::from(percent) / 100.0 * pixels as f64
 }
 
-/// An error as a part of the mean magnitude of two values; an infinite one has no magnitude to be a
-/// part of.
+/// An error as a fraction of the mean magnitude of two values; an infinite error is kept as it is.
 #[inline(always)]
 fn relative_error(error: f64, u: f32, v: f32) -> f64 {
     if error < f64::INFINITY {
@@ -273,7 +271,7 @@ impl fmt::Display for Comparison {
 }
 
 impl Comparison {
-    /// The line on the pixels over a threshold.
+    /// The line about the pixels over a threshold.
     fn write_share(&self, f: &mut fmt::Formatter<'_>, count: usize, threshold: f32) -> fmt::Result {
         let percent = general_format(self.percent(count), 3);
         let threshold = short(threshold.into());
@@ -291,7 +289,7 @@ impl Comparison {
         writeln!(f)
     }
 
-    /// Of the pixels.
+    /// A count as a percentage of the pixels.
     fn percent(&self, count: usize) -> f64 {
         100.0 * count as f64 / self.pixels.max(1) as f64
     }
@@ -310,13 +308,13 @@ fn listed_values(values: &[f32]) -> String {
     values.join(", ")
 }
 
-/// A number to as many digits as `idiff` prints.
+/// A number with as many digits as `idiff` prints.
 fn short(x: f64) -> String {
     general_format(x, 6)
 }
 
-/// A number to some significant digits, in the way of C's `%g`: no zeros at the end, an exponent
-/// where it is short.
+/// A number with some significant digits, formatted like C's `%g`: no trailing zeros, an exponent
+/// where it is shorter.
 fn general_format(x: f64, digits: usize) -> String {
     let scientific = format!("{x:.*e}", digits - 1);
     let Some((mantissa, exponent)) = scientific.split_once('e') else {
@@ -330,7 +328,7 @@ fn general_format(x: f64, digits: usize) -> String {
     scientific_format(mantissa, exponent)
 }
 
-/// With a sign and two digits of the exponent, as C prints it.
+/// With a sign and two digits in the exponent, as in C.
 fn scientific_format(mantissa: &str, exponent: i32) -> String {
     let sign = if exponent < 0 { '-' } else { '+' };
     let mantissa = without_trailing_zeros(mantissa);

@@ -14,13 +14,14 @@ const MEAN_STABILIZER: f32 = 0.01 * 0.01;
 /// 1.
 const VARIANCE_STABILIZER: f32 = 0.03 * 0.03;
 
-/// Mean structural similarity of two pictures of values from 0 to 1, averaged over the channels; 1
-/// for equal ones.
+/// Mean structural similarity of two pictures with values from 0 to 1, averaged over the channels;
+/// 1 for equal ones.
 ///
 /// None for pictures of different size, or smaller than the window of 11 pixels.
 ///
 /// # Method
-/// [Wang et al. 2004]: Gaussian window of 1.5 pixels, `K1 = 0.01`, `K2 = 0.03`, windows wholly inside the picture only.
+/// [Wang et al. 2004]: Gaussian window of 1.5 pixels, `K1 = 0.01`, `K2 = 0.03`, only windows that
+/// are entirely inside the picture.
 ///
 /// [Wang et al. 2004]: https://doi.org/10.1109/TIP.2003.819861
 pub fn ssim(a: &Image<[f32; 3]>, b: &Image<[f32; 3]>) -> Option<f64> {
@@ -30,7 +31,7 @@ pub fn ssim(a: &Image<[f32; 3]>, b: &Image<[f32; 3]>) -> Option<f64> {
     mean(&row_sums(a, b, window_centers(a.height())), a.size())
 }
 
-/// Where a window along a side lies wholly inside.
+/// Positions along a side at which a window is entirely inside.
 pub(super) fn window_centers(length: usize) -> Range<usize> {
     WINDOW_RADIUS_PX
         ..length
@@ -38,7 +39,8 @@ pub(super) fn window_centers(length: usize) -> Range<usize> {
             .max(WINDOW_RADIUS_PX)
 }
 
-/// The measure of a picture from the sums of its rows that have windows; none where there are none.
+/// The mean over a picture, from the sums of its rows that have windows; none if there are no such
+/// rows.
 pub(super) fn mean(rows: &[[f64; 3]], (width, height): (usize, usize)) -> Option<f64> {
     let windows = window_centers(width).len() * window_centers(height).len();
     let means = [0, 1, 2].map(|c| channel_sum(rows, c) / windows as f64);
@@ -49,7 +51,7 @@ fn channel_sum(rows: &[[f64; 3]], c: usize) -> f64 {
     rows.iter().map(|row| row[c]).sum()
 }
 
-/// Sums over the windows of some rows, which lie wholly inside, for each channel.
+/// Sums over the windows of some rows, which are entirely inside, for each channel.
 pub(super) fn row_sums(
     a: &Image<[f32; 3]>,
     b: &Image<[f32; 3]>,
@@ -66,7 +68,7 @@ fn channel(image: &Image<[f32; 3]>, c: usize) -> Image<f32> {
     image.map(|p| p[c])
 }
 
-/// Means over windows of one channel of two pictures, of its squares and of their product.
+/// Window means of one channel of two pictures, of their squares and of their product.
 struct WindowMeans {
     a: Image<f32>,
     b: Image<f32>,
@@ -94,7 +96,7 @@ impl WindowMeans {
             .collect()
     }
 
-    /// Structural similarity of the windows around a pixel.
+    /// Structural similarity of the windows around one pixel.
     #[inline(always)]
     fn similarity(&self, at: (usize, usize)) -> f64 {
         let (u, v) = (self.a[at], self.b[at]);
@@ -126,7 +128,7 @@ impl WindowWeights {
         }
     }
 
-    /// Weighted means around every pixel, the border's values going on outside.
+    /// Weighted means around every pixel, with the border's values extended outside.
     fn windowed_means(&self, plane: &Image<f32>) -> Image<f32> {
         let (width, height) = plane.size();
         let along_x = Image::from_fn(width, height, |x, y| {
@@ -138,7 +140,7 @@ impl WindowWeights {
         })
     }
 
-    /// Weighted mean around `center` of a line of `len` values, each end going on.
+    /// Weighted mean around `center` of a line of `len` values, extended at both ends.
     #[inline(always)]
     fn mean(&self, center: usize, len: usize, value: impl Fn(usize) -> f32) -> f32 {
         let (first, last) = (

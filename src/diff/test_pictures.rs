@@ -1,5 +1,4 @@
-//! Two pictures whose measures other programs have taken; `golden/diff/reference.py` makes the
-//! same.
+//! Two pictures measured with other programs; `golden/diff/reference.py` generates the same ones.
 
 use crate::image::Image;
 

@@ -1,18 +1,18 @@
-//! Differences to look at.
+//! Visualised differences.
 
 use super::bands::{RowSource, bands};
 use super::{NamedChannels, is_same};
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 
-/// How much [`triple`] makes of a difference.
+/// Factor by which [`triple`] magnifies differences.
 const DIFFERENCE_GAIN: f32 = 16.0;
-/// Light behind a transparent pixel in [`triple`]: photographic middle grey, so that neither black
-/// nor white hides.
+/// Light behind transparent pixels in [`triple`]: photographic middle grey, so that neither black
+/// nor white disappears.
 const MIDDLE_GREY: f32 = 0.18;
 
-/// `|a - b| * scale` of every channel, alpha too: a difference in colour alone is transparent.
-/// Infinite where one of them is not a number and the other is.
+/// `|a - b| * scale` of every channel, including alpha: a difference in colour alone is
+/// transparent. Infinite where only one of the two is not a number.
 ///
 /// # Panics
 /// When the sizes differ.
@@ -39,7 +39,7 @@ fn pixel_distance<P: NamedChannels>(mut a: P, b: &P, scale: f32) -> P {
     a
 }
 
-/// How far apart two values are; `strange` where one of them is not a number and the other is.
+/// Distance of two values; `strange` where only one of them is not a number.
 fn distance(u: f32, v: f32, strange: f32) -> f32 {
     if is_same(u, v) {
         0.0
@@ -50,11 +50,10 @@ fn distance(u: f32, v: f32, strange: f32) -> f32 {
     }
 }
 
-/// `expected | 16 times the difference | actual`, side by side, to be looked at as one picture.
+/// `expected | 16 times the difference | actual`, side by side in one picture.
 ///
-/// Transparent pixels show middle grey. Differences of alpha are grey; where one picture is not a
-/// number and the other is, the difference is white. The sizes may differ: what one picture does
-/// not have is black.
+/// Transparent pixels show middle grey. Differences in alpha are grey; where only one picture is
+/// not a number, the difference is white. The sizes may differ: missing pixels are black.
 pub fn triple<P: NamedChannels>(expected: &Image<P>, actual: &Image<P>) -> Image<LinearRgb> {
     let width = expected.width().max(actual.width());
     let height = expected.height().max(actual.height());
@@ -79,7 +78,7 @@ fn channels<P: NamedChannels>(pixel: &P) -> &[f32] {
     bytemuck::cast_slice(std::slice::from_ref(pixel))
 }
 
-/// A pixel over the backdrop; black where there is none.
+/// A pixel over the backdrop; black where it is missing.
 fn shown_over_grey<P: NamedChannels>(pixel: Option<&P>) -> LinearRgb {
     match *pixel.map_or(&[][..], channels) {
         [r, g, b, a] => LinearRgb::new(r, g, b) + LinearRgb::grey(MIDDLE_GREY * (1.0 - a)),
@@ -89,7 +88,7 @@ fn shown_over_grey<P: NamedChannels>(pixel: Option<&P>) -> LinearRgb {
     }
 }
 
-/// Colour by colour what differs; a missing pixel is zeros.
+/// The difference per colour channel; a missing pixel counts as zeros.
 fn shown_difference(a: &[f32], b: &[f32]) -> LinearRgb {
     let [red, green, blue, alpha] =
         [0, 1, 2, 3].map(|c| magnified_error(channel_or_zero(a, c), channel_or_zero(b, c)));
@@ -104,9 +103,9 @@ fn channel_or_zero(values: &[f32], c: usize) -> f32 {
     values.get(c).copied().unwrap_or(0.0)
 }
 
-/// The distance of two values, magnified; 1 where one of them is not a number.
+/// The magnified distance of two values; 1 where only one of them is not a number.
 fn magnified_error(u: f32, v: f32) -> f32 {
-    // The gain is a power of 2: its inverse times itself is 1 exactly.
+    // The gain is a power of 2: multiplied by its inverse it is exactly 1.
     DIFFERENCE_GAIN * distance(u, v, 1.0 / DIFFERENCE_GAIN)
 }
 

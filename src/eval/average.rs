@@ -1,8 +1,8 @@
-//! Average precision from a precision curve, in its two definitions.
+//! Average precision from a precision curve, by its two definitions.
 
 use super::rank::Running;
 
-/// Where precision is read: recalls of 0, 0.01 .. 1.
+/// Recalls at which precision is sampled: 0, 0.01 .. 1.
 pub(super) const RECALL_POINTS: usize = 101;
 
 /// The area under the interpolated precision envelope, by trapezoids over 101 recalls.
@@ -18,13 +18,13 @@ pub(super) fn trapezoid(recall: &[f64], precision: &[f64]) -> f64 {
     strips.map(|i| strip_area(i, [read[i], read[i + 1]])).sum()
 }
 
-/// Between the `i`-th recall and the next one.
+/// The area between the `i`-th recall and the next one.
 #[inline]
 fn strip_area(i: usize, heights: [f64; 2]) -> f64 {
     (recall_at(i + 1) - recall_at(i)) * (heights[1] + heights[0]) / 2.0
 }
 
-/// The envelope of the precision at each of the recalls, linear between its points.
+/// The precision envelope at each of the recalls, linear between its points.
 fn envelope_samples(recall: &[f64], precision: &[f64]) -> [f64; RECALL_POINTS] {
     let xs = with_ends(0.0, recall, 1.0);
     let mut ys = with_ends(1.0, precision, 0.0);
@@ -41,8 +41,8 @@ fn with_ends(first: f64, values: &[f64], last: f64) -> Vec<f64> {
     [&[first], values, &[last]].concat()
 }
 
-/// The mean of the precision envelope at 101 recalls, each read at the first detection that reaches
-/// it.
+/// The mean of the precision envelope at 101 recalls, each sampled at the first detection that
+/// reaches it.
 ///
 /// # Method
 /// As the COCO tools compute it (`COCOeval.accumulate`).
@@ -65,7 +65,7 @@ fn first_reaching(recall: f64, recalls: &[f64]) -> usize {
     recalls.partition_point(|&r| r < recall)
 }
 
-/// Recall and precision after each detection, `epsilon` keeping the divisions defined.
+/// Recall and precision after each detection; `epsilon` keeps the divisions defined.
 pub(super) fn recall_and_precision(
     sums: &Running,
     truths: f64,
@@ -78,17 +78,17 @@ pub(super) fn recall_and_precision(
     (recalls.collect(), precisions.collect())
 }
 
-/// Piecewise linear reading as NumPy's `interp` does it; the last of equal positions counts.
+/// Piecewise linear interpolation like NumPy's `interp`; of equal positions the last one counts.
 pub(super) fn interpolated(x: f64, xs: &[f64], ys: &[f64]) -> f64 {
     between(x, xs.partition_point(|&at| at <= x), xs, ys)
 }
 
-/// The same where the first position beyond `x` is known.
+/// The same if the first position beyond `x` is already known.
 fn between(x: f64, after: usize, xs: &[f64], ys: &[f64]) -> f64 {
     match after {
         0 => ys[0],
         n if n == xs.len() => ys[n - 1],
-        // What the line gives there, without its division.
+        // The value that the line has there, without its division.
         n if ys[n] == ys[n - 1] => ys[n],
         n => on_line(x, [xs[n - 1], xs[n]], [ys[n - 1], ys[n]]),
     }
@@ -99,7 +99,7 @@ fn on_line(x: f64, xs: [f64; 2], ys: [f64; 2]) -> f64 {
     (ys[1] - ys[0]) / (xs[1] - xs[0]) * (x - xs[0]) + ys[0]
 }
 
-/// Makes values the greatest of those that follow.
+/// Replaces each value with the maximum of itself and those after it.
 fn make_envelope(values: &mut [f64]) {
     let mut best = f64::NEG_INFINITY;
     for value in values.iter_mut().rev() {
@@ -123,9 +123,9 @@ mod tests {
     #[test]
     fn half_of_everything_found_without_error_is_half() {
         let (recall, precision) = ([0.25, 0.5], [1.0, 1.0]);
-        // Recalls 0 to 0.5 are 51 of 101 readings.
+        // Recalls 0 to 0.5 are 51 of 101 samples.
         assert!((mean_of_samples(&recall, &precision) - 51.0 / 101.0).abs() < 1e-12);
-        // From 0.5 the line falls to 0 at 1: half of the half is added.
+        // From 0.5 on the line falls to 0 at 1, which adds half of the other half.
         assert!((trapezoid(&recall, &precision) - 0.75).abs() < 1e-12);
     }
 

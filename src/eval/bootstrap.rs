@@ -1,4 +1,4 @@
-//! How much a score would move if other images had been taken.
+//! How much a score would vary with other images.
 
 use super::{Definition, EvalImage, Matches};
 use rand_chacha::ChaCha8Rng;
@@ -6,10 +6,10 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// A value and its interval of 95 %.
+/// A value and its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
-    /// The value of the sample as it is.
+    /// The value of the actual sample.
     pub value: f64,
     /// Its lower end; by bootstrap the 2.5 % quantile of the resampled values.
     pub low: f64,
@@ -17,10 +17,10 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// mAP@0.5:0.95 with its percentile bootstrap interval over images: `rounds` times, as many images
-/// are drawn with replacement as there are. Images of one [group](EvalImage::group) are alike, so
-/// they are drawn together, as many groups as there are. The same seed gives the same interval. A
-/// draw in which nothing is to be found has no score and does not count.
+/// mAP@0.5:0.95 with its percentile bootstrap interval over images: each of `rounds` resamples
+/// draws as many images with replacement as there are. Images of one [group](EvalImage::group) are
+/// similar, so whole groups are drawn, as many as there are. The same seed gives the same interval.
+/// A resample without any objects has no score and does not count.
 ///
 /// # Method
 /// [Efron 1979], percentile interval.
@@ -36,7 +36,7 @@ pub fn bootstrap(
 }
 
 impl Matches {
-    /// As [`bootstrap()`].
+    /// Like [`bootstrap()`].
     pub fn bootstrap(&self, rounds: usize, seed: u64) -> Interval {
         let rounds = (0..rounds as u64).into_par_iter();
         let values = rounds.filter_map(|round| {
@@ -48,7 +48,7 @@ impl Matches {
     }
 }
 
-/// The percentile interval of resampled values; the value itself where there are none.
+/// The percentile interval of resampled values; the value itself if there are none.
 pub(crate) fn interval(value: f64, mut values: Vec<f64>) -> Interval {
     if values.is_empty() {
         return Interval {
@@ -65,14 +65,14 @@ pub(crate) fn interval(value: f64, mut values: Vec<f64>) -> Interval {
     }
 }
 
-/// A quantile of sorted values, between two of them where need be.
+/// A quantile of sorted values, interpolated between two of them if necessary.
 fn quantile(values: &[f64], q: f64) -> f64 {
     let place = q * values.len().saturating_sub(1) as f64;
     let (low, high) = (place as usize, (place as usize + 1).min(values.len() - 1));
     values[low] + (values[high] - values[low]) * (place - low as f64)
 }
 
-/// How often each of `count` things is drawn in `count` draws.
+/// How often each of `count` items is drawn in `count` draws.
 pub(crate) fn drawn(count: usize, seed: u64, round: u64) -> Vec<u32> {
     let mut rng = round_generator(seed, round);
     let mut times = vec![0; count];

@@ -1,4 +1,4 @@
-//! The boxes of every class, image by image: each box is looked at once, however many classes there
+//! The boxes of every class, image by image: each box is visited once, however many classes there
 //! are.
 
 use super::{Detection, EvalImage, GroundTruth};
@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::iter::Peekable;
 
-/// Where a box stands.
+/// The position of a box.
 #[derive(Clone, Copy)]
 struct BoxPlace {
     class: u32,
@@ -14,7 +14,7 @@ struct BoxPlace {
     index: usize,
 }
 
-/// All boxes in order of class, image and, of detections, confidence.
+/// All boxes sorted by class, image and, for detections, confidence.
 pub(super) struct ByClass<'a> {
     sheets: &'a [EvalImage],
     truth: Vec<BoxPlace>,
@@ -29,13 +29,13 @@ pub(super) struct ClassBoxes<'a> {
     found: &'a [BoxPlace],
 }
 
-/// What an image has of a class.
+/// The boxes of a class in one image.
 pub(super) struct ImageBoxes<'a> {
-    /// Which sheet.
+    /// The index of the sheet.
     pub(super) sheet: usize,
     /// In the sheet's order.
     pub(super) truth: Vec<&'a GroundTruth>,
-    /// The surest first; equal ones in the sheet's order.
+    /// By decreasing confidence; equal ones in the sheet's order.
     pub(super) found: Vec<&'a Detection>,
 }
 
@@ -49,7 +49,7 @@ impl<'a> ImageBoxes<'a> {
     }
 }
 
-/// The places of boxes of these classes, given image by image.
+/// The positions of all boxes, whose classes are given image by image.
 fn places(sheets: impl Iterator<Item: Iterator<Item = u32>>) -> Vec<BoxPlace> {
     let mut places = Vec::new();
     for (sheet, classes) in sheets.enumerate() {
@@ -67,7 +67,7 @@ impl<'a> ByClass<'a> {
         let truth = sheets.iter().map(|s| s.truth.iter().map(|t| t.class));
         let found = sheets.iter().map(|s| s.found.iter().map(|f| f.class));
         let (mut truth, mut found) = (places(truth), places(found));
-        // Both sorts keep the order of equal ones.
+        // Both sorts are stable.
         truth.par_sort_by_key(|p| p.class);
         found.par_sort_by(|a, b| a.cmp_detections(b, sheets));
         Self {
@@ -77,7 +77,7 @@ impl<'a> ByClass<'a> {
         }
     }
 
-    /// The classes that occur in the truth, in order.
+    /// The classes that occur in the truth, in ascending order.
     pub(super) fn classes<'s>(&'s self) -> Vec<ClassBoxes<'s>> {
         self.truth
             .chunk_by(|a, b| a.class == b.class)
@@ -85,7 +85,7 @@ impl<'a> ByClass<'a> {
             .collect()
     }
 
-    /// The boxes of the class that all of this truth has.
+    /// The boxes of the class that all boxes in `truth` have.
     fn boxes_with<'s>(&'s self, truth: &'s [BoxPlace]) -> ClassBoxes<'s> {
         ClassBoxes {
             class: truth[0].class,
@@ -126,20 +126,20 @@ impl BoxPlace {
         self.sheet == other.sheet
     }
 
-    /// Of detections: by class and image, the surest first.
+    /// For detections: by class and image, then by decreasing confidence.
     fn cmp_detections(&self, other: &Self, sheets: &[EvalImage]) -> Ordering {
         (self.class, self.sheet)
             .cmp(&(other.class, other.sheet))
             .then_with(|| other.confidence(sheets).total_cmp(&self.confidence(sheets)))
     }
 
-    /// Of a detection.
+    /// The confidence of a detection.
     fn confidence(&self, sheets: &[EvalImage]) -> f64 {
         sheets[self.sheet].found[self.index].confidence
     }
 }
 
-/// The next boxes where they lie on this sheet.
+/// The next boxes if they are on this sheet.
 fn next_on<'a>(
     sheet: usize,
     places: &mut Peekable<impl Iterator<Item = &'a [BoxPlace]>>,
@@ -148,7 +148,7 @@ fn next_on<'a>(
     next.unwrap_or_default()
 }
 
-/// The first sheet that any of the next boxes lie on.
+/// The first sheet that has any of the next boxes.
 fn first_sheet(next: [Option<&&[BoxPlace]>; 2]) -> Option<usize> {
     let sheets = next.into_iter().flatten().map(|places| places[0].sheet);
     sheets.min()

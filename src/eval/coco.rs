@@ -1,4 +1,4 @@
-//! Average precision and recall as the COCO tools compute them.
+//! Average precision and recall as computed by the COCO tools.
 
 use super::average::{mean_of_samples, recall_and_precision};
 use super::by_class::{ByClass, ImageBoxes};
@@ -11,14 +11,14 @@ use super::{
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// No more detections of a class than this count in an image: the surest.
+/// Maximum number of detections of a class that count in an image: the most confident ones.
 pub(crate) const MAX_DETECTIONS: [usize; 3] = [1, 10, 100];
-/// Keeps a precision defined: the distance of 1 to the next number, as in the original.
+/// Keeps a precision defined: the distance from 1 to the next float, as in the original.
 const PRECISION_EPSILON: f64 = f64::EPSILON;
-/// No overlap reaches 1 for sure.
+/// An overlap may not quite reach 1 because of rounding.
 const MAX_THRESHOLD: f64 = 1.0 - 1e-10;
 
-/// Objects of which size are looked for; the others are ignored.
+/// The size range of the objects to find; others are ignored.
 #[derive(Clone, Copy)]
 pub(super) enum AreaRange {
     /// Of any size.
@@ -38,16 +38,16 @@ pub struct CocoScores {
     pub scores: Scores,
     /// AP@0.5:0.95 of small, medium and large objects; none where there are no such objects.
     pub ap_by_area: [Option<f64>; 3],
-    /// Average recall over objects of all sizes with 1, 10 and 100 detections an image.
+    /// Average recall over objects of all sizes with 1, 10 and 100 detections per image.
     pub ar_by_count: [Option<f64>; 3],
-    /// Average recall of small, medium and large objects with 100 detections an image.
+    /// Average recall of small, medium and large objects with 100 detections per image.
     pub ar_by_area: [Option<f64>; 3],
 }
 
 impl AreaRange {
     const ALL: [Self; 4] = [Self::All, Self::Small, Self::Medium, Self::Large];
 
-    /// Whether it takes an area, square pixels; both limits are included.
+    /// Whether it contains an area, square pixels; both limits are included.
     fn holds(self, area: f64) -> bool {
         let limits = match self {
             Self::All => 0.0..=1e10,
@@ -75,14 +75,14 @@ pub fn coco(sheets: &[EvalImage], weights: &[u32]) -> CocoScores {
     CocoScores::from_measured(&measured)
 }
 
-/// For each of [`AreaRange::ALL`].
+/// Rankings for each of [`AreaRange::ALL`].
 fn rankings_by_area(sheets: &[EvalImage]) -> [Vec<Ranking>; 4] {
     let classes = ByClass::new(sheets);
     AreaRange::ALL.map(|range| rankings(&classes, range))
 }
 
 impl CocoScores {
-    /// From what was measured in all areas, and in each range of them.
+    /// From the results for all areas, and for each size range.
     fn from_measured([all, by_area @ ..]: &[Vec<RangeScore<'_>>; 4]) -> Self {
         let by_area = by_area.each_ref();
         Self {
@@ -94,7 +94,7 @@ impl CocoScores {
     }
 }
 
-/// The detections of every class with something to find, the surest 100 of each image.
+/// The detections of every class with something to find, the 100 most confident ones of each image.
 pub(super) fn rankings(classes: &ByClass<'_>, range: AreaRange) -> Vec<Ranking> {
     let classes = classes.classes();
     let rank = classes.par_iter();
@@ -113,7 +113,7 @@ fn class_scores(measured: &[RangeScore<'_>]) -> Scores {
     }
 }
 
-/// Average precision of a class at every threshold; none where there is nothing to find.
+/// Average precision of a class at every threshold; none if there is nothing to find.
 pub(super) fn average_precision(ranking: &Ranking, weights: &[u32]) -> Option<[f64; THRESHOLDS]> {
     RangeScore::new(ranking, weights).map(|measured| measured.ap)
 }
@@ -129,7 +129,7 @@ fn over(measured: &[RangeScore<'_>], value: impl Fn(&RangeScore<'_>) -> f64) -> 
     (!measured.is_empty()).then(|| mean(measured.iter().map(value)))
 }
 
-/// A class in one range of sizes.
+/// A class in one size range.
 struct RangeScore<'a> {
     ranking: &'a Ranking,
     weights: &'a [u32],
@@ -140,7 +140,7 @@ struct RangeScore<'a> {
 }
 
 impl<'a> RangeScore<'a> {
-    /// None for a class without an object in the range.
+    /// None for a class without objects in the range.
     fn new(ranking: &'a Ranking, weights: &'a [u32]) -> Option<Self> {
         let truths = ranking.truths_to_find(weights)?;
         let curves = curves_at_thresholds(ranking, weights, truths);
@@ -155,7 +155,7 @@ impl<'a> RangeScore<'a> {
         })
     }
 
-    /// Recall with so many detections an image.
+    /// Recall with this many detections per image.
     fn recall_within(&self, count: usize) -> [f64; THRESHOLDS] {
         let mut right = [0.0; THRESHOLDS];
         for (hit, weight) in self.surest(count) {
@@ -166,7 +166,7 @@ impl<'a> RangeScore<'a> {
         right.map(|sum| sum / self.truths)
     }
 
-    /// The surest detections of each image.
+    /// The most confident detections of each image.
     fn surest(&self, count: usize) -> impl Iterator<Item = (&Hit, f64)> {
         let hits = self.ranking.counting(self.weights);
         hits.filter(move |(hit, _)| (hit.place as usize) < count)
@@ -191,23 +191,22 @@ impl<'a> RangeScore<'a> {
     }
 }
 
-/// A box of the truth as one range of sizes sees it.
+/// A ground-truth box in the context of one size range.
 struct Target<'a> {
     truth: &'a GroundTruth,
-    /// It is ignored.
+    /// Whether it is ignored.
     ignored: bool,
     taken: Marks,
 }
 
-/// The detections of a class in one image, matched with its boxes, and how many boxes there are to
-/// be found.
+/// The detections of a class in one image, matched with its boxes, and the number of boxes to find.
 fn match_image(image: &ImageBoxes<'_>, range: AreaRange) -> (Vec<Hit>, usize) {
     let mut targets = targets_of(image, range);
     let hits = match_targets(image, &mut targets, range);
     (hits, targets.iter().filter(|t| !t.ignored).count())
 }
 
-/// The surest detections, each with the targets that it takes.
+/// The most confident detections, each with the targets that it matches.
 fn match_targets(image: &ImageBoxes<'_>, targets: &mut [Target<'_>], range: AreaRange) -> Vec<Hit> {
     let index = BoxIndex::new(targets.iter().map(|t| t.truth.bbox));
     let surest = image.found.iter().take(MAX_DETECTIONS[2]).enumerate();
@@ -219,14 +218,14 @@ fn match_targets(image: &ImageBoxes<'_>, targets: &mut [Target<'_>], range: Area
         .collect()
 }
 
-/// Places of the targets near a detection, and how far they overlap it.
+/// Indices of the targets that a detection overlaps, and by how much.
 fn overlaps_with(found: &Detection, targets: &[Target<'_>], index: &BoxIndex) -> Vec<(usize, f64)> {
     let near = index.near(&found.bbox).into_iter();
     near.map(|k| (k, overlap(found, targets[k].truth)))
         .collect()
 }
 
-/// Those that count come first: a detection takes an ignored box only where none of them is left.
+/// Targets that count come first: a detection matches an ignored box only if none of them is left.
 fn targets_of<'a>(image: &ImageBoxes<'a>, range: AreaRange) -> Vec<Target<'a>> {
     let truth = image.truth.iter();
     let mut targets: Vec<_> = truth.map(|&truth| Target::new(truth, range)).collect();
@@ -243,13 +242,13 @@ impl<'a> Target<'a> {
         }
     }
 
-    /// At a threshold. Any number of detections may lie in a crowd.
+    /// Whether it is free at a threshold. A crowd may match any number of detections.
     fn is_free(&self, bit: Marks) -> bool {
         self.taken & bit == 0 || self.truth.crowd
     }
 }
 
-/// Thresholds at which a detection finds something, and at which it is ignored.
+/// Thresholds at which a detection is a match, and at which it is ignored.
 fn marks(
     found: &Detection,
     targets: &mut [Target<'_>],
@@ -275,8 +274,8 @@ fn marks(
     [right, ignored]
 }
 
-/// The free target with the greatest overlap from `threshold` on, the last of equal ones; those
-/// that count before ignored ones.
+/// The free target with the greatest overlap, at least `threshold`, the last of equal ones; targets
+/// that count precede ignored ones.
 fn nearest(
     targets: &[Target<'_>],
     overlaps: &[(usize, f64)],
@@ -300,13 +299,13 @@ fn nearest(
     best
 }
 
-/// Intersection over union; over the detection's own area where the truth is a crowd.
+/// Intersection over union; for a crowd, over the detection's own area.
 fn overlap(found: &Detection, truth: &GroundTruth) -> f64 {
     let shared = intersection(&found.bbox, &truth.bbox);
     share(shared, whole_area(found, truth, shared))
 }
 
-/// What the shared area is measured against: in a crowd the detection alone.
+/// The area to divide by: for a crowd only that of the detection.
 fn whole_area(found: &Detection, truth: &GroundTruth, shared: f64) -> f64 {
     match truth.crowd {
         true => found.box_area,

@@ -22,12 +22,12 @@ struct ImageRecord {
     id: i64,
     #[serde(default)]
     file_name: String,
-    /// LVIS names its images by address alone.
+    /// LVIS identifies its images only by URL.
     #[serde(default)]
     coco_url: String,
     width: Option<f64>,
     height: Option<f64>,
-    /// A number or a text.
+    /// A number or a string.
     video_id: Option<serde_json::Value>,
 }
 
@@ -55,14 +55,14 @@ struct CocoDetection {
     score: f64,
 }
 
-/// Truth in COCO form: what is to be found, and what its numbers mean.
+/// Ground truth in COCO form: the objects to find, and the meaning of ids.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CocoTruth {
     /// One per image, in order of their ids.
     pub sheets: Vec<EvalImage>,
-    /// Names of the categories, in order of their ids; a class is a place in this list.
+    /// Names of the categories, in order of their ids; a class is an index into this list.
     pub classes: Vec<String>,
-    /// File name of each image, and its width and height where they are told.
+    /// File name of each image, and its width and height if given.
     pub files: Vec<(String, Option<[f64; 2]>)>,
     images: BTreeMap<i64, usize>,
     categories: BTreeMap<i64, u32>,
@@ -71,8 +71,8 @@ pub struct CocoTruth {
 /// Reads `instances.json`: `images`, `annotations` (`bbox` as x, y, width, height), `categories`.
 ///
 /// # Errors
-/// [`Error::File`] for a file that is not such a document; [`Error::Field`] for an id that is there
-/// twice, an annotation of an unknown image or category, or a box that cannot be one.
+/// [`Error::File`] for a file that is not such a document; [`Error::Field`] for a duplicate id, an
+/// annotation of an unknown image or category, or an invalid box.
 pub fn read_coco_truth(path: &Path) -> Result<CocoTruth> {
     CocoTruth::new(&io::read_json_data(path)?).map_err(|e| e.in_file(path))
 }
@@ -80,14 +80,14 @@ pub fn read_coco_truth(path: &Path) -> Result<CocoTruth> {
 /// Adds detections: a list of `image_id`, `category_id`, `bbox` (x, y, width, height), `score`.
 ///
 /// # Errors
-/// As [`read_coco_truth`], and [`Error::Field`] for a score outside 0 to 1.
+/// Like [`read_coco_truth`], and [`Error::Field`] for a score outside 0 to 1.
 pub fn read_coco_results(path: &Path, truth: &mut CocoTruth) -> Result<()> {
     truth
         .add(&io::read_json_data::<Vec<CocoDetection>>(path)?)
         .map_err(|e| e.in_file(path))
 }
 
-/// What documents of truth and of detections give, for the fuzzers.
+/// The sheets of documents with truth and detections, for the fuzzers.
 #[cfg(feature = "fuzzing")]
 pub(crate) fn sheets_of(truth: &str, found: &str) -> Result<Vec<EvalImage>> {
     let mut truth = CocoTruth::new(&io::parse_json(truth)?)?;
@@ -148,8 +148,8 @@ impl CocoTruth {
         Ok((&mut self.sheets[place], class))
     }
 
-    /// Where the images are: in `folder`, or where COCO and petcomp have them for a document at
-    /// `path`. A file name that leads out of a folder leads nowhere.
+    /// Finds the images: in `folder`, or where COCO and petcomp store them for a document at
+    /// `path`. A file name that leads out of a folder is not followed.
     pub fn pictures(&self, path: &Path, folder: Option<&Path>) -> Vec<Option<Picture>> {
         let roots = picture_roots(path, folder);
         let files = self.files.iter();
@@ -169,7 +169,7 @@ fn image_folders(path: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Where the images may be: in the folder that is given, or near the document.
+/// Where the images may be: in the given folder, or near the document.
 fn picture_roots(document: &Path, folder: Option<&Path>) -> Vec<PathBuf> {
     match folder {
         Some(folder) => vec![folder.to_path_buf()],
@@ -187,14 +187,14 @@ fn folders_below(root: &Path, part: &str) -> [PathBuf; 4] {
     ]
 }
 
-/// Of a file's name without extension: what follows its last underscore.
+/// The part of a file's stem after its last underscore.
 fn last_word(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let word = stem.rsplit('_').next();
     word.unwrap_or_default().to_owned()
 }
 
-/// The image of this name below one of the folders, and its size where that is known.
+/// The image of this name below one of the folders, and its size if known.
 fn find_picture(roots: &[PathBuf], name: &str, size: Option<[f64; 2]>) -> Option<Picture> {
     if !is_below(name) {
         return None;
@@ -205,7 +205,7 @@ fn find_picture(roots: &[PathBuf], name: &str, size: Option<[f64; 2]>) -> Option
     Some(Picture { path, size })
 }
 
-/// A path that stays below the folder that it is joined to.
+/// Whether a path stays below the folder that it is joined to.
 fn is_below(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     parts.all(|part| matches!(part, Component::Normal(_)))
@@ -216,7 +216,7 @@ fn stored_size(path: &Path) -> Option<[f64; 2]> {
     Some([header.width as f64, header.height as f64])
 }
 
-/// Places in the document by id, in order of the ids.
+/// Positions in the document by id, in order of the ids.
 fn places(list: &str, ids: impl Iterator<Item = i64>) -> Result<BTreeMap<i64, usize>> {
     let mut places = BTreeMap::new();
     for (i, id) in ids.enumerate() {
@@ -242,7 +242,7 @@ impl ImageRecord {
         (self.listed_name().to_owned(), self.size())
     }
 
-    /// With nothing in it yet.
+    /// An empty sheet.
     fn sheet(&self, name: String) -> EvalImage {
         let video = self.video_id.as_ref().map(ToString::to_string);
         EvalImage {
@@ -263,7 +263,7 @@ impl ImageRecord {
         (width >= 1.0 && height >= 1.0).then_some([width, height])
     }
 
-    /// The file's name without folder and extension; the id of an image without a file.
+    /// The file's name without folder and extension; the id for an image without a file.
     fn stem(&self) -> String {
         match Path::new(self.listed_name()).file_stem() {
             Some(stem) => stem.to_string_lossy().into_owned(),
@@ -271,7 +271,7 @@ impl ImageRecord {
         }
     }
 
-    /// The same with its folder and extension.
+    /// The path with folder and extension.
     fn whole_path(&self) -> String {
         match self.listed_name() {
             "" => self.id.to_string(),
@@ -279,7 +279,7 @@ impl ImageRecord {
         }
     }
 
-    /// The same with its folder.
+    /// The path with its folder, without extension.
     fn path(&self) -> String {
         let folder = Path::new(self.listed_name()).parent();
         let path = folder.unwrap_or(Path::new("")).join(self.stem());
@@ -287,8 +287,8 @@ impl ImageRecord {
     }
 }
 
-/// What the images are called: by their files' names, with folders and extensions where those alone
-/// tell them apart.
+/// Names of the images: their file names, with folders and extensions if only those distinguish
+/// them.
 fn sheet_names(records: &[&ImageRecord]) -> Vec<String> {
     let named = |name: fn(&ImageRecord) -> String| -> Vec<String> {
         records.iter().map(|image| name(image)).collect()
@@ -467,14 +467,14 @@ mod tests {
     fn boxes_are_as_large_as_their_sides_are_told() {
         let text = TRUTH.replace("[0, 0, 2, 2]", "[293.09, 189.23, 80, 80]");
         let mut truth = CocoTruth::new(&io::parse_json(&text).unwrap()).unwrap();
-        // By their corners, one is a hair too small for the medium range, the other a hair less than
-        // half of the truth.
+        // Computed from its corners, one would be a hair too small for the medium range, the other
+        // a hair less than half of the truth.
         let found = r#"[{"image_id": 3, "category_id": 10, "bbox": [0.3, 0.3, 32, 32], "score": 0.9},
             {"image_id": 3, "category_id": 10, "bbox": [293.09, 189.23, 80, 40], "score": 0.5}]"#;
         let found: Vec<CocoDetection> = io::parse_json(found).unwrap();
         truth.add(&found).unwrap();
         let scores = crate::eval::coco(&truth.sheets, &[]);
-        // As of pycocotools: found at the first of ten thresholds, behind one false alarm.
+        // As in pycocotools: found at the first of ten thresholds, after one false positive.
         assert!((scores.scores.classes[0].ap[0] - 0.5).abs() < 1e-12);
         assert!((scores.ap_by_area[1].unwrap() - 0.05).abs() < 1e-12);
     }
@@ -496,7 +496,7 @@ mod tests {
             .unwrap();
         }
         let found = read_coco_truth(&path).unwrap().pictures(&path, None);
-        // Neither the one above the folder, nor the one whose size nobody tells.
+        // Neither the one above the folder, nor the one whose size is unknown.
         assert_eq!(found, [None, None]);
         let sized = TRUTH.replace("\"width\": 9", "\"width\": 9, \"height\": 6");
         let truth = CocoTruth::new(&io::parse_json(&sized).unwrap()).unwrap();

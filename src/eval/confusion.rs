@@ -1,25 +1,26 @@
-//! Which class is found where which is true.
+//! Which class is found for which true class.
 
 use super::EvalImage;
 use super::pairing::{BoxPair, pairs};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How often each class was found where each was true; no class is the background. What never
-/// happened takes no room.
+/// How often each class was found for each true class; none stands for the background. Combinations
+/// that never occur take no space.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Confusion {
-    /// Found and true class, none for the background, and how often.
+    /// Found and true class, none for the background, and how often they occur.
     pub counts: BTreeMap<[Option<u32>; 2], u64>,
 }
 
-/// Which detections are looked at.
+/// Which detections are considered.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ConfusionOptions {
-    /// Those surer than this. Default: 0.25, YOLOv5's.
+    /// Minimum confidence, exclusive. Default: 0.25, as in YOLOv5.
     pub confidence: f64,
-    /// They name a box that they overlap by more than this. Default: 0.45, YOLOv5's.
+    /// Minimum intersection over union, exclusive, of a detection and its box. Default: 0.45, as in
+    /// YOLOv5.
     pub iou: f64,
 }
 
@@ -32,7 +33,7 @@ impl Default for ConfusionOptions {
     }
 }
 
-/// Of the detection and of the box that it names.
+/// The classes of the detection and of the box that it is matched with.
 fn classes_in(sheet: &EvalImage, pair: BoxPair) -> [Option<u32>; 2] {
     [
         pair.found.map(|f| sheet.found[f].class),
@@ -41,8 +42,8 @@ fn classes_in(sheet: &EvalImage, pair: BoxPair) -> [Option<u32>; 2] {
 }
 
 impl Confusion {
-    /// Counts over all images, whatever the classes of two boxes that overlap. Pairs are made from
-    /// the greatest overlap down; crowds, and detections in them, are ignored.
+    /// Counts over all images, whatever the classes of two boxes that overlap. Pairs are formed by
+    /// decreasing overlap; crowds, and detections in them, are ignored.
     pub fn new(sheets: &[EvalImage], options: &ConfusionOptions) -> Self {
         let mut confusion = Self::default();
         for sheet in sheets {
@@ -59,8 +60,8 @@ impl Confusion {
         self.counts.keys().flatten().flatten().copied().collect()
     }
 
-    /// The classes that occur, those first with the most boxes missed, found where nothing is, or
-    /// confused with another class; of equal ones those first with the most boxes.
+    /// The classes that occur, sorted by how many boxes are missed, found where there is nothing,
+    /// or confused with another class, most first; equal ones by their number of boxes.
     pub fn worst(&self) -> Vec<u32> {
         let sums = self.sums_by_class();
         let mut classes: Vec<u32> = sums.keys().copied().collect();
@@ -68,7 +69,7 @@ impl Confusion {
         classes
     }
 
-    /// For each class the wrong ones, and all in which it occurs.
+    /// For each class the number of wrong boxes, and of all in which it occurs.
     fn sums_by_class(&self) -> BTreeMap<u32, [u64; 2]> {
         let mut sums: BTreeMap<u32, [u64; 2]> = BTreeMap::new();
         for (&[found, truth], &count) in &self.counts {

@@ -9,15 +9,15 @@ use super::{EvalImage, mean};
 pub struct Curves {
     /// The classes.
     pub classes: Vec<u32>,
-    /// Per class: recall and the precision there, from the surest detection on.
+    /// Per class: recall and the precision there, by decreasing confidence.
     pub precision_recall: Vec<Vec<[f64; 2]>>,
     /// Per class: confidence and F1.
     pub f1: Vec<Vec<[f64; 2]>>,
-    /// Mean precision of the classes at recalls of 0, 0.01 .. 1, of the envelope.
+    /// Mean precision of the classes, from the envelope, at recalls of 0, 0.01 .. 1.
     pub mean_precision: Vec<[f64; 2]>,
     /// Confidence and mean F1 of the classes.
     pub mean_f1: Vec<[f64; 2]>,
-    /// Where the mean F1 of the classes, smoothed, is greatest.
+    /// Where the smoothed mean F1 of the classes is greatest.
     pub best_confidence: f64,
 }
 
@@ -44,7 +44,7 @@ fn precision_recall(ranked: &Ranked<'_>) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// About [`RECALL_POINTS`] of the points, evenly, and the last.
+/// About [`RECALL_POINTS`] of the points, evenly spaced, and the last one.
 fn thinned<T>(points: impl ExactSizeIterator<Item = T>) -> impl Iterator<Item = T> {
     let count = points.len();
     let step = count.div_ceil(RECALL_POINTS).max(1);
@@ -65,7 +65,7 @@ fn sampled_precision(ranked: &Ranked<'_>) -> Vec<[f64; 2]> {
     recalls.zip(samples).map(|(x, y)| [x, y]).collect()
 }
 
-/// The mean of curves with points at the same places.
+/// The mean of curves with points at the same positions.
 fn mean_over(curves: &[Vec<[f64; 2]>]) -> Vec<[f64; 2]> {
     let first = curves.first().into_iter().flatten();
     first

@@ -1,15 +1,15 @@
-//! Rows of numbers in a label, of which the same may stand there twice.
+//! Rows of numbers in a label, to detect duplicates.
 
 use std::collections::HashSet;
 
-/// The rows of a label so far.
+/// The rows of a label read so far.
 #[derive(Debug, Default)]
 pub(crate) struct KnownRows(HashSet<Vec<u64>>);
 
 impl KnownRows {
-    /// Adds a row; false where an equal one is there.
+    /// Adds a row; false if there is already an equal one.
     pub(crate) fn insert(&mut self, numbers: impl IntoIterator<Item = f64>) -> bool {
-        // The two zeros are equal: 0 more makes the positive one of both.
+        // The two zeros are equal: adding 0 turns both into the positive one.
         let bits = numbers.into_iter().map(|number| (number + 0.0).to_bits());
         self.0.insert(bits.collect())
     }

@@ -7,12 +7,12 @@ use super::{Definition, EvalImage, Scores, check_weights, mean, yolov5};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Detections matched with the truth once, which is what takes long: they can be scored for any
-/// weights of the images.
+/// Detections matched with the ground truth once, which is the slow part: they can then be scored
+/// for any weights of the images.
 #[derive(Clone, Debug)]
 pub struct Matches {
     definition: Definition,
-    /// Of each image.
+    /// The group of each image.
     groups: Vec<usize>,
     rankings: Vec<Ranking>,
 }
@@ -27,25 +27,25 @@ impl Matches {
         }
     }
 
-    /// How many images there are.
+    /// The number of images.
     pub fn images(&self) -> usize {
         self.groups.len()
     }
 
-    /// The group of each image, 0, 1, ..; an image without one is a group by itself.
+    /// The group of each image, 0, 1, ..; an ungrouped image is its own group.
     pub(super) fn groups(&self) -> &[usize] {
         &self.groups
     }
 
-    /// How many groups there are.
+    /// The number of groups.
     pub(super) fn group_count(&self) -> usize {
         self.groups.iter().max().map_or(0, |last| last + 1)
     }
 
-    /// The scores, as [`evaluate`](super::evaluate) gives them.
+    /// The scores, as returned by [`evaluate`](super::evaluate).
     ///
     /// # Panics
-    /// When there are weights and not one per image.
+    /// When `weights` is neither empty nor one per image.
     pub fn scores(&self, weights: &[u32]) -> Scores {
         check_weights(weights, self.images());
         match self.definition {
@@ -54,15 +54,15 @@ impl Matches {
         }
     }
 
-    /// [`Scores::map`] of the scores, sooner.
+    /// [`Scores::map`] of the scores, but faster.
     ///
     /// # Panics
-    /// When there are weights and not one per image.
+    /// When `weights` is neither empty nor one per image.
     pub fn map(&self, weights: &[u32]) -> f64 {
         self.map_if_any(weights).unwrap_or(0.0)
     }
 
-    /// As [`map`](Self::map); none where nothing is to be found.
+    /// Like [`map`](Self::map); none if there is nothing to find.
     pub(crate) fn map_if_any(&self, weights: &[u32]) -> Option<f64> {
         check_weights(weights, self.images());
         let rankings = self.rankings.par_iter();
@@ -72,7 +72,7 @@ impl Matches {
         (!each.is_empty()).then(|| mean(each))
     }
 
-    /// Mean over the thresholds of a class' average precision.
+    /// A class's average precision, averaged over the thresholds.
     fn class_map(&self, ranking: &Ranking, weights: &[u32]) -> Option<f64> {
         let average_precision = match self.definition {
             Definition::Yolov5 => yolov5::average_precision(ranking, weights),
@@ -82,7 +82,7 @@ impl Matches {
     }
 }
 
-/// In order of the first image of each.
+/// Numbered by the first image of each group.
 fn group_numbers(sheets: &[EvalImage]) -> Vec<usize> {
     let (mut known, mut numbers) = (BTreeMap::new(), 0_usize..);
     let mut next = || numbers.next().unwrap_or_default();
@@ -95,7 +95,7 @@ fn group_numbers(sheets: &[EvalImage]) -> Vec<usize> {
         .collect()
 }
 
-/// The detections of every class, ranked as a definition matches them.
+/// The detections of every class, ranked after matching by a definition.
 fn rankings_by(definition: Definition, sheets: &[EvalImage]) -> Vec<Ranking> {
     match definition {
         Definition::Yolov5 => yolov5::rankings(sheets),

@@ -9,31 +9,31 @@ use std::cmp::Ordering;
 /// How a detection or a box is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MistakeKind {
-    /// A detection where nothing is, or the second one of a box.
+    /// A detection where there is nothing, or a second one of the same box.
     FalseAlarm,
     /// A detection of a box of another class.
     WrongClass,
-    /// A box that nothing was found for.
+    /// A box without a detection.
     Missed,
 }
 
-/// A box that is wrong, and the one nearest to it.
+/// A wrong box, and the one that it overlaps most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mistake {
-    /// Which sheet.
+    /// The index of the sheet.
     pub sheet: usize,
     /// What is wrong.
     pub kind: MistakeKind,
-    /// The detection: of a miss the one that overlaps it most, however unsure, if any does.
+    /// The detection; for a miss the one that overlaps it most, at any confidence, if any does.
     pub found: Option<usize>,
-    /// The box of the truth: of a false alarm the one that it overlaps most, if any.
+    /// The ground-truth box; for a false positive the one that it overlaps most, if any.
     pub truth: Option<usize>,
     /// How much the two overlap (intersection over union).
     pub iou: f64,
 }
 
-/// All mistakes by the pairs that a [`Confusion`](super::Confusion) counts, the worst first: of
-/// detections the surest, of misses the box with the most area that no detection covers.
+/// All mistakes by the pairs that a [`Confusion`](super::Confusion) counts, the worst first: the
+/// most confident detections, and the missed boxes with the largest area that no detection covers.
 pub fn mistakes(sheets: &[EvalImage], options: &ConfusionOptions) -> Vec<Mistake> {
     let numbered = sheets.par_iter().enumerate();
     let mut all: Vec<(f64, Mistake)> = numbered
@@ -43,7 +43,7 @@ pub fn mistakes(sheets: &[EvalImage], options: &ConfusionOptions) -> Vec<Mistake
     all.into_iter().map(|(_, mistake)| mistake).collect()
 }
 
-/// The mistakes of one image, with the severity of each.
+/// The mistakes of one image, each with its severity.
 fn rated_mistakes(
     i: usize,
     sheet: &EvalImage,
@@ -53,7 +53,7 @@ fn rated_mistakes(
     mistakes.into_iter().map(|m| (severity(sheet, &m), m))
 }
 
-/// Detections before misses; of each kind the most severe first.
+/// Detections before misses; the most severe of each kind first.
 fn worst_first(a: &(f64, Mistake), b: &(f64, Mistake)) -> Ordering {
     let by_kind = a.1.is_miss().cmp(&b.1.is_miss());
     by_kind.then(b.0.total_cmp(&a.0))

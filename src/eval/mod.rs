@@ -1,9 +1,9 @@
-//! Eval: how well the boxes of a detector match the truth.
+//! Evaluation: how well the boxes of a detector match the ground truth.
 //!
-//! Average precision has two definitions in use, and they differ by more than rounding:
+//! Two definitions of average precision are in use, and they differ by more than rounding:
 //! [`Definition::Yolov5`] integrates a precision curve over 101 points, [`Definition::Coco`]
-//! averages 101 readings of it, looks at no more than 100 detections an image and knows boxes that
-//! are ignored. Both are computed here from the same [`EvalImage`]s, one per image.
+//! averages 101 samples of it, considers at most 100 detections per image and supports ignored
+//! boxes. Both are computed here from the same [`EvalImage`]s, one per image.
 //!
 //! ```
 //! use petcomp::eval::{Definition, Detection, EvalImage, GroundTruth, evaluate};
@@ -75,23 +75,23 @@ use crate::geom::BBox;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Number of thresholds of intersection over union: 0.50 to 0.95 in steps of 0.05.
+/// Number of thresholds of the intersection over union: 0.50 to 0.95 in steps of 0.05.
 #[doc(hidden)]
 pub const THRESHOLDS: usize = 10;
 
-/// A box of the truth.
+/// A ground-truth box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroundTruth {
     /// Index into the class list.
     pub class: u32,
-    /// Where, pixels.
+    /// Its position, pixels.
     pub bbox: BBox,
-    /// Area of the box, square pixels: width times height where a file tells them, since corners
-    /// round both.
+    /// Area of the box, square pixels: width times height if the file gives them, since computing
+    /// them from corners rounds both.
     pub box_area: f64,
-    /// Area that decides its size range, square pixels: that of its mask where there is one.
+    /// Area that determines its size range, square pixels: that of its mask if it has one.
     pub area: f64,
-    /// It counts neither as found nor as missed (COCO's `iscrowd`).
+    /// Whether it counts neither as found nor as missed (COCO's `iscrowd`).
     pub crowd: bool,
 }
 
@@ -100,16 +100,16 @@ pub struct GroundTruth {
 pub struct Detection {
     /// Index into the class list.
     pub class: u32,
-    /// Where, pixels.
+    /// Its position, pixels.
     pub bbox: BBox,
-    /// As [`GroundTruth::box_area`]; it decides the size range, too.
+    /// Like [`GroundTruth::box_area`]; it also determines the size range.
     pub box_area: f64,
-    /// How sure the detector is, 0 to 1; average precision looks at the order alone.
+    /// Confidence of the detector, 0 to 1; average precision uses only the order.
     pub confidence: f64,
 }
 
 impl GroundTruth {
-    /// A box to be found, as large as its corners say.
+    /// A box to find, with the area of its corners.
     pub fn new(class: u32, bbox: BBox) -> Self {
         let area = overlap::area(&bbox);
         Self {
@@ -123,7 +123,7 @@ impl GroundTruth {
 }
 
 impl Detection {
-    /// A box as large as its corners say.
+    /// A box with the area of its corners.
     pub fn new(class: u32, bbox: BBox, confidence: f64) -> Self {
         Self {
             class,
@@ -134,21 +134,21 @@ impl Detection {
     }
 }
 
-/// What is in an image and what was found in it.
+/// The objects in an image and the detections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EvalImage {
     /// Name of the image, without folder and extension.
     pub image: String,
-    /// What images of one sequence have in common, by any name; empty of an image by itself.
+    /// An arbitrary name that the images of one sequence share; empty for a single image.
     pub group: String,
-    /// What there is.
+    /// The ground-truth boxes.
     pub truth: Vec<GroundTruth>,
-    /// What was found, in any order.
+    /// The detections, in any order.
     pub found: Vec<Detection>,
 }
 
 impl EvalImage {
-    /// An image in which nothing was found yet.
+    /// An image without detections.
     pub fn new(image: impl Into<String>, truth: Vec<GroundTruth>) -> Self {
         Self {
             image: image.into(),
@@ -159,29 +159,29 @@ impl EvalImage {
     }
 }
 
-/// Where the picture of a sheet is, to be shown.
+/// The picture of a sheet, for display.
 #[doc(hidden)]
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Picture {
     /// The file.
     pub path: PathBuf,
-    /// Width and height that the sheet's boxes are told in, pixels.
+    /// Width and height to which the sheet's boxes refer, pixels.
     pub size: [f64; 2],
 }
 
-/// Boxes lie within so many pixels of the picture's corner: areas then are numbers, and so are
-/// overlaps.
+/// Maximum distance of boxes from the picture's corner, pixels: areas and overlaps then stay
+/// finite.
 const FARTHEST_PX: f64 = 1e9;
 
-/// Which average precision is meant.
+/// Which definition of average precision to use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Definition {
     /// The trapezoid over 101 interpolated points, as YOLOv5 computes it.
     #[default]
     Yolov5,
-    /// The mean of 101 samples of the precision curve, at most 100 detections an image, as the COCO
-    /// tools compute it.
+    /// The mean of 101 samples of the precision curve, at most 100 detections per image, as
+    /// computed by the COCO tools.
     Coco,
 }
 
@@ -190,7 +190,7 @@ pub enum Definition {
 pub struct ClassScores {
     /// Index into the class list.
     pub class: u32,
-    /// How many boxes there are to be found.
+    /// The number of boxes to find.
     pub truths: u64,
     /// Precision and recall at the confidence with the best mean F1 (`yolov5`), at threshold 0.5.
     pub precision: f64,
@@ -203,22 +203,22 @@ pub struct ClassScores {
 /// Average precisions of all classes that occur in the truth.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
-    /// Which definition.
+    /// Which definition was used.
     pub definition: Definition,
     /// One per class with something to find, in order.
     pub classes: Vec<ClassScores>,
 }
 
 impl Scores {
-    /// mAP@0.5:0.95: the mean over classes and thresholds; 0 where there is nothing to find.
+    /// mAP@0.5:0.95: the mean over classes and thresholds; 0 if there is nothing to find.
     pub fn map(&self) -> f64 {
         mean(self.classes.iter().map(ClassScores::mean))
     }
 
-    /// mAP at one threshold, by its place in the list: 0 is mAP@0.5.
+    /// mAP at one threshold, by its index: 0 is mAP@0.5.
     ///
     /// # Panics
-    /// When there are not so many thresholds.
+    /// When the index is out of range.
     pub fn map_at(&self, threshold: usize) -> f64 {
         mean(self.classes.iter().map(|class| class.ap[threshold]))
     }
@@ -231,18 +231,18 @@ impl ClassScores {
     }
 }
 
-/// Scores by the definition asked for; the names of the classes are not needed.
+/// Scores by the given definition; the names of the classes are not needed.
 ///
-/// `weights` says how often each image counts; empty means once. Confidences that are equal rank in
-/// the order of images, and within one as given.
+/// `weights` gives how often each image counts; if it is empty, each counts once. Detections of
+/// equal confidence are ranked in the order of the images, and within an image as given.
 ///
 /// # Panics
-/// When there are weights and not one per sheet.
+/// When `weights` is neither empty nor one per sheet.
 pub fn evaluate(sheets: &[EvalImage], definition: Definition, weights: &[u32]) -> Scores {
     Matches::new(sheets, definition).scores(weights)
 }
 
-/// 0.50, 0.55 .. 0.95, as NumPy's `linspace` gives them.
+/// 0.50, 0.55 .. 0.95, as computed by NumPy's `linspace`.
 #[doc(hidden)]
 pub fn thresholds() -> [f64; THRESHOLDS] {
     let step = (0.95 - 0.5) / (THRESHOLDS - 1) as f64;
@@ -264,12 +264,12 @@ fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     overlap::share(sum, f64::from(count))
 }
 
-/// Curves and the best F1 are looked for between 0 and 1.
+/// Curves and the best F1 are computed for confidences from 0 to 1.
 fn is_confidence(number: f64) -> bool {
     (0.0..=1.0).contains(&number)
 }
 
-/// Fails for percents, logits and NaN, too.
+/// Also fails for percentages, logits and NaN.
 ///
 /// # Errors
 /// The number, and what was expected.
@@ -281,7 +281,7 @@ pub fn check_confidence(number: f64) -> std::result::Result<(), String> {
     Err(format!("{number}, expected a confidence, 0 to 1"))
 }
 
-/// The lines of a text that are not blank, with their places in it.
+/// The lines of a text that are not blank, with their indices.
 fn filled_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let lines = text.lines().enumerate();
     lines.filter(|(_, line)| !line.trim().is_empty())
@@ -292,7 +292,7 @@ fn in_line(i: usize, what: &str) -> String {
 }
 
 /// # Panics
-/// When there are weights and not one per sheet.
+/// When `weights` is neither empty nor one per sheet.
 fn check_weights(weights: &[u32], sheets: usize) {
     assert!(
         weights.is_empty() || weights.len() == sheets,

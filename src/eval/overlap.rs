@@ -1,4 +1,4 @@
-//! How much two boxes share.
+//! How much two boxes overlap.
 
 use super::EvalImage;
 use crate::geom::BBox;
@@ -8,12 +8,12 @@ pub fn iou(a: &BBox, b: &BBox) -> f64 {
     share(intersection(a, b), area(a) + area(b) - intersection(a, b))
 }
 
-/// Area of a box; 0 for one turned inside out.
+/// Area of a box; 0 for an inverted one.
 pub(super) fn area(b: &BBox) -> f64 {
     b.width().max(0.0) * b.height().max(0.0)
 }
 
-/// Area of what two boxes share.
+/// Area of the intersection of two boxes.
 pub(super) fn intersection(a: &BBox, b: &BBox) -> f64 {
     shared_length([a.x0, a.x1], [b.x0, b.x1]) * shared_length([a.y0, a.y1], [b.y0, b.y1])
 }
@@ -23,22 +23,22 @@ fn shared_length(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[1].min(b[1]) - a[0].max(b[0])).max(0.0)
 }
 
-/// A ratio; 0 where there is nothing to share.
+/// A ratio; 0 where the whole is 0.
 pub(super) fn share(part: f64, whole: f64) -> f64 {
     if whole > 0.0 { part / whole } else { 0.0 }
 }
 
-/// Boxes to be asked which of them overlap another one, without looking at each.
+/// An index of boxes that finds those that overlap another box without testing each.
 pub(super) struct BoxIndex {
     boxes: Vec<BBox>,
-    /// Places in `boxes`, in order of their left edges.
+    /// Indices into `boxes`, in order of their left edges.
     order: Vec<usize>,
-    /// The greatest right edge of the boxes up to each place of the order.
+    /// The greatest right edge of the boxes up to each position in `order`.
     reach: Vec<f64>,
 }
 
 impl BoxIndex {
-    /// So few are looked at one by one.
+    /// Up to this many are tested one by one.
     const FEW: usize = 24;
 
     pub(super) fn new(boxes: impl IntoIterator<Item = BBox>) -> Self {
@@ -63,7 +63,7 @@ impl BoxIndex {
         Self::new(sheet.found.iter().map(|f| f.bbox))
     }
 
-    /// Those that share more than an edge with a box, in order.
+    /// Indices of those that share more than an edge with a box, in ascending order.
     pub(super) fn near(&self, b: &BBox) -> Vec<usize> {
         if self.order.is_empty() {
             let all = 0..self.boxes.len();
@@ -75,7 +75,7 @@ impl BoxIndex {
         near
     }
 
-    /// All boxes that may share columns with one, from the left.
+    /// All boxes that may share columns with `b`, from the left.
     fn side_by_side(&self, b: &BBox) -> &[usize] {
         let end = self.order.partition_point(|&i| self.boxes[i].x0 < b.x1);
         let start = self.reach[..end].partition_point(|&reach| reach <= b.x0);
@@ -83,7 +83,7 @@ impl BoxIndex {
     }
 }
 
-/// How far to the right the boxes reach up to each in the order.
+/// The greatest right edge of the boxes up to each position in `order`.
 fn running_right_edges(boxes: &[BBox], order: &[usize]) -> Vec<f64> {
     let edges = order.iter().scan(f64::NEG_INFINITY, |reach, &i| {
         *reach = reach.max(boxes[i].x1);
@@ -92,7 +92,7 @@ fn running_right_edges(boxes: &[BBox], order: &[usize]) -> Vec<f64> {
     edges.collect()
 }
 
-/// Places of the boxes, from the leftmost.
+/// Indices of the boxes, from the leftmost.
 fn order_by_left(boxes: &[BBox]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..boxes.len()).collect();
     order.sort_by(|&a, &b| boxes[a].x0.total_cmp(&boxes[b].x0));

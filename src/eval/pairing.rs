@@ -1,19 +1,19 @@
-//! Which detection names which box, whatever their classes.
+//! Which detection is matched with which box, whatever their classes.
 
 use super::overlap::{BoxIndex, area, intersection, iou, share};
 use super::{ConfusionOptions, EvalImage};
 use crate::geom::BBox;
 use std::collections::BinaryHeap;
 
-/// A detection and the box that it names, by their places in the sheet: without a box it is a false
-/// alarm, without a detection a miss.
+/// A detection and the box that it is matched with, by their indices in the sheet: without a box it
+/// is a false positive, without a detection a miss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct BoxPair {
     pub(super) found: Option<usize>,
     pub(super) truth: Option<usize>,
 }
 
-/// Every detection and every box that counts, once. Pairs are made from the greatest overlap down;
+/// Every detection and every box that counts, once. Pairs are formed by decreasing overlap;
 /// detections in a crowd are ignored.
 pub(super) fn pairs(sheet: &EvalImage, options: &ConfusionOptions) -> Vec<BoxPair> {
     let mut search = PairSearch::new(sheet, options);
@@ -29,7 +29,7 @@ pub(super) fn pairs(sheet: &EvalImage, options: &ConfusionOptions) -> Vec<BoxPai
         .collect()
 }
 
-/// The places of those surer than this.
+/// Indices of the detections above this confidence.
 fn sure_detections(sheet: &EvalImage, confidence: f64) -> Vec<usize> {
     let places = 0..sheet.found.len();
     places
@@ -37,8 +37,8 @@ fn sure_detections(sheet: &EvalImage, confidence: f64) -> Vec<usize> {
         .collect()
 }
 
-/// A detection and the free box that it overlaps most. The greatest comes first: of equal overlaps
-/// the first box, then the first detection.
+/// A detection and the free box that it overlaps most. Candidates are ordered by decreasing
+/// overlap; of equal overlaps the first box comes first, then the first detection.
 #[derive(Clone, Copy, PartialEq)]
 struct PairCandidate {
     overlap: f64,
@@ -78,15 +78,15 @@ impl<'a> PairSearch<'a> {
         }
     }
 
-    /// The box that each detection names.
+    /// The box that each detection is matched with.
     fn match_boxes(&mut self, found: &[usize]) -> Vec<Option<usize>> {
         let mut open: BinaryHeap<PairCandidate> =
             found.iter().filter_map(|&f| self.best(f)).collect();
         let mut matched = vec![None; self.sheet.found.len()];
         while let Some(PairCandidate { truth, found, .. }) = open.pop() {
             if self.taken[truth] {
-                // Its box has been taken; boxes only get fewer, so its next one is no better than
-                // this was.
+                // Its box is taken; the set of free boxes only shrinks, so its next one overlaps no
+                // more than this one did.
                 open.extend(self.best(found));
             } else {
                 self.taken[truth] = true;
@@ -96,7 +96,7 @@ impl<'a> PairSearch<'a> {
         matched
     }
 
-    /// The boxes that no detection names.
+    /// The boxes without a detection.
     fn missed(&self) -> impl Iterator<Item = BoxPair> {
         (0..self.sheet.truth.len())
             .filter(|&t| self.is_open(t))
@@ -106,7 +106,7 @@ impl<'a> PairSearch<'a> {
             })
     }
 
-    /// Whether a box is still to be found.
+    /// Whether a box is still unmatched.
     fn is_open(&self, t: usize) -> bool {
         !self.taken[t] && !self.sheet.truth[t].crowd
     }
@@ -132,7 +132,7 @@ impl<'a> PairSearch<'a> {
         iou(&self.sheet.truth[t].bbox, &self.sheet.found[f].bbox)
     }
 
-    /// As the COCO tools have it, by the share of the detection that lies in a crowd.
+    /// As in the COCO tools, by the share of the detection that is inside a crowd.
     fn in_crowd(&self, found: Option<usize>) -> bool {
         found.is_some_and(|f| {
             let bbox = &self.sheet.found[f].bbox;
@@ -141,7 +141,7 @@ impl<'a> PairSearch<'a> {
         })
     }
 
-    /// Whether so much of a detection lies in this box, and the box is a crowd.
+    /// Whether enough of a detection is inside this box, and the box is a crowd.
     fn is_in_crowd(&self, bbox: &BBox, t: usize) -> bool {
         let truth = &self.sheet.truth[t];
         truth.crowd && share(intersection(bbox, &truth.bbox), area(bbox)) > self.min_iou
@@ -155,7 +155,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// All pairs in order of overlap: what the search above saves.
+    /// All pairs in order of overlap: the brute-force equivalent of the search above.
     fn by_sorting(sheet: &EvalImage, least: f64) -> Vec<(usize, usize)> {
         let each = (0..sheet.truth.len()).flat_map(|t| (0..sheet.found.len()).map(move |f| (t, f)));
         let mut all: Vec<_> = each

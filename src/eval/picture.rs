@@ -5,19 +5,19 @@ use crate::plot::{Axis, Chart, clipped, escaped};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// Widest and narrowest side of a cell of the matrix, what all of them may take, and room for
+/// Smallest and largest side of a cell of the matrix, limit for the whole matrix, and room for
 /// names, in SVG units.
 const CELL_SIDES: [f64; 2] = [26.0, 56.0];
 const MAX_MATRIX_SIDE: f64 = 900.0;
 const NAME_ROOM: f64 = 150.0;
 
-/// So many letters of a name have room beside the matrix, and beside a chart.
+/// How many letters of a name fit next to the matrix, and next to a chart.
 const MAX_NAME_LETTERS: usize = 20;
 
-/// So many classes have a curve of their own beside the mean: colours are not told apart beyond.
+/// How many classes have a separate curve in addition to the mean: more colours cannot be told apart.
 pub(crate) const MAX_CURVES: usize = 7;
 
-/// Precision over recall: the mean of all classes, and the first of the classes to be `shown`.
+/// Precision over recall: the mean of all classes, and the first of the classes in `shown`.
 pub(crate) fn precision_recall_picture(curves: &Curves, names: &[String], shown: &[u32]) -> String {
     let lines = (&curves.mean_precision, &curves.precision_recall[..]);
     picture(
@@ -73,13 +73,13 @@ fn add_curve(chart: &mut Chart, name: String, points: &CurvePoints) {
     chart.curves.push(points.clone());
 }
 
-/// Where the classes to be shown have their curves.
+/// Indices of the classes in `shown` among the curves.
 fn shown_places(curves: &Curves, shown: &[u32]) -> impl Iterator<Item = usize> {
     let shown = shown.iter();
     shown.filter_map(|class| curves.classes.binary_search(class).ok())
 }
 
-/// A chart of shares, both axes from 0 to 1.
+/// A chart of shares, with both axes from 0 to 1.
 fn empty_chart(title: &str, axes: [&str; 2]) -> Chart {
     let [across, up] = axes.map(unit_axis);
     Chart {
@@ -90,7 +90,7 @@ fn empty_chart(title: &str, axes: [&str; 2]) -> Chart {
     }
 }
 
-/// From 0 to 1.
+/// An axis from 0 to 1.
 fn unit_axis(title: &str) -> Axis {
     Axis {
         title: title.into(),
@@ -99,14 +99,14 @@ fn unit_axis(title: &str) -> Axis {
     }
 }
 
-/// Found against true classes, those to be `shown`: each column's shares as shades, counts in
-/// words. Others share a row and a column, and so does the background.
+/// Found by true class, for the classes in `shown`: each column's shares as shades, with the counts
+/// as text. The other classes share a row and a column; the background has one, too.
 pub(crate) fn confusion_picture(confusion: &Confusion, names: &[String], shown: &[u32]) -> String {
     let matrix = ConfusionTable::new(confusion, names, shown);
     let n = matrix.titles.len() as f64;
     let cell = cell_side(n);
     let side = NAME_ROOM + cell * n;
-    // The turned name of the last column reaches beyond it.
+    // The rotated name of the last column extends beyond it.
     let width = side + NAME_ROOM / 2.0;
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {side}\" width=\"{width}\" height=\"{side}\" \
@@ -122,12 +122,12 @@ pub(crate) fn confusion_picture(confusion: &Confusion, names: &[String], shown: 
     svg + "</svg>\n"
 }
 
-/// Of a matrix with so many rows.
+/// The cell size of a matrix with this many rows.
 fn cell_side(rows: f64) -> f64 {
     (MAX_MATRIX_SIDE / rows).clamp(CELL_SIDES[0], CELL_SIDES[1])
 }
 
-/// A name beside its row, and turned above its column; both have the same middle.
+/// A name next to its row, and rotated above its column; both have the same centre.
 fn row_and_column_name(title: &str, middle: f64) -> String {
     let edge = NAME_ROOM - 8.0;
     let short = clipped(title, MAX_NAME_LETTERS);
@@ -135,7 +135,7 @@ fn row_and_column_name(title: &str, middle: f64) -> String {
     word([edge, middle + 4.0], "end", &short, "") + &word([middle, edge], "start", &short, &turned)
 }
 
-/// The classes to be shown, the others as one, and the background.
+/// The classes in `shown`, the others as one, and the background.
 fn titles(confusion: &Confusion, names: &[String], shown: &[u32]) -> Vec<String> {
     let mut titles: Vec<String> = shown
         .iter()
@@ -149,18 +149,18 @@ fn titles(confusion: &Confusion, names: &[String], shown: &[u32]) -> Vec<String>
     titles
 }
 
-/// How many classes are not shown.
+/// The number of classes that are not shown.
 fn count_others(confusion: &Confusion, shown: &[u32]) -> usize {
     let classes = confusion.classes();
     let others = classes.iter().filter(|class| !shown.contains(class));
     others.count()
 }
 
-/// A confusion as a table that is not longer than can be shown.
+/// A confusion matrix as a table of limited size.
 struct ConfusionTable {
-    /// What the rows and columns are.
+    /// Titles of the rows and columns.
     titles: Vec<String>,
-    /// By column and row; what never happened is left out.
+    /// By column and row; combinations that never occur are omitted.
     counts: BTreeMap<[usize; 2], u64>,
     /// Sum of each column.
     sums: Vec<u64>,
@@ -225,7 +225,7 @@ impl ConfusionTable {
     }
 }
 
-/// A count in four letters at most, up to a thousand million.
+/// A count in at most four characters, up to 1,000,000,000.
 fn short(count: u64) -> String {
     match count {
         0..10_000 => count.to_string(),
@@ -241,7 +241,7 @@ fn word([x, y]: [f64; 2], anchor: &str, text: &str, more: &str) -> String {
     )
 }
 
-/// What a class is called: by number where it has no name.
+/// The name of a class: its number if it has none.
 pub(crate) fn class_name(class: u32, names: &[String]) -> String {
     names
         .get(class as usize)
@@ -249,7 +249,7 @@ pub(crate) fn class_name(class: u32, names: &[String]) -> String {
         .unwrap_or_else(|| format!("class {class}"))
 }
 
-/// The column of a class; those that are not shown share the one before the background's.
+/// The column of a class; classes that are not shown share the one before the background's.
 fn column_of(class: Option<u32>, shown: &[u32], background: usize) -> usize {
     let Some(class) = class else {
         return background;

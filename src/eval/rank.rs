@@ -1,4 +1,4 @@
-//! Detections of one class from all images, the surest first.
+//! Detections of one class from all images, by decreasing confidence.
 
 use super::THRESHOLDS;
 use super::by_class::{ClassBoxes, ImageBoxes};
@@ -7,22 +7,22 @@ use rayon::prelude::*;
 /// Bits, one per threshold.
 pub(super) type Marks = u16;
 
-/// A detection after it was matched with the truth.
+/// A detection matched with the ground truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Hit {
     pub(super) confidence: f64,
-    /// Which sheet it is from.
+    /// The index of its sheet.
     pub(super) sheet: usize,
-    /// How many of its class and image are surer.
+    /// How many detections of its class and image are more confident.
     pub(super) place: u32,
-    /// Thresholds at which it found something.
+    /// Thresholds at which it is a true positive.
     pub(super) right: Marks,
     /// Thresholds at which it is ignored.
     pub(super) ignored: Marks,
 }
 
 impl Hit {
-    /// A detection with the thresholds at which it is right and at which it is ignored.
+    /// A detection with the thresholds at which it is right and those at which it is ignored.
     pub(super) fn new(image: &ImageBoxes<'_>, place: usize, [right, ignored]: [Marks; 2]) -> Self {
         Self {
             confidence: image.found[place].confidence,
@@ -33,39 +33,39 @@ impl Hit {
         }
     }
 
-    /// Thresholds at which it found something and counts.
+    /// Thresholds at which it is a true positive and counts.
     pub(super) fn true_positives(&self) -> impl Iterator<Item = usize> {
         marked(self.right & !self.ignored)
     }
 
-    /// Whether it is right at a threshold; none where it is ignored.
+    /// Whether it is right at a threshold; none if it is ignored there.
     fn is_right_at(&self, threshold: usize) -> Option<bool> {
         let is_ignored = is_marked(self.ignored, threshold);
         (!is_ignored).then(|| is_marked(self.right, threshold))
     }
 }
 
-/// Running sums of true and false positives at one threshold, the surest detection first.
+/// Running sums of true and false positives at one threshold, by decreasing confidence.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Running {
     pub(super) right: Vec<f64>,
     pub(super) wrong: Vec<f64>,
 }
 
-/// The detections of a class, matched with the truth once: they can be counted for any weights of
-/// the images.
+/// The detections of a class, matched with the ground truth once: they can then be counted for any
+/// weights of the images.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ranking {
     pub(super) class: u32,
-    /// Sheets with boxes to be found, and how many.
+    /// Sheets with boxes to find, and the number of such boxes.
     truths: Vec<(usize, usize)>,
-    /// The surest first; equal ones in the order of images.
+    /// By decreasing confidence; equal ones in the order of images.
     pub(super) hits: Vec<Hit>,
 }
 
 impl Ranking {
-    /// `match_image` gives the detections of an image, matched with its boxes, and how many of
-    /// those there are to be found.
+    /// `match_image` returns the detections of an image, matched with its boxes, and the number of
+    /// boxes to find.
     pub(super) fn new(
         boxes: &ClassBoxes<'_>,
         match_image: impl Fn(&ImageBoxes<'_>) -> (Vec<Hit>, usize) + Send + Sync,
@@ -87,7 +87,7 @@ impl Ranking {
         }
     }
 
-    /// How many boxes there are to be found.
+    /// The number of boxes to find.
     pub(super) fn truths(&self, weights: &[u32]) -> f64 {
         self.truths
             .iter()
@@ -95,12 +95,12 @@ impl Ranking {
             .sum()
     }
 
-    /// How many boxes there are to be found; none where there are no such boxes.
+    /// The number of boxes to find; none if it is 0.
     pub(super) fn truths_to_find(&self, weights: &[u32]) -> Option<f64> {
         Some(self.truths(weights)).filter(|&truths| truths > 0.0)
     }
 
-    /// Those of images that count.
+    /// Detections in images with a positive weight, with that weight.
     pub(super) fn counting(&self, weights: &[u32]) -> impl Iterator<Item = (&Hit, f64)> {
         self.hits
             .iter()
@@ -108,7 +108,7 @@ impl Ranking {
             .filter(|(_, count)| *count > 0.0)
     }
 
-    /// Those of images that count that are not ignored at a threshold, and whether they are right.
+    /// The same without those ignored at a threshold, and whether they are right.
     pub(super) fn counting_at(
         &self,
         threshold: usize,
@@ -133,12 +133,11 @@ impl Ranking {
         sums
     }
 
-    /// Sums at every threshold where a precision curve can turn: at each true positive, before it,
-    /// and at the end.
+    /// Sums at every threshold, only where a precision curve can turn: at each true positive,
+    /// before it, and at the end.
     ///
-    /// Between two true positives precision falls with every detection and recall stands still. So
-    /// of those only the last is ever read, and the envelope of precision is that of all of
-    /// them.
+    /// Between two true positives precision falls with every detection while recall is constant. So
+    /// only the last of these is ever read, and the envelope of precision is unchanged.
     pub(super) fn turns(&self, weights: &[u32]) -> [Running; THRESHOLDS] {
         let mut tallies: [TurnTally; THRESHOLDS] = Default::default();
         let mut all = 0.0;
@@ -155,7 +154,7 @@ impl Ranking {
     }
 }
 
-/// Sums at one threshold where a precision curve can turn, in the making.
+/// The sums at one threshold where a precision curve can turn, while they are collected.
 #[derive(Default)]
 struct TurnTally {
     sums: Running,
@@ -180,7 +179,7 @@ impl TurnTally {
         self.sums.turn(self.right, self.wrong(all));
     }
 
-    /// False positives among the first `all` detections.
+    /// The number of false positives among the first `all` detections.
     fn wrong(&self, all: f64) -> f64 {
         all - self.right - self.ignored
     }
@@ -192,7 +191,7 @@ impl Running {
         self.wrong.push(wrong);
     }
 
-    /// Adds sums that are others than the last ones.
+    /// Adds sums unless they equal the last ones.
     fn turn(&mut self, right: f64, wrong: f64) {
         if self.last() != (right, wrong) {
             self.push(right, wrong);
@@ -205,7 +204,7 @@ impl Running {
     }
 }
 
-/// The thresholds that are marked.
+/// The indices of the set bits.
 pub(super) fn marked(mut marks: Marks) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let next = (marks != 0).then(|| marks.trailing_zeros() as usize)?;
@@ -301,7 +300,8 @@ mod tests {
             weights in prop::collection::vec(0_u32..3, 4),
             rare in 0_u16..5,
         ) {
-            // Most detections are wrong, as in life, and what is right at a threshold is so at those below.
+            // Most detections are wrong, as in practice, and one that is right at a threshold is
+            // right at those below.
             let made = |&(right, ignored, kind, sheet): &(u16, u16, u16, usize)| {
                 let right = if kind < rare { 0 } else { right };
                 Hit { sheet, ..hit(right & !ignored, if kind == 4 { ignored } else { 0 }) }

@@ -8,7 +8,7 @@ use crate::io;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// What is known of each image beside its boxes.
+/// What is known about each image besides its boxes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tags {
     /// The factors: `light`, `camera`, ..
@@ -16,16 +16,16 @@ pub struct Tags {
     levels: BTreeMap<String, Vec<String>>,
 }
 
-/// Reads a CSV, as spreadsheets write it, whose first column is the image and whose others are
-/// factors; its first line names them.
+/// Reads a CSV, as written by spreadsheets, whose first column is the image and whose other columns
+/// are factors, named in the header line.
 ///
-/// An image is called as its sheet is, or by its file, in a folder or without one where the file's
-/// name is that of one image alone. An empty cell says nothing.
+/// An image is identified by the name of its sheet, or by its file name; the folder may be omitted
+/// if only one image has that file name. Empty cells are ignored.
 ///
 /// # Errors
-/// [`Error::File`] for a file that cannot be read; [`Error::Field`] for one without a line of
-/// names, a line of another length, an image that is listed twice, a name of several images, or one
-/// without any image that a sheet is of.
+/// [`Error::File`] for a file that cannot be read; [`Error::Field`] for one without a header line,
+/// a line of different length, an image that is listed twice, an ambiguous name, or a file in which
+/// no image belongs to a sheet.
 pub fn read_tags(path: &Path, sheets: &[EvalImage]) -> Result<Tags> {
     let bytes = io::read_bytes(path)?;
     parse(&bytes, sheets).map_err(|e| e.in_file(path))
@@ -52,7 +52,7 @@ fn parse(bytes: &[u8], sheets: &[EvalImage]) -> Result<Tags> {
     Ok(tags)
 }
 
-/// The reader of CSV passes over empty lines, not over those of spaces; numbers of lines stay.
+/// Empties lines of spaces, which the CSV reader would not skip; line numbers are preserved.
 fn without_blank_lines(text: &str) -> String {
     let lines = text.lines();
     lines
@@ -61,8 +61,8 @@ fn without_blank_lines(text: &str) -> String {
         .collect()
 }
 
-/// Lines of images that are not in the truth: a table may be of a whole dataset. Where there are no
-/// others it is of another one.
+/// Skips lines of images that are not in the truth, since a table may cover a whole dataset. If no
+/// image is in the truth, it belongs to another dataset.
 fn pass_over(unknown: Vec<Error>, are_all: bool) -> Result<()> {
     let count = unknown.len();
     let Some(first) = unknown.into_iter().next() else {
@@ -78,7 +78,7 @@ fn pass_over(unknown: Vec<Error>, are_all: bool) -> Result<()> {
 /// The images of the truth.
 struct Images<'a> {
     names: BTreeSet<&'a str>,
-    /// Those in folders, by the name alone.
+    /// Those in folders, by file name alone.
     in_folders: BTreeMap<&'a str, Vec<&'a str>>,
 }
 
@@ -94,9 +94,9 @@ impl<'a> Images<'a> {
         Self { names, in_folders }
     }
 
-    /// The image that a name in a table means.
+    /// The image that a name in a table refers to.
     fn called(&self, name: &str) -> Result<Option<&'a str>> {
-        // With as many of its folders as the truth has.
+        // With as many of its folders as in the truth.
         let image = paths_below(name).find_map(|path| self.named(path));
         match image {
             Some(image) => Ok(Some(image)),
@@ -110,7 +110,7 @@ impl<'a> Images<'a> {
             .copied()
     }
 
-    /// The one image of this file's name.
+    /// The only image with this file name.
     fn of_file(&self, name: &str) -> Result<Option<&'a str>> {
         let images = self.in_folders.get(name);
         let images = images.or_else(|| self.in_folders.get(without_extension(name)));
@@ -131,12 +131,12 @@ impl<'a> Images<'a> {
     }
 }
 
-/// The path, and what is left of it without its first folder, its first two and so on.
+/// The path, then without its first folder, without its first two and so on.
 fn paths_below(path: &str) -> impl Iterator<Item = &str> {
     std::iter::successors(Some(path), |path| Some(path.split_once('/')?.1))
 }
 
-/// Of an image's file; any other name stays, whatever dots are in it.
+/// Strips the extension of an image file; other names keep their dots.
 fn without_extension(file: &str) -> &str {
     match file.rsplit_once('.') {
         Some((stem, _)) if is_picture(Path::new(file)) => stem,
@@ -144,14 +144,14 @@ fn without_extension(file: &str) -> &str {
     }
 }
 
-/// What a row of cells says of a factor.
+/// The level of a factor in a row of cells.
 fn level(row: &[String], factor: usize) -> Option<&str> {
     let cell = row.get(factor).map(String::as_str);
     cell.filter(|cell| !cell.is_empty())
 }
 
 impl Tags {
-    /// Adds an image's line: its level of each factor.
+    /// Adds an image's line: its level for each factor.
     fn add(&mut self, image: &str, row: &csv::StringRecord) -> Result<()> {
         let levels = row.iter().skip(1).map(String::from).collect();
         match self.levels.insert(image.to_owned(), levels) {
@@ -163,7 +163,7 @@ impl Tags {
         }
     }
 
-    /// No tags yet, for the factors that the first line names behind the image.
+    /// Empty tags for the factors in the header line, after the image column.
     fn with_titles(titles: &csv::StringRecord) -> Result<Self> {
         if titles.len() < 2 {
             let what = "no factors, expected a first line such as image,light,camera";
@@ -175,12 +175,12 @@ impl Tags {
         })
     }
 
-    /// What a factor is for an image; none for an image without tags.
+    /// The level of a factor for an image; none for an image without tags.
     pub fn of(&self, image: &str, factor: usize) -> Option<&str> {
         level(self.levels.get(image)?, factor)
     }
 
-    /// Everything that a factor is for some image, in order.
+    /// All levels that a factor has for some image, in order.
     pub fn levels(&self, factor: usize) -> BTreeSet<&str> {
         let rows = self.levels.values();
         rows.filter_map(|row| level(row, factor)).collect()

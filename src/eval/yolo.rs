@@ -14,33 +14,33 @@ use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Truth of a folder of images: a sheet for each of them, nothing found yet.
+/// Ground truth of a folder of images: a sheet for each of them, without detections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct YoloTruth {
     /// In order of the images' names.
     pub sheets: Vec<EvalImage>,
     /// Width and height of each image, pixels.
     pub sizes: Vec<[u32; 2]>,
-    /// The images, where they are found.
+    /// The images, if they were found.
     pub pictures: Vec<Option<Picture>>,
-    /// How many numbers of keypoints stand behind the box in a label, and in a detection; they are
-    /// left aside.
+    /// How many keypoint numbers follow the box in a label, and in a detection; they are not
+    /// evaluated.
     pub keypoint_numbers: usize,
 }
 
-/// Reads `NAME.txt` of a folder of labels and of those below it: `class cx cy w h`, shares of the
-/// image, one box a line; outlines (`class x1 y1 x2 y2 ..`) give the box around them. Rows of equal
-/// class, box and keypoints count once, as in training.
+/// Reads `NAME.txt` in a folder of labels and its subfolders: `class cx cy w h`, as shares of the
+/// image, one box per line; for outlines (`class x1 y1 x2 y2 ..`) the bounding box is used. Rows
+/// with equal class, box and keypoints count once, as in training.
 ///
-/// The images are below the folder `images`, by default where YOLO has them: the same path with its
-/// last `labels` replaced by `images`. One without a label file shows nothing that is to be found.
-/// Sizes come from the images; `size` is taken for all where it is given. Overlaps do not depend on
-/// it, COCO's ranges of area do.
+/// The images are in the folder `images` or its subfolders, by default where YOLO expects them: the
+/// same path with its last `labels` replaced by `images`. An image without a label file contains no
+/// objects. Sizes come from the images; if `size` is given, it applies to all of them. Overlaps do
+/// not depend on it, but COCO's area ranges do.
 ///
 /// # Errors
-/// [`Error::File`] for a folder without labels or a whole dataset's, a label without an image where
-/// no `size` is given, files of one name in several folders or whose names are not UTF-8, or a bad
-/// line.
+/// [`Error::File`] for a folder without labels or that of a whole dataset, a label without an image
+/// if no `size` is given, files of the same name in several folders or with names that are not
+/// UTF-8, or a bad line.
 pub fn read_yolo_truth(
     labels: &Path,
     images: Option<&Path>,
@@ -49,7 +49,7 @@ pub fn read_yolo_truth(
     read_pose_truth(labels, images, size, 0)
 }
 
-/// As [`read_yolo_truth`], of labels with so many numbers of keypoints behind the box.
+/// Like [`read_yolo_truth`], for labels with this many keypoint numbers after the box.
 pub(crate) fn read_pose_truth(
     labels: &Path,
     images: Option<&Path>,
@@ -68,7 +68,7 @@ pub(crate) fn read_pose_truth(
     Ok(YoloTruth::from_images(all, keypoints))
 }
 
-/// A dataset's folder has the labels of all its parts, and texts that are none.
+/// The folder of a whole dataset has the labels of all its parts, and text files that are not labels.
 fn refuse_dataset(folder: &Path) -> Result<()> {
     let is_file = |name: &&str| folder.join(name).is_file();
     let file = ["data.yaml", "dataset.json"].into_iter().find(is_file);
@@ -90,19 +90,19 @@ fn refuse_dataset(folder: &Path) -> Result<()> {
     Err(Error::file(folder, what))
 }
 
-/// The truth of an image, its size, and the image where it is found.
+/// The ground truth of an image, its size, and the image if it was found.
 struct LabelledImage {
     sheet: EvalImage,
     size: [u32; 2],
     picture: Option<Picture>,
-    /// Rows of its label that are left out.
+    /// Rows of its label that are ignored as duplicates.
     repeated: usize,
 }
 
-/// Files by their names without folder and extension.
+/// Files by name without folder and extension.
 type FilesByName = BTreeMap<String, PathBuf>;
 
-/// A folder of labels and that of its images, whose files have the same names.
+/// A folder of labels and the folder of its images, whose files have the same names.
 struct LabelFolder {
     labels: FilesByName,
     images: FilesByName,
@@ -148,7 +148,7 @@ impl LabelFolder {
         })
     }
 
-    /// What is wrong with a label that has no image.
+    /// The error for a label without an image.
     fn missing_image(&self, name: &str) -> Error {
         let label = self.labels[name].display();
         let what = format!(
@@ -158,8 +158,8 @@ impl LabelFolder {
     }
 }
 
-/// The truth of images, each with its label where YOLO has it: the same path with its last `images`
-/// replaced by `labels`. An image without a label file shows nothing that is to be found.
+/// The ground truth of images, each with its label where YOLO expects it: the same path with its
+/// last `images` replaced by `labels`. An image without a label file contains no objects.
 ///
 /// # Errors
 /// [`Error::File`] for an image that cannot be read, or a bad line.
@@ -167,7 +167,7 @@ pub fn read_yolo_truth_of(images: &[PathBuf]) -> Result<YoloTruth> {
     read_pose_truth_of(images, 0)
 }
 
-/// As [`read_yolo_truth_of`], of labels with so many numbers of keypoints behind the box.
+/// Like [`read_yolo_truth_of`], for labels with this many keypoint numbers after the box.
 pub(crate) fn read_pose_truth_of(images: &[PathBuf], keypoints: usize) -> Result<YoloTruth> {
     let all = images.par_iter().map(|image| read_image(image, keypoints));
     let all = all.collect::<Result<_>>()?;
@@ -191,7 +191,7 @@ fn read_image(image: &Path, keypoints: usize) -> Result<LabelledImage> {
     })
 }
 
-/// What eval needs of a sidecar that petcomp writes: whether the picture is one of a belt.
+/// What eval needs from a sidecar written by petcomp: whether the picture is part of a belt sequence.
 #[derive(Deserialize)]
 struct Sidecar {
     scene: SidecarScene,
@@ -207,14 +207,14 @@ struct SidecarBelt {
     sequence: u64,
 }
 
-/// The sequence of a belt that an image is of, with its dataset's folder, by the sidecar beside it
-/// or its label; empty of any other image.
+/// The belt sequence of an image, prefixed with the folder of its sidecars, found by the sidecar
+/// that belongs to the image or its label; empty for any other image.
 fn sequence_beside(image: Option<&Path>, label: Option<&Path>) -> String {
     let sidecar =
         |path: &Path, step| io::with_last_step(path, step, "scenes").with_extension("json");
     let by_image = image.map(|path| sidecar(path, "images"));
     let by_label = label.map(|path| sidecar(path, "labels"));
-    // Most often the same file.
+    // Usually the same file.
     let by_label = by_label.filter(|path| by_image.as_ref() != Some(path));
     let mut sidecars = [by_image, by_label].into_iter().flatten();
     sidecars
@@ -222,40 +222,40 @@ fn sequence_beside(image: Option<&Path>, label: Option<&Path>) -> String {
         .unwrap_or_default()
 }
 
-/// None of a JSON that is no sidecar of a belt's picture.
+/// None for a JSON that is not the sidecar of a belt's picture.
 fn sequence_in(sidecar: &Path) -> Option<String> {
     let belt = io::read_json_data::<Sidecar>(sidecar).ok()?.scene.belt?;
     let folder = sidecar.parent().unwrap_or(Path::new("")).display();
     Some(format!("{folder}/{}", belt.sequence))
 }
 
-/// Where YOLO has the label of an image.
+/// Where YOLO expects the label of an image.
 pub(crate) fn label_of(image: &Path) -> PathBuf {
     io::with_last_step(image, "images", "labels").with_extension("txt")
 }
 
-/// The names of the classes, which LabelImg writes beside its labels.
+/// The list of class names that LabelImg writes next to its labels.
 pub(crate) fn is_class_list(path: &Path) -> bool {
     path.ends_with("classes.txt")
 }
 
-/// Extensions of the images that Ultralytics 8.4 takes, whether petcomp reads them or not.
+/// Extensions of the images that Ultralytics 8.4 accepts, whether petcomp reads them or not.
 const TRAINED_EXTENSIONS: [&str; 13] = [
     "avif", "bmp", "dng", "heic", "heif", "jp2", "jpeg", "jpg", "mpo", "png", "tif", "tiff", "webp",
 ];
 
-/// Whether a trainer takes a file for an image, by its name.
+/// Whether a trainer treats a file as an image, judged by its name.
 pub(crate) fn is_image(path: &Path) -> bool {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     extension.is_some_and(|e| TRAINED_EXTENSIONS.contains(&e.as_str()))
 }
 
-/// Whether a file is an image by its name, a trainer's or one that petcomp reads.
+/// Whether a file name is that of an image, for a trainer or for petcomp.
 pub(super) fn is_picture(path: &Path) -> bool {
     is_image(path) || Format::from_extension(path).is_some()
 }
 
-/// Nothing where there is no label file.
+/// Empty if there is no label file.
 fn truth_of(label: Option<&Path>, size: [u32; 2], keypoints: usize) -> Result<LabelTruth> {
     label.map_or_else(
         || Ok(LabelTruth::default()),
@@ -270,15 +270,16 @@ fn picture_of(path: PathBuf, size: [u32; 2]) -> Picture {
     }
 }
 
-/// Adds what a detector found, from `NAME.txt` of a folder and of those below it: `class cx cy w h
-/// confidence`, or with the id of a track behind it.
+/// Adds detections from `NAME.txt` in a folder and its subfolders: `class cx cy w h confidence`,
+/// optionally followed by a track id.
 ///
-/// An image without a file has no detections; a file without an image is refused, as it may be a
-/// misspelt name.
+/// An image without a file has no detections; a file without an image is an error, since its name
+/// may be misspelt.
 ///
 /// # Errors
-/// [`Error::File`] for a folder that cannot be read, a name that the truth does not have or has
-/// twice, files of one name in several folders or whose names are not UTF-8, or a bad line.
+/// [`Error::File`] for a folder that cannot be read, a name that is missing from the truth or
+/// ambiguous there, files of the same name in several folders or with names that are not UTF-8, or
+/// a bad line.
 pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
     let (known, files) = (truth.places_by_name()?, text_files(folder, |_| true)?);
     if files.is_empty() {
@@ -326,7 +327,7 @@ impl YoloTruth {
         Ok(places)
     }
 
-    /// The path of an image, as far as it is known.
+    /// The path of an image, if known.
     fn path_of(&self, place: usize) -> &Path {
         let picture = self.pictures.get(place).and_then(Option::as_ref);
         let name = Path::new(&self.sheets[place].image);
@@ -344,7 +345,7 @@ fn warn_repeated(images: &[LabelledImage]) {
     }
 }
 
-/// What is wrong with a name that no image has.
+/// The error for a name that no image has.
 pub(super) fn no_image(name: &str, count: usize) -> String {
     format!("no image \"{name}\" in the truth of {count} images")
 }
@@ -359,14 +360,14 @@ fn read_detections(path: &Path, size: [u32; 2], keypoints: usize) -> Result<Vec<
     rows.map_err(|what| Error::file(path, what))
 }
 
-/// What was read, or what is wrong with the text.
+/// The parsed value, or what is wrong with the text.
 type Parsed<T> = std::result::Result<T, String>;
 
-/// What a label says.
+/// The content of a label.
 #[derive(Debug, Default, PartialEq)]
 struct LabelTruth {
     boxes: Vec<GroundTruth>,
-    /// Rows that are left out, as trainers do: each has class, box and keypoints of one above it.
+    /// Rows that are ignored, as trainers do: each repeats class, box and keypoints of an earlier one.
     repeated: usize,
 }
 
@@ -382,14 +383,14 @@ fn parse_truth(text: &str, size: [u32; 2], keypoints: usize) -> Parsed<LabelTrut
     })
 }
 
-/// With a confidence at the end of each line.
+/// Parses lines that have a confidence at the end.
 fn parse_detections(text: &str, size: [u32; 2], keypoints: usize) -> Parsed<Vec<Detection>> {
     let rows = parse_rows(text, 1, keypoints)?.into_iter();
     let found = rows.map(|row| Detection::new(row.class, row.bbox(size), row.confidence));
     Ok(found.collect())
 }
 
-/// What a text of labels and one of detections give, for the fuzzers.
+/// The sheet of a label text and a detection text, for the fuzzers.
 pub(crate) fn sheet_of(truth: &str, found: &str, size: [u32; 2]) -> Parsed<EvalImage> {
     let truth = parse_truth(truth, size, 0)?.boxes;
     Ok(EvalImage {
@@ -398,21 +399,21 @@ pub(crate) fn sheet_of(truth: &str, found: &str, size: [u32; 2]) -> Parsed<EvalI
     })
 }
 
-/// The text files of a kind below a folder.
+/// The wanted text files below a folder.
 fn text_files(folder: &Path, is_wanted: impl Fn(&Path) -> bool) -> Result<FilesByName> {
     let is_text = |path: &Path| path.extension().is_some_and(|e| e == "txt");
     let is_wanted = |path: &Path| is_text(path) && is_wanted(path);
     by_name(io::files_below(folder, is_wanted, usize::MAX)?)
 }
 
-/// The pictures below a folder; none where there is no folder.
+/// The pictures below a folder; none if the folder does not exist.
 fn picture_files(folder: &Path) -> Result<FilesByName> {
     if !folder.is_dir() {
         return Ok(FilesByName::new());
     }
     let mut paths = io::files_below(folder, is_picture, usize::MAX)?;
-    // Of one name JPEG and PNG come first, which a page shows as they are, and what cannot be read
-    // last.
+    // For equal names JPEG and PNG come first, since a page can show them directly, and unreadable
+    // formats last.
     paths.sort_by_cached_key(|path| {
         let format = Format::from_extension(path);
         let is_shown = matches!(format, Some(Format::Jpeg | Format::Png));
@@ -421,10 +422,10 @@ fn picture_files(folder: &Path) -> Result<FilesByName> {
     by_name(paths)
 }
 
-/// By what an image and its label are called.
+/// Files by the name that an image and its label share.
 ///
-/// Of one name in one folder the first file counts; in several folders they are of several images,
-/// which nothing tells apart.
+/// Of files with the same name in one folder the first counts; in different folders they belong to
+/// different images that cannot be distinguished.
 fn by_name(paths: Vec<PathBuf>) -> Result<FilesByName> {
     let mut files = FilesByName::new();
     for path in paths {
@@ -452,7 +453,7 @@ fn image_size(image: &Path) -> Result<[u32; 2]> {
     Ok([header.width as u32, header.height as u32])
 }
 
-/// A line: class, box in shares of the image, and what stands behind.
+/// A line: class, box as shares of the image, keypoints and confidence.
 struct LabelRow {
     class: u32,
     shares: BBox,
@@ -460,13 +461,13 @@ struct LabelRow {
     confidence: f64,
 }
 
-/// Boxes may reach beyond the image, but not so many times its side.
+/// Boxes may extend beyond the image, but not by more than this many times its side.
 const MAX_SHARE: f64 = 10.0;
 
 /// Numbers of a box: `cx cy w h`.
 const BOX_NUMBERS: usize = 4;
 
-/// Lines with `extra` numbers (a confidence or nothing) at their ends.
+/// Lines with `extra` numbers (a confidence or none) at their end.
 fn parse_rows(text: &str, extra: usize, keypoints: usize) -> Parsed<Vec<LabelRow>> {
     filled_lines(text)
         .map(|(i, line)| parse_row(line, extra, keypoints).map_err(|what| in_line(i, &what)))
@@ -492,9 +493,9 @@ fn parse_row(line: &str, extra: usize, keypoints: usize) -> Parsed<LabelRow> {
     })
 }
 
-/// Takes the numbers of keypoints out from behind those of the box; a row may do without them.
+/// Removes the keypoint numbers that follow the box; a row may omit them.
 fn take_keypoints(numbers: &mut Vec<f64>, extra: usize, keypoints: usize) -> Parsed<Vec<f64>> {
-    // Behind a confidence there may be the id of a track.
+    // A confidence may be followed by a track id.
     let ends = |behind: usize| (extra..=2 * extra).contains(&behind);
     let is_box = numbers.len().checked_sub(BOX_NUMBERS).is_some_and(ends);
     if keypoints == 0 || is_box {
@@ -516,7 +517,7 @@ fn take_keypoints(numbers: &mut Vec<f64>, extra: usize, keypoints: usize) -> Par
     Ok(taken.collect())
 }
 
-/// The numbers of the place, and those behind them.
+/// The numbers of the box or outline, and those after them.
 fn split_extra(numbers: &[f64], extra: usize) -> Parsed<(&[f64], &[f64])> {
     let extra = extra + usize::from(extra > 0 && has_track_id(numbers));
     let count = numbers.len().checked_sub(extra);
@@ -524,7 +525,8 @@ fn split_extra(numbers: &[f64], extra: usize) -> Parsed<(&[f64], &[f64])> {
     Ok(numbers.split_at(count))
 }
 
-/// Whether a tracker wrote them: a place, which is an even count of numbers, `confidence id`.
+/// Whether a tracker wrote them: the numbers of the box or outline, an even count, then `confidence
+/// id`.
 fn has_track_id(numbers: &[f64]) -> bool {
     match *numbers {
         [_, _, _, _, .., confidence, id] if numbers.len().is_multiple_of(2) => {
@@ -546,7 +548,7 @@ fn parse_finite(word: &str) -> Parsed<f64> {
     }
 }
 
-/// Fails for pixels in place of shares, and for a box with a negative side.
+/// Fails for pixels instead of shares, and for a box with a negative side.
 fn check_shares(place: &[f64]) -> Parsed<()> {
     if let Some(far) = place.iter().find(|share| share.abs() > MAX_SHARE) {
         return Err(format!(
@@ -561,7 +563,7 @@ fn check_shares(place: &[f64]) -> Parsed<()> {
     }
 }
 
-/// The box of `cx cy w h`, or around an outline; none for any other count of numbers.
+/// The box of `cx cy w h`, or around an outline; none for other counts of numbers.
 fn box_around(place: &[f64]) -> Option<BBox> {
     match *place {
         [cx, cy, w, h] => Some(centered_box([cx, cy], [w, h])),
@@ -595,7 +597,7 @@ fn too_few(numbers: &[f64], extra: usize) -> String {
 }
 
 impl LabelRow {
-    /// All that makes it another object than those of other rows.
+    /// All numbers that distinguish the object from those of other rows.
     fn numbers(&self) -> impl Iterator<Item = f64> {
         let BBox { x0, y0, x1, y1 } = self.shares;
         let place = [f64::from(self.class), x0, y0, x1, y1].into_iter();
@@ -861,8 +863,8 @@ mod tests {
         );
     }
 
-    /// A set of photos as a camera and a labelling program leave it: an image in capitals, one
-    /// without objects and so without a label file.
+    /// A set of photos as written by a camera and a labelling program: one file name in capitals,
+    /// one image without objects and hence without a label file.
     fn photo_set(images: &str) -> tempfile::TempDir {
         let root = tempfile::tempdir().unwrap();
         for folder in ["labels/val", images] {

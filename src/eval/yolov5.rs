@@ -1,4 +1,4 @@
-//! Average precision as YOLOv5 computes it.
+//! Average precision as computed by YOLOv5.
 
 use super::average::{interpolated, recall_and_precision, trapezoid};
 use super::by_class::{ByClass, ImageBoxes};
@@ -8,30 +8,30 @@ use super::{ClassScores, Definition, Detection, EvalImage, Scores, THRESHOLDS, c
 use crate::geom::BBox;
 use rayon::prelude::*;
 
-/// Confidences at which precision, recall and F1 are read.
+/// Number of confidences at which precision, recall and F1 are sampled.
 pub(super) const CONFIDENCE_STEPS: usize = 1000;
 /// Keeps recall and F1 defined, as in the original.
 const RATIO_EPSILON: f64 = 1e-16;
 /// Keeps an intersection over union defined, square pixels, as in the original.
 const AREA_EPSILON: f32 = 1e-7;
-/// Half the width, in readings, of the window that F1 is smoothed with before its best confidence
-/// is taken.
+/// Half the width, in samples, of the window that smooths F1 before its best confidence is chosen.
 const SMOOTHING_READINGS: usize = 50;
 
 /// Average precision by the definition of YOLOv5, with precision and recall at the confidence of
 /// the best F1.
 ///
-/// Each detection is held against the box of its class that it overlaps most; of those that name
-/// the same box the surest counts. A box marked as crowd need not be found, and what finds nothing
-/// else and lies in it is ignored, as the COCO tools have it; YOLO labels have no such mark.
+/// Each detection is compared with the box of its class that it overlaps most; of those that match
+/// the same box the most confident one counts. A box marked as crowd need not be found, and a
+/// detection that is inside it and matches nothing else is ignored, as in the COCO tools; YOLO
+/// labels have no such mark.
 ///
 /// # Method
-/// YOLOv5 7.0: `val.py` (`process_batch`) and `utils/metrics.py` (`ap_per_class`); overlaps in
-/// single precision as there. Departs from it where confidences or overlaps are equal: there the
-/// order is that of an unstable sort, here that of the input.
+/// YOLOv5 7.0: `val.py` (`process_batch`) and `utils/metrics.py` (`ap_per_class`); overlaps also in
+/// single precision. Departs from it for equal confidences or overlaps: YOLOv5 uses the order of an
+/// unstable sort, petcomp that of the input.
 ///
 /// # Panics
-/// When there are weights and not one per sheet.
+/// When `weights` is neither empty nor one per sheet.
 pub fn yolov5(sheets: &[EvalImage], weights: &[u32]) -> Scores {
     check_weights(weights, sheets.len());
     scores(&rankings(sheets), weights)
@@ -55,7 +55,7 @@ pub(super) fn scores(rankings: &[Ranking], weights: &[u32]) -> Scores {
     }
 }
 
-/// The scores of all classes at a reading of confidence.
+/// The scores of all classes at a sampled confidence.
 fn scores_at(reading: usize, classes: &[Ranked<'_>], weights: &[u32]) -> Vec<ClassScores> {
     let scores = classes
         .par_iter()
@@ -63,14 +63,14 @@ fn scores_at(reading: usize, classes: &[Ranked<'_>], weights: &[u32]) -> Vec<Cla
     scores.collect()
 }
 
-/// Average precision of a class at every threshold; none where there is nothing to find.
+/// Average precision of a class at every threshold; none if there is nothing to find.
 pub(super) fn average_precision(ranking: &Ranking, weights: &[u32]) -> Option<[f64; THRESHOLDS]> {
     let truths = ranking.truths_to_find(weights)?;
     let turns = ranking.turns(weights);
     Some(turns.each_ref().map(|sums| area_below(sums, truths)))
 }
 
-/// Area below the curve of precision over recall.
+/// Area under the curve of precision over recall.
 fn area_below(sums: &Running, truths: f64) -> f64 {
     let (recall, precision) = curve(sums, truths);
     if recall.is_empty() {
@@ -80,7 +80,7 @@ fn area_below(sums: &Running, truths: f64) -> f64 {
     }
 }
 
-/// The classes with something to find, to be read at a confidence.
+/// The classes with something to find, with precision and recall by confidence.
 pub(super) fn ranked<'a>(rankings: &'a [Ranking], weights: &[u32]) -> Vec<Ranked<'a>> {
     rankings
         .par_iter()
@@ -93,7 +93,7 @@ pub(super) struct Ranked<'a> {
     pub(super) ranking: &'a Ranking,
     pub(super) recall: Vec<f64>,
     pub(super) precision: Vec<f64>,
-    /// Negated, so that they rise.
+    /// Negated, so that they are ascending.
     confidences: Vec<f64>,
 }
 
@@ -127,7 +127,7 @@ impl<'a> Ranked<'a> {
         self.read(&self.recall, confidence, 0.0)
     }
 
-    /// 0 for a class in which nothing at all was found.
+    /// 0 for a class without any detections.
     fn read(&self, values: &[f64], confidence: f64, above_all: f64) -> f64 {
         match self.confidences.first() {
             None => 0.0,
@@ -151,18 +151,18 @@ fn curve(sums: &Running, truths: f64) -> (Vec<f64>, Vec<f64>) {
     recall_and_precision(sums, truths, [RATIO_EPSILON, 0.0])
 }
 
-/// Reading `i` of [`CONFIDENCE_STEPS`], 0 to 1.
+/// Sample `i` of [`CONFIDENCE_STEPS`], 0 to 1.
 pub(super) fn confidence(i: usize) -> f64 {
     i as f64 / (CONFIDENCE_STEPS - 1) as f64
 }
 
-/// Where the smoothed mean F1 of the classes is greatest.
+/// The sample at which the smoothed mean F1 of the classes is greatest.
 pub(super) fn best_confidence(classes: &[Ranked<'_>]) -> usize {
     let sums = f1_sums(classes);
     first_greatest((0..CONFIDENCE_STEPS).map(|i| window_sum(&sums, i)))
 }
 
-/// The sum of the classes' F1 at every reading of confidence.
+/// The sum of the classes' F1 at every sampled confidence.
 fn f1_sums(classes: &[Ranked<'_>]) -> Vec<f64> {
     let readings = (0..CONFIDENCE_STEPS).into_par_iter();
     readings.map(|i| f1_sum(classes, confidence(i))).collect()
@@ -172,7 +172,7 @@ fn f1_sum(classes: &[Ranked<'_>], confidence: f64) -> f64 {
     classes.iter().map(|class| class.f1_at(confidence)).sum()
 }
 
-/// Where the greatest value is; of equal ones the first.
+/// The index of the greatest value, the first of equal ones.
 fn first_greatest(values: impl Iterator<Item = f64>) -> usize {
     let mut best = (0, f64::NEG_INFINITY);
     for (i, value) in values.enumerate() {
@@ -183,7 +183,7 @@ fn first_greatest(values: impl Iterator<Item = f64>) -> usize {
     best.0
 }
 
-/// Sum of the readings around one; the ends go on as they are.
+/// Sum of the samples around one; the end values are extended.
 fn window_sum(values: &[f64], i: usize) -> f64 {
     let (i, reach, last) = (
         i as isize,
@@ -194,8 +194,8 @@ fn window_sum(values: &[f64], i: usize) -> f64 {
     window.map(|i| values[i.clamp(0, last) as usize]).sum()
 }
 
-/// The detections of a class in one image, marked right where they found something, and how many
-/// boxes there are to be found.
+/// The detections of a class in one image, marked as right where they match, and the number of
+/// boxes to find.
 fn match_image(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
     let [crowds, truth] = [true, false].map(|crowd| boxes_of(image, crowd));
     let right = right_marks(&truth, &image.found);
@@ -206,13 +206,13 @@ fn match_image(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
     (hits.collect(), truth.len())
 }
 
-/// The boxes that are a crowd, or those that are none.
+/// The boxes that are crowds, or those that are not.
 fn boxes_of(image: &ImageBoxes<'_>, crowd: bool) -> Vec<BBox> {
     let boxes = image.truth.iter().filter(|truth| truth.crowd == crowd);
     boxes.map(|truth| truth.bbox).collect()
 }
 
-/// The thresholds at which each detection found a box that no surer one has found.
+/// The thresholds at which each detection matches a box that no more confident one has matched.
 fn right_marks(truth: &[BBox], found: &[&Detection]) -> Vec<Marks> {
     let index = BoxIndex::new(truth.iter().copied());
     let mut taken: Vec<Marks> = vec![0; truth.len()];
@@ -225,7 +225,7 @@ fn right_marks(truth: &[BBox], found: &[&Detection]) -> Vec<Marks> {
         .collect()
 }
 
-/// The thresholds that the share of each detection within a crowd reaches.
+/// The thresholds that the share of each detection inside a crowd reaches.
 fn crowd_marks(crowds: &[BBox], found: &[&Detection]) -> Vec<Marks> {
     let index = BoxIndex::new(crowds.iter().copied());
     let marks = |found: &&Detection| {
@@ -240,15 +240,15 @@ fn share_within(crowd: &BBox, found: &BBox) -> f32 {
     share(intersection(crowd, found), area(found)) as f32
 }
 
-/// Takes a box at the thresholds that are reached; returns those at which it was free.
+/// Takes a box at the thresholds that are reached; returns those at which it was still free.
 fn take_free(taken: &mut Marks, reached: Marks) -> Marks {
     let free = reached & !*taken;
     *taken |= reached;
     free
 }
 
-/// The box that a detection overlaps most; of equal overlaps the last: that is how the original's
-/// descending sort leaves them.
+/// The box that a detection overlaps most, the last of equal ones, as left by the original's
+/// descending sort.
 fn nearest(truth: &[BBox], index: &BoxIndex, found: &Detection) -> Option<(usize, f32)> {
     let near = index.near(&found.bbox).into_iter();
     let overlaps = near.map(|t| (t, overlap(&truth[t], &found.bbox)));
@@ -262,7 +262,7 @@ fn overlap(a: &BBox, b: &BBox) -> f32 {
     shared / (area_of(a) + area_of(b) - shared + AREA_EPSILON)
 }
 
-/// In single precision: left, top, right, bottom.
+/// Left, top, right, bottom in single precision.
 #[inline]
 fn corners_of(b: &BBox) -> [f32; 4] {
     [b.x0, b.y0, b.x1, b.y1].map(|v| v as f32)
@@ -284,7 +284,7 @@ fn reached(overlap: f32) -> Marks {
         .fold(0, |marks, i| marks | 1 << i)
 }
 
-/// From both ends, as PyTorch's `linspace` rounds.
+/// Computed from both ends, as PyTorch's `linspace` rounds.
 #[inline]
 fn threshold(i: usize) -> f32 {
     let step = (0.95_f32 - 0.5) / (THRESHOLDS - 1) as f32;
@@ -310,8 +310,8 @@ mod tests {
         )];
         let hits = rankings(&sheets).remove(0).hits;
         assert_eq!(hits[0].confidence, 0.9);
-        // The surer one overlaps by 0.9 (just below, with the original's epsilon); the exact one
-        // has only the rest.
+        // The more confident one overlaps by 0.9 (just below, with the original's epsilon); the
+        // exact one gets only the remaining threshold.
         assert_eq!((hits[0].right | hits[1].right).count_ones(), 10);
         assert_eq!(hits[0].right & hits[1].right, 0);
         assert_eq!(hits[1].right & 1, 0);
@@ -344,7 +344,7 @@ mod tests {
             ],
         )];
         assert_eq!(yolov5(&crowded, &[]), yolov5(&plain, &[]));
-        // Half of the detection lies in the crowd: it is ignored at the first threshold alone.
+        // Half of the detection is inside the crowd: it is ignored only at the first threshold.
         let half = found(0, bbox(145.0, 0.0, 10.0, 50.0), 0.9);
         let hits = rankings(&[sheet(vec![crowd], vec![half])]).remove(0).hits;
         assert_eq!((hits[0].right, hits[0].ignored), (0, 1));

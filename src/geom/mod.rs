@@ -70,14 +70,15 @@ impl Plane {
 /// A rectangle in space: the shape of a card.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quad {
-    /// Where it lies; the rectangle is the plane `z = 0` of this frame, centred.
+    /// Its pose; the rectangle is the plane `z = 0` of this frame, centred.
     pub world_from_card: Pose,
     /// Width and height, metres.
     pub size: [f64; 2],
 }
 
 impl Quad {
-    /// The corners in the order of the texture's: top left, top right, bottom right, bottom left.
+    /// The corners in the order of the texture's corners: top left, top right, bottom right, bottom
+    /// left.
     pub fn corners(&self) -> [Point3<f64>; 4] {
         [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[u, v]| self.point(u, v))
     }
@@ -111,7 +112,7 @@ impl Quad {
 pub struct Homography(pub nalgebra::Matrix3<f64>);
 
 impl Homography {
-    /// The image of a point; not finite where it goes to infinity.
+    /// Maps a point; the result is not finite if it is at infinity.
     pub fn map(&self, p: Point2<f64>) -> Point2<f64> {
         let q = self.0 * p.to_homogeneous();
         Point2::new(q.x / q.z, q.y / q.z)
@@ -134,7 +135,7 @@ pub(crate) struct Line {
 const MIN_ANGLE_RAD: f64 = 0.05;
 
 impl Line {
-    /// The line with the least squared distances from some points; none through fewer than two.
+    /// The least-squares line through points; none for fewer than two.
     pub(crate) fn through(points: &[Point2<f64>]) -> Option<Self> {
         if points.len() < 2 {
             return None;
@@ -163,7 +164,7 @@ impl Line {
     }
 }
 
-/// The corners of a quadrangle whose sides are on these lines, the first between the last line and
+/// The corners of a quadrangle whose sides are on these lines, starting between the last line and
 /// the first; none where neighbours are nearly parallel.
 pub(crate) fn corners_between(sides: &[Line; 4]) -> Option<[Point2<f64>; 4]> {
     let mut corners = [Point2::origin(); 4];

@@ -4,79 +4,79 @@ use super::markup::{label, tenths, text};
 use super::number::{power, trimmed};
 use maud::{Markup, html};
 
-/// Size of the frame of a chart in a row, and of one alone, in SVG units.
+/// Frame size of a chart in a row, and of a single one, in SVG units.
 const ROW_FRAME_SIZE: [f64; 2] = [300.0, 260.0];
 const LONE_FRAME_SIZE: [f64; 2] = [620.0, 360.0];
-/// The room around a frame for words.
+/// Margins around a frame, for text.
 const LEFT_MARGIN: f64 = 62.0;
 const TOP_MARGIN: f64 = 40.0;
 const BOTTOM_MARGIN: f64 = 48.0;
-/// Width of the column of names at the right, beside its letters, and of one letter.
+/// Width of the legend at the right, without its letters, and of one letter.
 const LEGEND_WIDTH: f64 = 56.0;
 const LEGEND_LETTER_WIDTH: f64 = 7.0;
-/// Size of the words beside points, and the room that a letter of them takes.
+/// Font size of the labels of points, and the width of a letter.
 const POINT_LABEL_SIZE: f64 = 10.0;
 const POINT_LABEL_LETTER_WIDTH: f64 = 5.6;
-/// How far a word stands from its point.
+/// Distance of a label from its point.
 const POINT_LABEL_DISTANCE: f64 = 7.0;
-/// Half the side of the room that a point takes from words.
+/// Half the side of the area around a point that labels must not cover.
 const POINT_CLEARANCE: f64 = 3.0;
-/// Logarithmic axes on which values are up to so many times each other also have lines at 2 and 5.
+/// Logarithmic axes whose values span up to this factor also have lines at 2 and 5.
 const FEW_DECADES: f64 = 100.0;
-/// Where logarithmic axes have lines in a decade.
+/// Where logarithmic axes may have lines in a decade.
 const DECADE_STEPS: [f64; 3] = [1.0, 2.0, 5.0];
-/// What powers of ten may be off by, as a share.
+/// Relative rounding error of powers of ten.
 const ROUNDING_SHARE: f64 = 1e-9;
-/// Colours that people with any colour vision tell apart (Okabe and Ito, "Color Universal Design").
-/// Yellow, which is faint on white, comes last.
+/// Colours that are distinguishable with any colour vision (Okabe and Ito, "Color Universal
+/// Design"). Yellow, which is faint on white, comes last.
 const COLORS: [&str; 8] = [
     "#000000", "#e69f00", "#56b4e9", "#009e73", "#d55e00", "#0072b2", "#cc79a7", "#f0e442",
 ];
 
-/// Charts next to each other; curves of one place in the list share colour and name.
+/// Charts next to each other; curves with the same index share colour and name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chart {
-    /// What is seen in it.
+    /// What it shows.
     pub title: String,
-    /// What each curve is called, the same in every chart of a row.
+    /// The name of each curve, the same in every chart of a row.
     pub names: Vec<String>,
-    /// Across.
+    /// The horizontal axis.
     pub across: Axis,
-    /// Upwards.
+    /// The vertical axis.
     pub up: Axis,
     /// One per name.
     pub curves: Vec<Curve>,
-    /// Points with a ring around them: where the defaults are.
+    /// Points with a ring around them, which mark the defaults.
     pub defaults: Vec<[f64; 2]>,
 }
 
-/// What a large chart has beyond a small one.
+/// Additional content of a large chart.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Beside {
-    /// Words beside points; those without room are left out.
+    /// Labels of points; those without room are omitted.
     pub labels: Vec<([f64; 2], String)>,
-    /// Points of one curve have nothing between them, and no line.
+    /// Whether the points of a curve are unrelated and not joined by lines.
     pub apart: bool,
 }
 
 /// The points of a curve, from left to right; points that are not finite, or not positive on a
-/// logarithmic axis, are left out.
+/// logarithmic axis, are omitted.
 pub type Curve = Vec<[f64; 2]>;
 
-/// One direction of a chart.
+/// An axis of a chart.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Axis {
-    /// What it is, with its unit.
+    /// Its quantity, with the unit.
     pub title: String,
-    /// Least and greatest value in the frame; both positive where it is logarithmic.
+    /// Minimum and maximum value in the frame; both positive if it is logarithmic.
     pub range: [f64; 2],
-    /// Every factor of ten is as long as another.
+    /// Whether the scale is logarithmic.
     pub logarithmic: bool,
 }
 
 impl Axis {
-    /// A logarithmic axis over powers of ten that hold all positive values; 1 to 10 where there are
-    /// none.
+    /// A logarithmic axis over powers of ten that contains all positive values; 1 to 10 if there
+    /// are none.
     pub fn over_decades(title: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
         let extent = positive_extent(values).unwrap_or([1.0, 10.0]);
         Self {
@@ -86,8 +86,8 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis that begins and ends at 1, 2 or 5 times a power of ten, as near to all
-    /// positive values as can be; 1 to 10 where there are none.
+    /// A logarithmic axis from 1, 2 or 5 times a power of ten to another, as close to all positive
+    /// values as possible; 1 to 10 if there are none.
     pub fn around(title: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
         let Some([least, most]) = positive_extent(values) else {
             return Self::over_decades(title, []);
@@ -109,7 +109,7 @@ impl Axis {
         }
     }
 
-    /// How far along a value is, from 0 to 1; none where it cannot be shown.
+    /// The position of a value along the axis, from 0 to 1; none if it cannot be shown.
     fn fraction_of(&self, value: f64) -> Option<f64> {
         let [low, high, value] = [self.range[0], self.range[1], value].map(|v| self.on_scale(v));
         let fraction = (value - low) / (high - low);
@@ -125,7 +125,7 @@ impl Axis {
         }
     }
 
-    /// Values with a line through the chart.
+    /// Values with a grid line.
     fn marked_values(&self) -> Vec<f64> {
         let [low, high] = self.range;
         if !self.logarithmic {
@@ -154,7 +154,7 @@ impl Axis {
     }
 }
 
-/// Least and greatest of the finite, positive values.
+/// Minimum and maximum of the finite, positive values.
 fn positive_extent(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
     values
         .into_iter()
@@ -163,13 +163,13 @@ fn positive_extent(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
         .reduce(|[low, high], [v, _]| [v.min(low), v.max(high)])
 }
 
-/// The exponents of the decades that hold a range, at least one.
+/// The exponents of the decades that contain a range, at least one decade.
 fn decades_around([low, high]: [f64; 2]) -> [f64; 2] {
     let first = libm::floor(libm::log10(low));
     [first, libm::ceil(libm::log10(high)).max(first + 1.0)]
 }
 
-/// The ends of a range and what divides it into four.
+/// The ends of a range and the values that divide it into four.
 fn quarters([low, high]: [f64; 2]) -> Vec<f64> {
     (0..=4)
         .map(|i| low + (high - low) * f64::from(i) / 4.0)
@@ -182,12 +182,12 @@ fn polyline_points(places: &[[f64; 2]]) -> String {
 }
 
 impl Chart {
-    /// Charts side by side with one list of names, the first chart's, as an SVG document.
+    /// Charts side by side with one legend, the first chart's, as an SVG document.
     pub fn row(charts: &[Self]) -> String {
         draw_charts(charts, ROW_FRAME_SIZE, &Beside::default())
     }
 
-    /// A chart by itself, larger than in a row, as an SVG document.
+    /// A single chart, larger than in a row, as an SVG document.
     #[doc(hidden)]
     pub fn alone(&self, beside: &Beside) -> String {
         draw_charts(std::slice::from_ref(self), LONE_FRAME_SIZE, beside)
@@ -211,7 +211,7 @@ fn draw_charts(charts: &[Chart], frame: [f64; 2], beside: &Beside) -> String {
         + "\n"
 }
 
-/// Charts beside each other.
+/// Charts next to each other.
 fn framed(charts: &[Chart], size: [f64; 2]) -> impl Iterator<Item = Framed<'_>> {
     (0..).zip(charts).map(move |(i, chart)| Framed {
         chart,
@@ -241,7 +241,7 @@ fn curve_color(i: usize) -> &'static str {
     COLORS[i % COLORS.len()]
 }
 
-/// A chart and where its frame stands in the drawing.
+/// A chart and the position of its frame in the drawing.
 struct Framed<'a> {
     chart: &'a Chart,
     left: f64,
@@ -259,7 +259,7 @@ impl Framed<'_> {
         Some(TOP_MARGIN + self.size[1] * (1.0 - fraction))
     }
 
-    /// Where a point of a curve stands; none where it cannot be shown.
+    /// The position of a point of a curve in the drawing; none if it cannot be shown.
     fn place(&self, point: &[f64; 2]) -> Option<[f64; 2]> {
         Some([self.x(point[0])?, self.y(point[1])?])
     }
@@ -320,7 +320,7 @@ impl Framed<'_> {
         }
     }
 
-    /// The points of a curve, joined by a line where it is asked for.
+    /// The points of a curve, joined by a line if requested.
     fn curve_svg(&self, curve: &Curve, color: &str, joined: bool) -> Markup {
         let places: Vec<_> = curve.iter().filter_map(|p| self.place(p)).collect();
         html! {
@@ -351,7 +351,7 @@ impl Framed<'_> {
     }
 }
 
-/// A part of the drawing.
+/// A rectangle in the drawing.
 #[derive(Clone, Copy)]
 struct Area {
     left: f64,
@@ -361,7 +361,7 @@ struct Area {
 }
 
 impl Area {
-    /// What a point takes.
+    /// The area of a point.
     fn of_point([x, y]: [f64; 2]) -> Self {
         Self {
             left: x - POINT_CLEARANCE,
@@ -371,7 +371,7 @@ impl Area {
         }
     }
 
-    /// What a word takes that begins at a place.
+    /// The area of a label that begins at a position.
     fn of_word([x, y]: [f64; 2], width: f64) -> Self {
         Self {
             left: x,
@@ -396,8 +396,8 @@ impl Area {
     }
 }
 
-/// Words beside points, where they cover neither each other nor another point, and stay in the
-/// frame; lines that run behind them are kept off by a rim.
+/// Labels next to points, where they cover neither each other nor another point, and stay inside
+/// the frame; a white outline separates them from lines behind.
 fn labels_beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, frame: Area) -> Markup {
     let taken = points.into_iter().map(Area::of_point).collect();
     html! {
@@ -408,7 +408,7 @@ fn labels_beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, frame: Ar
     }
 }
 
-/// Where the words that have room begin, first come, first served.
+/// Where the labels that have room begin, first come, first served.
 fn free_places(
     labels: Vec<([f64; 2], &str)>,
     mut taken: Vec<Area>,
@@ -433,14 +433,14 @@ fn free_place(point: [f64; 2], width: f64, taken: &[Area], frame: &Area) -> Opti
     })
 }
 
-/// Where a word beside a point may begin, best first: to its right or left, above or below.
+/// Where the label of a point may begin, best first: to its right or left, above or below.
 fn places_beside([x, y]: [f64; 2], width: f64) -> [[f64; 2]; 4] {
     let (right, left) = (x + POINT_LABEL_DISTANCE, x - POINT_LABEL_DISTANCE - width);
     let (above, below) = (y - 3.0, y + POINT_LABEL_SIZE);
     [[right, above], [right, below], [left, above], [left, below]]
 }
 
-/// A number as short as it can be; beyond a thousandth and a hundred thousand with a power of ten.
+/// A number as short as possible; with a power of ten outside about a thousandth to a hundred thousand.
 fn short_number(value: f64) -> String {
     if value != 0.0 && !(9e-4..9e4).contains(&value.abs()) {
         return power(value);

@@ -1,16 +1,16 @@
-//! Maps of where things are in pictures.
+//! Maps of positions in pictures.
 
 use super::markup::text;
 use maud::{Markup, html};
 
-/// Cells across and down, and a cell's side in SVG units.
+/// Columns and rows of cells, and a cell's side in SVG units.
 const GRID_CELLS: [usize; 2] = [32, 24];
 const CELL_SIDE: f64 = 9.0;
 /// Room for the title, SVG units.
 const TITLE_HEIGHT: f64 = 22.0;
 
-/// How many places, as shares of a picture's width and height, lie in each part of it: the darker
-/// the more. Those outside the picture are left out.
+/// How many positions, as shares of a picture's width and height, fall into each cell: darker means
+/// more. Those outside the picture are ignored.
 pub(crate) fn heat_map(title: &str, places: &[[f64; 2]]) -> String {
     let [width, height] = GRID_CELLS.map(|n| n as f64 * CELL_SIDE);
     let whole_height = height + TITLE_HEIGHT;
@@ -26,7 +26,7 @@ pub(crate) fn heat_map(title: &str, places: &[[f64; 2]]) -> String {
         + "\n"
 }
 
-/// Places in each cell, row by row.
+/// Positions in each cell, row by row.
 fn counts_by_cell(places: &[[f64; 2]]) -> Vec<u64> {
     let mut counts = vec![0_u64; GRID_CELLS[0] * GRID_CELLS[1]];
     for cell in places.iter().filter_map(cell_of) {
@@ -35,7 +35,7 @@ fn counts_by_cell(places: &[[f64; 2]]) -> Vec<u64> {
     counts
 }
 
-/// The cell of a place, if that lies in the picture.
+/// The cell of a position, if it is inside the picture.
 fn cell_of(place: &[f64; 2]) -> Option<usize> {
     if !place.iter().all(|share| (0.0..=1.0).contains(share)) {
         return None;
@@ -45,7 +45,7 @@ fn cell_of(place: &[f64; 2]) -> Option<usize> {
     Some(row * GRID_CELLS[0] + column)
 }
 
-/// The cells with something in them.
+/// The cells that are not empty.
 fn filled_cells(counts: &[u64]) -> Markup {
     let most = counts.iter().copied().max().unwrap_or(0).max(1);
     html! {
@@ -58,7 +58,7 @@ fn filled_cells(counts: &[u64]) -> Markup {
     }
 }
 
-/// By the square root, so that few can be told from none.
+/// By the square root, so that few can be distinguished from none.
 fn opacity(count: u64, most: u64) -> f64 {
     0.06 + 0.94 * (count as f64 / most as f64).sqrt()
 }

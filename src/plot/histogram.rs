@@ -1,31 +1,31 @@
-//! Histograms as SVG: what was drawn against what it was drawn from.
+//! Histograms as SVG: drawn values compared with their distribution.
 
 use super::markup::{clipped, tenths, text};
 use super::number::trimmed;
 use maud::{Markup, html};
 
-/// Size of the bars' frame, SVG units.
+/// Size of the frame of the bars, SVG units.
 const FRAME_SIZE: [f64; 2] = [250.0, 110.0];
-/// The room around it for words, SVG units.
+/// Margins around it for text, SVG units.
 const LEFT_MARGIN: f64 = 40.0;
 const RIGHT_MARGIN: f64 = 12.0;
 const TOP_MARGIN: f64 = 24.0;
 const BOTTOM_MARGIN: f64 = 24.0;
-/// Where the bars end below.
+/// The lower end of the bars.
 const BASELINE: f64 = TOP_MARGIN + FRAME_SIZE[1];
 /// Width of a letter of 11 units on average, a little more than most sans-serif fonts need.
 const LETTER_WIDTH: f64 = 6.0;
 
-/// Counts in bins of the same width.
+/// Counts in bins of equal width.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Histogram {
     /// What was counted, with its unit.
     pub title: String,
-    /// What stands below the first and the last bin.
+    /// Labels below the first and the last bin.
     pub ends: [String; 2],
     /// The counts.
     pub counts: Vec<u64>,
-    /// Count that each bin should have, of values equally likely everywhere.
+    /// Expected count per bin if all values are equally likely.
     pub expected: Option<f64>,
 }
 
@@ -41,7 +41,7 @@ impl Histogram {
         let last = counts.len() - 1;
         for value in values {
             let place = (value - low) / (high - low) * bins as f64;
-            // What is below 0 and NaN become 0.
+            // Values below 0 and NaN become 0.
             counts[(place as usize).min(last)] += 1;
         }
         Self {
@@ -52,14 +52,14 @@ impl Histogram {
         }
     }
 
-    /// The same with a line at the count of values that are equally likely everywhere.
+    /// The same with a line at the expected count for equally likely values.
     pub fn uniform(mut self) -> Self {
         self.expected =
             Some(self.counts.iter().sum::<u64>() as f64 / self.counts.len().max(1) as f64);
         self
     }
 
-    /// An SVG document: bars, and a dashed line at what is expected with a band of two standard
+    /// An SVG document: bars, and a dashed line at the expected count with a band of two standard
     /// deviations around it.
     pub fn svg(&self) -> String {
         let width = LEFT_MARGIN + FRAME_SIZE[0] + RIGHT_MARGIN;
@@ -90,7 +90,7 @@ impl Histogram {
         TOP_MARGIN + FRAME_SIZE[1] * (1.0 - (count / self.top_count()).clamp(0.0, 1.0))
     }
 
-    /// Two standard deviations on either side of what is expected.
+    /// Two standard deviations on either side of the expected count.
     fn expected_band(&self, expected: f64) -> Markup {
         let spread = 2.0 * self.deviation(expected);
         let (top, bottom) = (self.y(expected + spread), self.y(expected - spread));
@@ -100,7 +100,7 @@ impl Histogram {
         }
     }
 
-    /// Standard deviation of a count where all bins are as likely.
+    /// Standard deviation of a count if all bins are equally likely.
     fn deviation(&self, expected: f64) -> f64 {
         (expected * (1.0 - 1.0 / self.counts.len().max(1) as f64)).sqrt()
     }
@@ -134,7 +134,7 @@ fn line_across(y: &str) -> String {
     format!("M{LEFT_MARGIN} {y}h{}", FRAME_SIZE[0])
 }
 
-/// A text, cut where there is no more room for it; the whole appears where it is pointed at.
+/// A text, truncated if it does not fit; the whole appears as a tooltip.
 fn clipped_label([x, y]: [f64; 2], room: f64, anchor: &str, whole: &str) -> Markup {
     html! {
         text x=(tenths(x)) y=(tenths(y)) text-anchor=(anchor) {
@@ -143,7 +143,7 @@ fn clipped_label([x, y]: [f64; 2], room: f64, anchor: &str, whole: &str) -> Mark
     }
 }
 
-/// A number with as many digits as help.
+/// A number with as many digits as are useful.
 fn short_number(value: f64) -> String {
     if value.abs() >= 100.0 {
         format!("{value:.0}")

@@ -1,4 +1,4 @@
-//! Tables, charts and pages: HTML and SVG that need nothing beside them.
+//! Tables, charts and pages: self-contained HTML and SVG.
 
 mod chart;
 pub(crate) mod heat;

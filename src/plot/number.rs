@@ -1,11 +1,11 @@
 //! Numbers as people read them.
 
-/// Digits that count.
+/// Significant digits.
 const DIGITS: i32 = 3;
-/// Numbers from a thousandth to below this are written out, others with a power of ten.
+/// Numbers in this range are written out, others with a power of ten.
 const WRITTEN_OUT: [f64; 2] = [1e-3, 1e5];
 
-/// Three digits that count: `0.00123`, `12.3`, `1234`, `1.2e-7`; `0` only for zero.
+/// Three significant digits: `0.00123`, `12.3`, `1234`, `1.2e-7`; `0` only for zero.
 pub fn three(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
@@ -17,7 +17,7 @@ pub fn three(value: f64) -> String {
     format!("{value:.*}", (DIGITS - whole_digits).max(0) as usize)
 }
 
-/// With a power of ten, without zeros at the end of the number before it.
+/// With a power of ten, without trailing zeros in the number before it.
 pub(crate) fn power(value: f64) -> String {
     let text = format!("{value:.2e}");
     match text.split_once('e') {
@@ -26,7 +26,7 @@ pub(crate) fn power(value: f64) -> String {
     }
 }
 
-/// A number with digits behind its point, without the zeros at its end.
+/// A number with decimals, without trailing zeros.
 pub(crate) fn trimmed(number: &str) -> &str {
     number.trim_end_matches('0').trim_end_matches('.')
 }

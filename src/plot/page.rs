@@ -1,4 +1,4 @@
-//! A page of text, tables, charts and pictures in one HTML file that needs nothing else.
+//! A page of text, tables, charts and pictures in one self-contained HTML file.
 
 use super::Table;
 use super::markup::text;
@@ -11,7 +11,7 @@ pub struct Page {
     body: String,
 }
 
-/// Looks like a report and not like a web site; wide things scroll inside their own frame.
+/// Looks like a report, not like a web site; wide content scrolls inside its own frame.
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1100px;margin:2em auto;padding:0 1em;color:#222}\
     table{border-collapse:collapse;margin:1em 0;font-size:13px}\
     th,td{border:1px solid #ccc;padding:2px 8px;text-align:left;min-width:3.5em;max-width:32em;overflow-wrap:anywhere}\
@@ -33,7 +33,7 @@ impl Page {
         self.push(html! { h2 { (text(heading)) } })
     }
 
-    /// Starts a part of a section.
+    /// Starts a subsection.
     pub fn subheading(&mut self, heading: &str) -> &mut Self {
         self.push(html! { h3 { (text(heading)) } })
     }
@@ -48,7 +48,7 @@ impl Page {
         self.push(html! { figure { (PreEscaped(table.html())) } })
     }
 
-    /// The first rows of a table that may be long, and where the others are.
+    /// The first rows of a table that may be long, and the name of the file with all of them.
     pub fn beginning(&mut self, table: &Table, rows: usize, file: &str) -> &mut Self {
         self.table(&table.first_rows(rows));
         match table.rows.len().saturating_sub(rows) {
@@ -57,19 +57,19 @@ impl Page {
         }
     }
 
-    /// A drawing with what is to be seen in it; `svg` is an SVG document, e.g. of
+    /// A drawing with a caption; `svg` is an SVG document, e.g. from
     /// [`Chart::row`](super::Chart::row).
     pub fn chart(&mut self, svg: &str, caption: &str) -> &mut Self {
         self.push(html! { figure { (PreEscaped(svg)) figcaption { (text(caption)) } } })
     }
 
-    /// A picture with what is to be seen in it; `png` are the bytes of a PNG file.
+    /// A picture with a caption; `png` is the content of a PNG file.
     pub fn picture(&mut self, png: &[u8], caption: &str) -> &mut Self {
         let data = format!("data:image/png;base64,{}", base64(png));
         self.push(html! { figure { img alt="" src=(data); figcaption { (text(caption)) } } })
     }
 
-    /// Markup as it is.
+    /// Adds markup unchanged.
     pub fn html(&mut self, markup: &str) -> &mut Self {
         self.body += markup;
         self
@@ -101,7 +101,7 @@ impl Page {
     }
 }
 
-/// Bytes in the alphabet of RFC 4648 section 4, padded.
+/// Bytes encoded as Base64 (RFC 4648 section 4), padded.
 pub fn base64(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for group in bytes.chunks(3) {
@@ -112,7 +112,7 @@ pub fn base64(bytes: &[u8]) -> String {
     text
 }
 
-/// The letters of three bytes; those of bytes that are missing mean nothing.
+/// The letters of three bytes; those of missing bytes are meaningless.
 fn base64_letters(group: &[u8]) -> [char; 4] {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let word = group

@@ -4,7 +4,7 @@ use super::markup::text;
 use crate::error::printable;
 use maud::html;
 
-/// A table: what the columns are, with their units, and a row of texts for each line.
+/// A table: columns with titles, which include units, and rows of text.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Table {
     /// Titles of the columns.
@@ -25,14 +25,14 @@ impl Table {
     /// Adds a row.
     ///
     /// # Panics
-    /// When it has not one cell per column.
+    /// When the number of cells is not the number of columns.
     pub fn push(&mut self, row: impl IntoIterator<Item = impl Into<String>>) {
         let row: Vec<String> = row.into_iter().map(Into::into).collect();
         assert_eq!(row.len(), self.columns.len(), "one cell per column");
         self.rows.push(row);
     }
 
-    /// The same with a column for each row: for tables that are wider than long.
+    /// Rows and columns swapped: for tables that are wider than long.
     pub fn transposed(&self) -> Self {
         let mut columns =
             (0..self.columns.len()).map(|i| self.lines().map(|row| row[i].clone()).collect());
@@ -42,7 +42,7 @@ impl Table {
         }
     }
 
-    /// The table without the rows behind these.
+    /// The first rows of the table.
     pub(super) fn first_rows(&self, count: usize) -> Self {
         Self {
             columns: self.columns.clone(),

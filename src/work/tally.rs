@@ -1,13 +1,12 @@
-//! Counts, added up for the job that asked for them.
+//! Counts, added up for the job that requested them.
 //!
-//! # Why threads of its own
-//! A value handed back by every function would have to go through filters, lazily made levels of
-//! detail and readers of files, which return what they make to whoever asks first. A global sum
-//! would mix scenes that are made side by side. So a job that is counted runs on threads of its
-//! own, which all know where to add; two jobs share no thread, hence no sum. Sums of integers do
-//! not depend on their order, and what may be made twice by threads that race for it is
-//! counted where it is kept, so the numbers are the same at any thread count. Nothing that is
-//! counted decides a byte.
+//! # Why separate threads
+//! A value returned by every function would have to pass through filters, levels of detail computed
+//! on demand and file readers, which return their results to whoever asks first. A global sum would
+//! mix scenes that are generated concurrently. So a job that is counted runs on its own threads,
+//! each of which knows where to add; two jobs share no thread and hence no sum. Sums of integers do
+//! not depend on their order, and work that racing threads may do twice is counted where the result
+//! is kept, so the numbers are the same at any thread count. Counting never affects an output byte.
 
 use super::Kind;
 use std::cell::RefCell;
@@ -15,7 +14,7 @@ use std::ops::Index;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Bytes from which on an allocation is a large one.
+/// Allocations of at least this many bytes are counted as large.
 pub const LARGE_BYTES: usize = 1 << 20;
 
 /// How much of each kind was done.
@@ -47,15 +46,15 @@ thread_local! {
 
 /// Runs a job on as many threads as the current pool has, and returns what it did.
 ///
-/// A job inside of a job adds nothing to the outer one. Threads that the job starts by itself are
-/// not counted, other than those of this library.
+/// A job inside another job adds nothing to the outer one. Threads that the job starts itself are
+/// not counted, except those of this library.
 ///
 /// # Errors
 /// When the system provides no threads.
 pub fn counted<T: Send>(job: impl FnOnce() -> T + Send) -> std::io::Result<(T, Work)> {
     let tally = Arc::new(Tally::default());
     let done = pool_for(Some(tally.clone()), rayon::current_num_threads())?.install(job);
-    // A job is over when all its parts are.
+    // A job ends when all its parts have ended.
     Ok((done, tally.work()))
 }
 
@@ -72,13 +71,13 @@ fn pool_for(tally: Option<Arc<Tally>>, threads: usize) -> std::io::Result<rayon:
         .map_err(std::io::Error::other)
 }
 
-/// Adds to what this thread's job did.
+/// Adds to the work of this thread's job.
 #[inline]
 pub(crate) fn add(kind: Kind, count: u64) {
     add_all([(kind, count)]);
 }
 
-/// Adds several kinds at once.
+/// Adds several kinds of work.
 #[inline]
 pub(crate) fn add_all<const N: usize>(counts: [(Kind, u64); N]) {
     CURRENT_TALLY.with_borrow(|current| {
@@ -89,13 +88,13 @@ pub(crate) fn add_all<const N: usize>(counts: [(Kind, u64); N]) {
     });
 }
 
-/// For the allocator of a program that counts: so many bytes were requested at once.
+/// For the allocator of a program that counts: this many bytes were requested at once.
 ///
-/// Small ones cost a comparison. Never allocates.
+/// Small requests cost one comparison. Never allocates.
 #[inline]
 pub fn allocated(bytes: usize) {
     if bytes >= LARGE_BYTES {
-        // A thread that ends has none any more.
+        // A thread that is ending no longer has one.
         let _ = CURRENT_TALLY.try_with(|tally| {
             if let Ok(Some(tally)) = tally.try_borrow().as_deref() {
                 tally.0[Kind::LargeAllocations as usize].fetch_add(1, Ordering::Relaxed);
@@ -157,7 +156,7 @@ mod tests {
     fn large_allocations_are_counted_and_small_ones_are_not() {
         let (_, work) =
             counted(|| [LARGE_BYTES - 1, LARGE_BYTES, usize::MAX].map(allocated)).unwrap();
-        // The program's own allocator may count as well; here there is none.
+        // The program's own allocator may also count; here there is none.
         assert_eq!(work[Kind::LargeAllocations], 2);
     }
 }

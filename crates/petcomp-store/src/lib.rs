@@ -1,10 +1,10 @@
-//! Datasets in object stores: Amazon S3 and what speaks its language, Google Cloud Storage, Azure
-//! Blob Storage.
+//! Datasets in object stores: Amazon S3 and compatible ones, Google Cloud Storage, Azure Blob
+//! Storage.
 //!
-//! Credentials and endpoints come from the environment, by the names that the stores' own tools
+//! Credentials and endpoints come from the environment, under the names that the stores' own tools
 //! use (`AWS_ACCESS_KEY_ID`, `AWS_ENDPOINT_URL`, `GOOGLE_SERVICE_ACCOUNT`,
-//! `AZURE_STORAGE_ACCOUNT_NAME`, ..), and on machines of a cloud from the machine's own role. They
-//! are in no message.
+//! `AZURE_STORAGE_ACCOUNT_NAME`, ..), and on cloud machines from the machine's own role. They never
+//! appear in messages.
 
 mod location;
 mod message;
@@ -22,27 +22,27 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::runtime::Runtime;
 
-/// How often a put is begun again that the client has given up on.
+/// Total attempts of a put, each with the client's own retries.
 const PUT_ATTEMPTS: u32 = 3;
 
-/// Before the second one; twice as long before each further one.
+/// Before the second attempt; doubled before each further one.
 const FIRST_PAUSE: Duration = Duration::from_secs(1);
 
 /// Opens the store behind a URL: `s3://BUCKET/PREFIX`, `gs://BUCKET/PREFIX` or
 /// `az://CONTAINER/PREFIX`.
 ///
-/// Nothing is asked of it yet.
+/// Sends no request yet.
 ///
 /// # Errors
-/// [`Error::Value`] for a URL that is none of these or that holds credentials, and for settings in
-/// the environment that do not fit together.
+/// [`Error::Value`] for a URL that is none of these or that contains credentials, and for
+/// inconsistent settings in the environment.
 pub fn open(url: &str) -> Result<Arc<dyn ArchiveStore>> {
     let location = Location::parse(url)?;
     let store = location.connect()?;
     Ok(Arc::new(Prefix::new(location, store)?))
 }
 
-/// What lies below a prefix of a store.
+/// The objects below a prefix of a store.
 struct Prefix {
     location: Location,
     store: Box<dyn ObjectStore>,
@@ -62,7 +62,7 @@ impl Prefix {
         })
     }
 
-    /// Puts content, and begins again where nobody knows what became of it.
+    /// Puts content, and tries again if the outcome is unknown.
     async fn put_again(&self, at: &ObjectPath, content: PutPayload) -> object_store::Result<()> {
         let mut pause = FIRST_PAUSE;
         for _ in 1..PUT_ATTEMPTS {

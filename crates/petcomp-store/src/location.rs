@@ -1,4 +1,4 @@
-//! Where in which store.
+//! The location of a dataset: a store and a place in it.
 
 use crate::message::explained;
 use object_store::aws::{AmazonS3Builder, AmazonS3ConfigKey, Checksum, S3ConditionalPut};
@@ -11,12 +11,12 @@ use std::path::PathBuf;
 use std::time::Duration;
 use url::Url;
 
-/// One answer may take as long as an archive of some gigabytes takes.
+/// A single response may take as long as an archive of several gigabytes.
 const REQUEST_TIMEOUT: &str = "15 minutes";
 
 /// A bucket, and a prefix in it.
 pub(crate) struct Location {
-    /// As it was given, without a slash at its end.
+    /// As given, without a trailing slash.
     pub(crate) url: String,
     scheme: Scheme,
     bucket: String,
@@ -35,7 +35,7 @@ impl Location {
     ///
     /// # Errors
     /// [`Error::Value`] for anything else, for a URL with a user, a query or a fragment (it is not
-    /// shown: there may be credentials in it), and for a prefix that no object may have.
+    /// shown: it may contain credentials), and for a prefix that no object may have.
     pub(crate) fn parse(text: &str) -> Result<Self> {
         let url = Url::parse(text).map_err(|e| unusable(text, &e))?;
         refuse_credentials(&url)?;
@@ -56,13 +56,13 @@ impl Location {
         self.prefix.parts().chain(parts).collect()
     }
 
-    /// How people call an object.
+    /// An object's name in messages.
     pub(crate) fn url_of(&self, at: &ObjectPath) -> PathBuf {
         let (scheme, _) = self.url.split_once("://").unwrap_or_default();
         PathBuf::from(format!("{scheme}://{}/{at}", self.bucket))
     }
 
-    /// The store, by what the environment says of it.
+    /// Connects to the store with the environment's settings.
     pub(crate) fn connect(&self) -> Result<Box<dyn ObjectStore>> {
         use_ring();
         let store = match self.scheme {
@@ -107,10 +107,10 @@ fn unusable(url: &str, why: &dyn std::fmt::Display) -> Error {
     Error::value("output", format!("\"{url}\": {why}"))
 }
 
-/// Fails where a URL is that of no object store.
+/// Fails unless a URL is that of an object store.
 ///
 /// # Errors
-/// As [`open`](crate::open), but for settings in the environment.
+/// As [`open`](crate::open), except for settings in the environment.
 pub fn check(url: &str) -> Result<()> {
     Location::parse(url).map(|_| ())
 }
@@ -118,8 +118,8 @@ pub fn check(url: &str) -> Result<()> {
 /// The folder of a `file://` URL.
 ///
 /// # Errors
-/// [`Error::Value`] for any other, for one that names another machine, and for one with a query or
-/// a fragment, which are no part of a path.
+/// [`Error::Value`] for any other URL, for one that names another machine, and for one with a query
+/// or a fragment, which are not part of a path.
 pub fn folder_of(url: &str) -> Result<PathBuf> {
     let refused = |expected| Error::value("output", format!("\"{url}\", expected {expected}"));
     let parsed = Url::parse(url).map_err(|_| refused("file:///FOLDER"))?;
@@ -142,7 +142,7 @@ fn scheme_of(url: &Url) -> Result<Scheme> {
     }
 }
 
-/// A percent sign stands for what no store has in the name of a bucket.
+/// A percent sign encodes a character that no store allows in the name of a bucket.
 fn check_bucket(bucket: &str) -> std::result::Result<(), &'static str> {
     match bucket {
         "" => Err("expected a bucket after the ://"),
@@ -161,7 +161,7 @@ fn refuse_credentials(url: &Url) -> Result<()> {
     Err(Error::value("output", what))
 }
 
-/// Six further attempts within a minute, the pauses doubled each time.
+/// Six further attempts within a minute, with doubled pauses.
 fn retries() -> RetryConfig {
     RetryConfig {
         backoff: BackoffConfig {
@@ -174,9 +174,9 @@ fn retries() -> RetryConfig {
     }
 }
 
-/// TLS of the whole process, unless it has chosen one.
+/// TLS for the whole process, unless it has already chosen a provider.
 fn use_ring() {
-    // An error says that another one was chosen before, which will do.
+    // An error means that another one was already chosen, which is fine.
     let _ = rustls::crypto::ring::default_provider().install_default();
 }
 

@@ -1,9 +1,9 @@
-//! What went wrong in a store, without what nobody else may see.
+//! What went wrong in a store, without secrets.
 
 use object_store::Error;
 use std::error::Error as _;
 
-/// Letters of a message that are shown: a store may answer with a page.
+/// How many characters of a message are shown: a store may respond with a whole page.
 const SHOWN_LETTERS: usize = 300;
 
 /// The message of an error and of its causes on one line, without the queries of URLs, where Azure

@@ -1,4 +1,4 @@
-//! The mAP of a run, and where that of other images may lie.
+//! The mAP of a run, and the range to expect with other images.
 
 use super::EvalReportOptions;
 use crate::eval::{EvalImage, Interval, Matches};
@@ -8,15 +8,15 @@ use std::collections::BTreeSet;
 /// mAP@0.5:0.95 of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapEstimate {
-    /// Of the images as they are.
+    /// For the actual images.
     pub value: f64,
-    /// Its interval; none of fewer than 40 rounds, nor of fewer than two images, or sequences, that
-    /// show something to be found: these tell of no others.
+    /// Its interval; none for fewer than 40 rounds, or fewer than two images, or sequences, with
+    /// objects: these allow no statement about others.
     #[serde(flatten)]
     pub range: Option<MapRange>,
 }
 
-/// An interval of 95 %.
+/// A 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapRange {
     /// Its lower end: the 2.5 % quantile of the resampled values.
@@ -25,11 +25,11 @@ pub struct MapRange {
     pub high: f64,
 }
 
-/// Of fewer rounds less than one is to be expected beyond either end of an interval.
+/// With fewer rounds, less than one resampled value is expected beyond either end of an interval.
 const MIN_ROUNDS: usize = 40;
 
 impl MapEstimate {
-    /// Of matched images.
+    /// From matched images.
     pub(super) fn new(
         matches: &Matches,
         sheets: &[EvalImage],
@@ -51,7 +51,7 @@ impl MapRange {
     }
 }
 
-/// How many images, or sequences of them, show something to be found.
+/// The number of images, or sequences of them, with objects.
 fn count_groups_with_objects(matches: &Matches, sheets: &[EvalImage]) -> usize {
     let groups = sheets.iter().zip(matches.groups());
     let shown = groups.filter(|(sheet, _)| sheet.truth.iter().any(|truth| !truth.crowd));

@@ -9,7 +9,7 @@ use crate::label::gallery::{self, Figure, gallery, marked_box};
 use crate::plot::{Page, Table};
 use rayon::prelude::*;
 
-/// Colours of Okabe and Ito, which every kind of colour vision tells apart.
+/// Colours of Okabe and Ito, distinguishable with every kind of colour vision.
 const TRUTH: &str = "#009e73";
 const FOUND: &str = "#0072b2";
 const WRONG: &str = "#d55e00";
@@ -20,15 +20,15 @@ const THIN: &str = "stroke-width=\"1.5\"";
 const DASHED: &str = "stroke-width=\"1.5\" stroke-dasharray=\"5 3\"";
 const THICK_DASHED: &str = "stroke-width=\"3\" stroke-dasharray=\"7 4\"";
 
-/// What is seen around a box: so many times its longer side, but at least this share of the
+/// The area shown around a box: its longer side times this, but at least this share of the
 /// picture's.
 const VIEW_SCALE: f64 = 3.0;
 const MIN_VIEW_SHARE: f64 = 0.15;
-/// Boxes that a picture shows beside those that it is about: more would hide it, and make the page
-/// grow without end.
+/// Maximum number of boxes shown in addition to those of the mistake: more would hide it, and make
+/// the page grow without limit.
 const MAX_OTHER_BOXES: usize = 100;
 
-/// All mistakes of a run, one a row.
+/// All mistakes of a run, one per row.
 pub(crate) fn table(run: &Run, mistakes: &[Mistake], options: &EvalReportOptions) -> Table {
     let columns = [
         "image",
@@ -107,7 +107,7 @@ fn add_figures(
     }
 }
 
-/// The first that have a picture.
+/// The first ones that have a picture.
 fn with_pictures<'a>(mistakes: &[&'a Mistake], options: &EvalReportOptions) -> Vec<&'a Mistake> {
     let shown = mistakes.iter().copied();
     shown
@@ -116,7 +116,8 @@ fn with_pictures<'a>(mistakes: &[&'a Mistake], options: &EvalReportOptions) -> V
         .collect()
 }
 
-/// None for a picture that cannot be read, which is only warned of: the scores do not depend on it.
+/// None for a picture that cannot be read; that is only a warning, since the scores do not depend
+/// on it.
 fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<Figure> {
     let shown = ShownMistake::new(run, mistake);
     let Picture { path, size } = options.picture(mistake.sheet)?;
@@ -129,11 +130,11 @@ fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<F
     Some(figure)
 }
 
-/// What all marks of a figure have in common.
+/// What all markings of a figure share.
 struct FigureCanvas<'a> {
-    /// Height of its letters, in pixels of the picture.
+    /// Letter height, in pixels of the picture.
     letter: f64,
-    /// Upper edge of what is seen.
+    /// Upper edge of the visible area.
     top: f64,
     options: &'a EvalReportOptions,
 }
@@ -156,7 +157,7 @@ impl<'a> FigureCanvas<'a> {
     }
 }
 
-/// A mistake with the boxes that it is about.
+/// A mistake with the boxes involved.
 struct ShownMistake<'a> {
     mistake: &'a Mistake,
     sheet: &'a EvalImage,
@@ -181,7 +182,7 @@ impl<'a> ShownMistake<'a> {
         if self.mistake.is_miss() { truth } else { found }.unwrap_or_default()
     }
 
-    /// Of the truth and of the detection.
+    /// The boxes of the truth and of the detection.
     fn boxes(&self) -> [Option<BBox>; 2] {
         [self.truth.map(|t| t.bbox), self.found.map(|f| f.bbox)]
     }
@@ -203,7 +204,7 @@ impl<'a> ShownMistake<'a> {
         svg
     }
 
-    /// Boxes and detections that have no part in the mistake.
+    /// Boxes and detections that are not part of the mistake.
     fn other_marks(&self, view: &BBox, canvas: &FigureCanvas<'_>) -> String {
         let mut svg = String::new();
         for truth in self.other_boxes(view) {
@@ -225,7 +226,7 @@ impl<'a> ShownMistake<'a> {
     fn found_mark(&self, found: &Detection, canvas: &FigureCanvas<'_>) -> String {
         let (color, style) = self.found_style();
         let words = format!("{} {:.2}", canvas.class_name(found.class), found.confidence);
-        // Apart from the words of the truth, which stand at the upper corner.
+        // Away from the text of the ground-truth box, which is at the upper corner.
         let at = [found.bbox.x0, found.bbox.y1 + 1.2 * canvas.letter];
         canvas.marked(&found.bbox, "", color, style)
             + &gallery::words(at, &words, canvas.letter, color)
@@ -258,7 +259,7 @@ impl<'a> ShownMistake<'a> {
         ]
     }
 
-    /// Nothing where there is no box.
+    /// Empty if there is no box.
     fn true_class(&self, options: &EvalReportOptions) -> String {
         let truth = self.truth.map(|t| class_name(t.class, &options.classes));
         truth.unwrap_or_default()
@@ -269,7 +270,7 @@ impl<'a> ShownMistake<'a> {
         found.unwrap_or_default()
     }
 
-    /// Boxes of the truth in the view that the mistake is not about.
+    /// Ground-truth boxes in the view that are not part of the mistake.
     fn other_boxes(&self, view: &BBox) -> Vec<&'a GroundTruth> {
         let seen = self.sheet.truth.iter().filter(|t| t.bbox.overlaps(view));
         seen.filter(|&t| !is_same(self.truth, t))
@@ -277,7 +278,7 @@ impl<'a> ShownMistake<'a> {
             .collect()
     }
 
-    /// Detections in the view that the mistake is not about, the surest ones.
+    /// The most confident detections in the view that are not part of the mistake.
     fn other_detections(&self, view: &BBox, confidence: f64) -> Vec<&'a Detection> {
         let found = self.sheet.found.iter();
         let mut seen: Vec<&Detection> = found
@@ -340,7 +341,7 @@ fn legend_key(color: &str, style: &str, words: &str) -> String {
     )
 }
 
-/// The part of a picture that shows a box with its surroundings.
+/// The part of a picture that shows a box and its surroundings.
 fn square_around(shown: &BBox, [width, height]: [f64; 2]) -> BBox {
     let side = view_side(shown, width.max(height));
     let (w, h, middle) = (side.min(width), side.min(height), shown.center());
@@ -358,7 +359,7 @@ fn view_side(shown: &BBox, longer_side: f64) -> f64 {
     (VIEW_SCALE * shown.width().max(shown.height())).max(MIN_VIEW_SHARE * longer_side)
 }
 
-/// Whether this very box is the own one.
+/// Whether this is the very same box.
 fn is_same<T>(own: Option<&T>, other: &T) -> bool {
     own.is_some_and(|own| std::ptr::eq(own, other))
 }
@@ -368,7 +369,7 @@ mod tests {
     use super::*;
     use crate::eval::tests::bbox;
 
-    /// Twenty thousand detections of a crowd made each of 48 pictures two megabytes.
+    /// Twenty thousand detections in a crowd once made each of 48 pictures two megabytes large.
     #[test]
     fn a_picture_shows_no_more_than_the_surest_detections_around_a_mistake() {
         let at = |i: usize| bbox(i as f64, 0.0, 2.0, 2.0);

@@ -1,4 +1,5 @@
-//! A detector against the truth: tables, curves and one page; several runs with their spread.
+//! A detector compared with the ground truth: tables, curves and one page; several runs with their
+//! spread.
 
 mod earlier;
 mod map_estimate;
@@ -21,37 +22,37 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// What one training found.
+/// The result of one training run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// Its name: the folder or file of its predictions, with folders above it where need be.
+    /// Its name: the folder or file of its predictions, with parent folders if necessary.
     pub name: String,
-    /// Images with truth and detections.
+    /// Images with ground truth and detections.
     pub sheets: Vec<EvalImage>,
 }
 
-/// What is asked of the report.
+/// What to report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EvalReportOptions {
-    /// Names of the classes; unnamed ones are called by number.
+    /// Names of the classes; unnamed ones are shown by number.
     pub classes: Vec<String>,
-    /// Light, camera position, ..: scores are given for each.
+    /// Light, camera position, ..: scores are reported for each.
     pub tags: Tags,
-    /// Rounds of the bootstrap over images, or their sequences; there is no interval of fewer than
-    /// 40. Default: 200.
+    /// Rounds of the bootstrap over images, or their sequences; fewer than 40 give no interval.
+    /// Default: 200.
     pub rounds: usize,
-    /// Where its draws come from. Default: 0.
+    /// Seed of its draws. Default: 0.
     pub seed: u64,
-    /// Which detections the confusion and the mistakes look at. Default: YOLOv5's.
+    /// Which detections the confusion matrix and the mistakes consider. Default: as in YOLOv5.
     pub confusion: ConfusionOptions,
-    /// The pictures of the sheets, one each or none at all, for mistakes to be shown.
+    /// The pictures of the sheets, one each or none at all, to show mistakes.
     pub pictures: Vec<Option<Picture>>,
-    /// Most pictures of mistakes of each kind on the page. Default: 24.
+    /// Maximum number of pictures of mistakes of each kind on the page. Default: 24.
     pub shown: usize,
 }
 
 impl EvalReportOptions {
-    /// Of a sheet, where it is found.
+    /// The picture of a sheet, if it was found.
     fn picture(&self, sheet: usize) -> Option<&Picture> {
         self.pictures.get(sheet)?.as_ref()
     }
@@ -78,11 +79,11 @@ pub struct Metrics {
     pub run: String,
     /// Number of images.
     pub images: usize,
-    /// Number of [groups](EvalImage::group) that the images are of, one by itself counted as one;
-    /// none where all are by themselves.
+    /// Number of [groups](EvalImage::group) of the images, where a single image counts as one; none
+    /// if all images are single.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sequences: Option<usize>,
-    /// mAP@0.5:0.95 as YOLOv5 has it, with its interval over images, or over their sequences.
+    /// mAP@0.5:0.95 as defined by YOLOv5, with its interval over images, or over their sequences.
     pub map: MapEstimate,
     /// By the definition of YOLOv5.
     pub yolov5: Scores,
@@ -118,7 +119,7 @@ impl Metrics {
         ]
     }
 
-    /// The scores of a class; none of one that is not in the truth.
+    /// The scores of a class; none for one that is not in the truth.
     fn class(&self, class: u32) -> Option<&ClassScores> {
         let classes = &self.yolov5.classes;
         classes
@@ -127,19 +128,19 @@ impl Metrics {
             .map(|i| &classes[i])
     }
 
-    /// How many of the classes are in the truth.
+    /// The number of classes that are in the truth.
     fn count_scored(&self, classes: &[u32]) -> usize {
         let scored = classes.iter().filter(|class| self.class(**class).is_some());
         scored.count()
     }
 }
 
-/// Evaluates runs and writes `metrics.json` (one run) or `NAME.json` each, `scores.csv`,
-/// `classes.csv`, `factors.csv`, of the first run `confusion.csv`, `mistakes.csv` and its charts as
-/// SVG, and everything as one page, `eval.html`, with pictures of its worst mistakes.
+/// Evaluates runs and writes `metrics.json` (one run) or a `NAME.json` each, `scores.csv`,
+/// `classes.csv`, `factors.csv`, for the first run `confusion.csv`, `mistakes.csv` and its charts
+/// as SVG, and everything as one page, `eval.html`, with pictures of its worst mistakes.
 ///
 /// # Errors
-/// [`Error::File`](crate::Error::File) for what cannot be written.
+/// [`Error::File`](crate::Error::File) for a file that cannot be written.
 pub fn write(folder: &Path, runs: &[Run], options: &EvalReportOptions) -> Result<Vec<Metrics>> {
     let all: Vec<Metrics> = runs.iter().map(|run| Metrics::of(run, options)).collect();
     io::create_folder(folder)?;
@@ -149,7 +150,7 @@ pub fn write(folder: &Path, runs: &[Run], options: &EvalReportOptions) -> Result
     Ok(all)
 }
 
-/// The tables and pictures as files, and the page that shows them.
+/// Writes the tables and pictures as files, and the page that shows them.
 fn write_parts(
     folder: &Path,
     runs: &[Run],
@@ -185,8 +186,8 @@ fn add_classes(
     add_table(page, folder, &title, "classes.csv", tables)
 }
 
-/// `metrics.json` of one run, or `1-NAME.json` and so on of several, and none of an earlier
-/// evaluation.
+/// Writes `metrics.json` for one run, or `1-NAME.json` and so on for several, and removes those of
+/// an earlier evaluation.
 fn write_metrics(folder: &Path, all: &[Metrics]) -> Result<()> {
     let runs: Vec<&str> = all.iter().map(|metrics| metrics.run.as_str()).collect();
     let names = metrics_names(&runs);
@@ -206,8 +207,8 @@ fn metrics_names(runs: &[&str]) -> Vec<String> {
     }
 }
 
-/// Fails where a file that [`write`] makes in its folder for runs of these names would replace one
-/// that it is made from.
+/// Fails if a file that [`write`] creates in its folder for runs of these names would replace one
+/// of its inputs.
 ///
 /// # Errors
 /// [`Error::File`](crate::Error::File) for the first such file.
@@ -221,7 +222,7 @@ pub fn check_inputs_stay(
     io::check_distinct(inputs, written.map(|name| folder.join(name)))
 }
 
-/// Warns where no run could find anything, for the truth is empty.
+/// Warns if no run could find anything because the truth is empty.
 pub fn warn_of_empty_truth(truth: &Path, runs: &[Metrics]) {
     let is_empty = |metrics: &Metrics| metrics.yolov5.classes.is_empty();
     if runs.iter().all(is_empty) {
@@ -236,7 +237,7 @@ fn file_names(runs: &[&str]) -> Vec<String> {
     names.chain(metrics_names(runs)).collect()
 }
 
-/// What there is of each evaluation, beside the metrics.
+/// The files of each evaluation, in addition to the metrics.
 const FILES: [&str; 9] = [
     "scores.csv",
     "classes.csv",
@@ -249,8 +250,8 @@ const FILES: [&str; 9] = [
     "eval.html",
 ];
 
-/// Writes a table that is not empty, and adds what is shown of it to the page; an empty one takes
-/// that of an earlier evaluation away.
+/// Writes a table that is not empty, and adds its visible part to the page; for an empty one, that
+/// of an earlier evaluation is removed.
 fn add_table(
     page: &mut Page,
     folder: &Path,
@@ -267,10 +268,10 @@ fn add_table(
     Ok(())
 }
 
-/// So many classes are shown on the page and on a terminal; the tables (CSV) have all of them.
+/// Maximum number of classes on the page and on a terminal; the tables (CSV) have all of them.
 const MAX_SHOWN_CLASSES: usize = 50;
 
-/// So many rows of a table are shown on the page.
+/// Maximum number of rows of a table on the page.
 const MAX_SHOWN_ROWS: usize = 200;
 
 /// The charts, the confusion and the mistakes of a run.
@@ -304,7 +305,7 @@ fn add_mistakes(
     Ok(())
 }
 
-/// All classes in order, or of many those with the most mistakes, those first.
+/// All classes in order; if there are too many, those with the most mistakes, in that order.
 fn shown_classes(all: &[Metrics], confusion: &Confusion) -> Vec<u32> {
     let known: BTreeSet<u32> = scored_classes(all).chain(confusion.classes()).collect();
     if known.len() <= MAX_SHOWN_CLASSES {
@@ -314,7 +315,7 @@ fn shown_classes(all: &[Metrics], confusion: &Confusion) -> Vec<u32> {
     worst.take(MAX_SHOWN_CLASSES).collect()
 }
 
-/// The classes in the truth of the runs, one after the other.
+/// The classes in the truth of the runs, run by run.
 fn scored_classes(all: &[Metrics]) -> impl Iterator<Item = u32> {
     let scored = all.iter().flat_map(|metrics| &metrics.yolov5.classes);
     scored.map(|class| class.class)
@@ -347,7 +348,7 @@ fn class_title(class: Option<u32>, options: &EvalReportOptions) -> String {
     }
 }
 
-/// A row per run, and one over all where there are several.
+/// One row per run, and a summary row if there are several.
 pub fn scores_table(all: &[Metrics]) -> Table {
     let mut table = Table::new([
         "run",
@@ -370,9 +371,9 @@ pub fn scores_table(all: &[Metrics]) -> Table {
     table
 }
 
-/// The row of the spread of the mAP by YOLOv5's definition.
+/// The row with the spread of the mAP by YOLOv5's definition.
 fn spread_row(spread: &Spread) -> [String; 7] {
-    // The normal distribution knows no ends, a mAP does.
+    // The normal distribution is unbounded, a mAP is not.
     let interval = spread
         .interval
         .map(|interval| range_text(interval.low.max(0.0), interval.high.min(1.0)));
@@ -387,7 +388,7 @@ fn spread_row(spread: &Spread) -> [String; 7] {
     ]
 }
 
-/// Empty where there is none.
+/// Empty if there is no interval.
 fn interval_text(metrics: &Metrics) -> String {
     let Some(MapRange { low, high }) = metrics.map.range else {
         return String::new();
@@ -409,8 +410,8 @@ pub fn classes_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
     classes_among(all, options, &Vec::from_iter(classes))
 }
 
-/// The same for a terminal: of many classes those with the lowest average precision, and how many
-/// others there are.
+/// The same for a terminal: if there are too many classes, those with the lowest average precision,
+/// and how many others there are.
 pub fn classes_in_brief(all: &[Metrics], options: &EvalReportOptions) -> (Table, usize) {
     let order = classes_by_precision(all);
     let others = order.len().saturating_sub(MAX_SHOWN_CLASSES);
@@ -421,7 +422,7 @@ pub fn classes_in_brief(all: &[Metrics], options: &EvalReportOptions) -> (Table,
     (classes_among(all, options, &shown), others)
 }
 
-/// The classes by the lowest average precision of any run.
+/// The classes, sorted by their lowest average precision in any run.
 fn classes_by_precision(all: &[Metrics]) -> Vec<u32> {
     let mut order: Vec<(u32, f64)> = lowest_precisions(all).into_iter().collect();
     order.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -479,7 +480,7 @@ fn name_or_number(class: u32, options: &EvalReportOptions) -> String {
     name.unwrap_or_else(|| class.to_string())
 }
 
-/// mAP per level of every factor; empty without tags.
+/// mAP per level of each factor; empty without tags.
 pub fn factors_table(runs: &[Run], options: &EvalReportOptions) -> Table {
     let mut table = Table::new([
         "run",
@@ -510,7 +511,7 @@ fn add_factor(table: &mut Table, runs: &[Run], matches: &[[Matches; 2]], tags: &
     }
 }
 
-/// Number of images, and the mAP of both definitions on them; empty where nothing is to be found.
+/// Number of images, and their mAP by both definitions; empty if there is nothing to find.
 fn weighted_scores(matches: &[Matches; 2], weights: &[u32]) -> [String; 3] {
     let images = weights.iter().filter(|weight| **weight > 0).count();
     let [yolov5, coco] = matches.each_ref().map(|m| m.map_if_any(weights));
@@ -523,7 +524,7 @@ fn match_both(run: &Run) -> [Matches; 2] {
     [Definition::Yolov5, Definition::Coco].map(|d| Matches::new(&run.sheets, d))
 }
 
-/// 1 for each image at a level of a factor, 0 for the others.
+/// 1 for each image with a level of a factor, 0 for the others.
 fn level_weights(run: &Run, tags: &Tags, factor: usize, level: &str) -> Vec<u32> {
     run.sheets
         .iter()
@@ -559,7 +560,7 @@ fn pictures(
     ]
 }
 
-/// Which classes have a curve, where not all have.
+/// Which classes have a curve, if not all do.
 fn describe_curves(classes: usize) -> String {
     let most = eval::MAX_CURVES;
     if classes > most {

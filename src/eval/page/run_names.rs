@@ -1,9 +1,9 @@
-//! What runs are called: as their predictions, and told apart.
+//! Names of runs: after their predictions, and unique.
 
 use std::path::{Component, Path, PathBuf};
 
-/// The name of the file or folder; of the folder around one called `labels`, as YOLO's programs
-/// leave their detections.
+/// The name of the file or folder; for one called `labels`, as YOLO programs save their detections,
+/// that of its parent folder.
 pub fn run_name(path: &Path) -> String {
     let run = path.parent().and_then(Path::file_name);
     match (run, path.file_stem()) {
@@ -13,7 +13,8 @@ pub fn run_name(path: &Path) -> String {
     }
 }
 
-/// Names of the runs, with as many of the folders above as tell them apart; numbered where none do.
+/// Unique names of the runs, with as many parent folders as necessary; numbered if folders do not
+/// distinguish them.
 pub fn run_names(paths: &[PathBuf]) -> Vec<String> {
     let runs: Vec<Vec<String>> = paths.iter().map(|path| run_steps(path)).collect();
     let names = (1..).zip(&runs);
@@ -25,7 +26,7 @@ pub fn run_names(paths: &[PathBuf]) -> Vec<String> {
         .collect()
 }
 
-/// The folders above a run, and its name.
+/// The parent folders of a run, and its name.
 fn run_steps(path: &Path) -> Vec<String> {
     let run = if path.ends_with("labels") {
         path.parent()
@@ -39,8 +40,8 @@ fn run_steps(path: &Path) -> Vec<String> {
     above.chain([run_name(path)]).collect()
 }
 
-/// The shortest ending of a path that no other run's has, or all of it where it is only part of
-/// another's; none where another has the same steps.
+/// The shortest suffix of a path that no other run's path has, or all of it if it is a suffix of
+/// another's; none if another has the same steps.
 fn own_ending(steps: &[String], runs: &[Vec<String>]) -> Option<String> {
     let twins = runs.iter().filter(|run| run.as_slice() == steps);
     if twins.count() > 1 {

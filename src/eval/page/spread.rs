@@ -1,9 +1,9 @@
-//! Several runs: their mean, and how far they scatter.
+//! Several runs: their mean and spread.
 
 use crate::eval::Interval;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Mean of several runs and how far they scatter.
+/// Mean and spread of several runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     /// Number of runs.
@@ -12,12 +12,12 @@ pub struct Spread {
     pub mean: f64,
     /// Sample standard deviation; 0 for a single run.
     pub std: f64,
-    /// Where the mean of many more runs lies, with a confidence of 95 %; none for a single run.
+    /// Where the mean of many more runs would be, with 95 % confidence; none for a single run.
     pub interval: Option<Interval>,
 }
 
 impl Spread {
-    /// Over the values of runs, taken for normally distributed.
+    /// From the values of runs, assumed to be normally distributed.
     ///
     /// # Method
     /// [Student 1908]: mean +- t * std / sqrt(n).
@@ -44,13 +44,13 @@ fn around(mean: f64, half_width: f64) -> Interval {
     }
 }
 
-/// Student's t at 97.5 %; none without a degree of freedom.
+/// Student's t at 97.5 %; none without degrees of freedom.
 fn t_quantile(freedom: f64) -> Option<f64> {
     let distribution = StudentsT::new(0.0, 1.0, freedom).ok()?;
     Some(distribution.inverse_cdf(0.975))
 }
 
-/// Standard deviation of a sample; 0 of one value.
+/// Sample standard deviation; 0 for a single value.
 fn deviation(values: &[f64], mean: f64) -> f64 {
     let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
     match values.len() {
