@@ -1,7 +1,7 @@
 //! Archives in an object store: several machines write to it, and none needs to know of another.
 //!
-//! Nothing is ever overwritten. An archive counts as there once its receipt is, which is put last
-//! and says how long its files are and what their checksums are.
+//! Nothing is ever overwritten. An archive counts as present once its receipt is; the receipt is
+//! put last and records the sizes and checksums of its files.
 
 use crate::dataset::Plan;
 use crate::dataset::folder::{self, IDENTITY};
@@ -10,38 +10,38 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// An object store, or what lies below a prefix in one.
+/// An object store, or what is below a prefix in one.
 ///
-/// Content that was put under a name stays as it is.
+/// Content that was put under a name never changes.
 pub trait ArchiveStore: Send + Sync {
-    /// What people call it: `s3://bucket/prefix`.
+    /// Its address as people write it: `s3://bucket/prefix`.
     fn url(&self) -> &str;
 
-    /// Puts content under a name unless something is there; says whether nothing was.
+    /// Puts content under a name unless the name exists; returns whether the name was new.
     ///
-    /// A put whose answer is lost may be tried again and then finds its own content there.
+    /// A put whose answer is lost may be retried and then finds its own content there.
     ///
     /// # Errors
-    /// [`Error::File`] with the object's URL where the store refuses, is full or cannot be reached.
+    /// [`Error::File`] with the object's URL if the store refuses, is full or cannot be reached.
     fn put(&self, name: &str, content: Vec<u8>) -> Result<bool>;
 
-    /// What is under a name.
+    /// The content under a name.
     ///
     /// # Errors
-    /// As [`Self::put`], and where nothing is.
+    /// As [`Self::put`], and for a name that does not exist.
     fn get(&self, name: &str) -> Result<Vec<u8>>;
 
-    /// The names below a folder, without its own, in any order.
+    /// The names below a folder, without the folder's own, in any order.
     ///
     /// # Errors
     /// As [`Self::put`].
     fn names(&self, folder: &str) -> Result<Vec<String>>;
 }
 
-/// Where receipts are.
+/// Folder of the receipts.
 const RECEIPTS: &str = "receipts";
 
-/// Makes the store the plan's, or checks that it is.
+/// Claims the store for a plan, or checks that it belongs to that plan.
 pub(super) fn claim(store: &dyn ArchiveStore, plan: &Plan) -> Result<()> {
     let now = folder::plan_identity(plan)?;
     let text = serde_json::to_vec_pretty(&now).map_err(|e| Error::value("recipe", e))?;
@@ -53,7 +53,7 @@ pub(super) fn claim(store: &dyn ArchiveStore, plan: &Plan) -> Result<()> {
     folder::check_same_plan(&before, &now, Path::new(store.url()))
 }
 
-/// The numbers of the archives that are there.
+/// Numbers of the archives that are present.
 pub(super) fn present(store: &dyn ArchiveStore) -> Result<BTreeSet<u64>> {
     let names = store.names(RECEIPTS)?;
     let numbers = names.iter().filter_map(|name| name.strip_suffix(".json"));
@@ -99,8 +99,8 @@ fn upload(store: &dyn ArchiveStore, name: &str, path: &Path) -> Result<ReceivedF
     Ok(received)
 }
 
-/// Puts content, or finds the same there: from a run that was killed before its receipt, or of a
-/// put whose answer was lost.
+/// Puts content, or finds the same content there: from a run that was killed before its receipt, or
+/// from a put whose answer was lost.
 fn put_or_compare(store: &dyn ArchiveStore, name: &str, content: Vec<u8>) -> Result<()> {
     let checksum = crc32fast::hash(&content);
     let bytes = content.len();

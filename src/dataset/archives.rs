@@ -1,8 +1,8 @@
-//! A dataset of archives alone: each holds a fixed span of numbers, and is there whole or not at all.
+//! A dataset of archives only: each holds a fixed span of numbers, and is present whole or not at all.
 //!
-//! The samples of an archive are made in a hidden folder, as a dataset of their own: a run that was
-//! broken off in the middle of an archive goes on there. What is finished is packed, moved to its
-//! place in one step, and the folder goes.
+//! The samples of an archive are generated in a hidden folder, as a dataset of their own, so a run
+//! that was interrupted in the middle of an archive resumes there. When all are finished, the
+//! archive is packed and moved into place in one step, and the folder is deleted.
 
 use crate::dataset::archive_store::{self, ArchiveStore};
 use crate::dataset::journal::{self, count_listed, lines_of};
@@ -18,16 +18,16 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Takes away the archives of a dataset that are not whole, so that the next run makes them again:
-/// returns how many are whole and how many were not. That run also reads every input file anew.
+/// Deletes the incomplete archives of a dataset so that the next run generates them again; returns
+/// how many are complete and how many were not. The next run also rereads every input file.
 ///
-/// Whole is one that ends as archives end and has all of its samples; what their files hold has no
-/// checksums there. Samples that are not packed yet are compared as by
+/// An archive is complete if it has a valid end and all of its samples; archives hold no checksums
+/// of their files' content. Samples that are not packed yet are compared as by
 /// [`repair`](crate::dataset::repair).
 ///
 /// # Errors
-/// A folder that holds no dataset of archives, or one that an older petcomp began; an archive that
-/// a run is making.
+/// A folder that holds no dataset of archives, or one that was started by an older petcomp; an
+/// archive that a run is writing.
 pub fn repair_archives(folder: &Path, range: SampleRange) -> Result<(usize, usize)> {
     check_range(range)?;
     let layout = ArchiveLayout::of_folder(folder)?;
@@ -50,11 +50,11 @@ pub fn repair_archives(folder: &Path, range: SampleRange) -> Result<(usize, usiz
     Ok((good, bad))
 }
 
-/// Makes a dataset of files.
+/// Generates a dataset of files.
 type MakeFiles<'a> = &'a dyn Fn(&Plan, Report) -> Result<DatasetCounts>;
 
-/// Makes the archives of a plan that are not there; see [`generate`](crate::dataset::generate).
-/// `files` is called for each archive.
+/// Generates the missing archives of a plan; see [`generate`](crate::dataset::generate). `files` is
+/// called for each archive.
 pub(super) fn generate_archives(
     plan: &Plan,
     archives: WebDataset,
@@ -77,7 +77,7 @@ pub(super) fn generate_archives(
     Ok(run.counts())
 }
 
-/// An archive cannot be made in part.
+/// An archive cannot be generated in part.
 fn check_range(range: SampleRange) -> Result<()> {
     match range {
         SampleRange::All | SampleRange::Shard(_) => Ok(()),
@@ -92,7 +92,7 @@ fn check_range(range: SampleRange) -> Result<()> {
 struct ArchiveLayout<'a> {
     folder: &'a Path,
     archives: WebDataset,
-    /// Of all samples.
+    /// Number of all samples.
     count: u64,
     split: Split,
 }
@@ -106,7 +106,7 @@ struct ArchiveFile {
 }
 
 impl<'a> ArchiveLayout<'a> {
-    /// As a dataset that was begun before says it.
+    /// As recorded by a dataset that was started before.
     fn of_folder(folder: &'a Path) -> Result<Self> {
         let before = folder::begun(folder)?;
         let layout = Self::of_identity(folder, &before);
@@ -128,7 +128,7 @@ impl<'a> ArchiveLayout<'a> {
         Ok(layout)
     }
 
-    /// The archives of a range: all, or a machine's share.
+    /// The archives of a range: all, or one machine's share.
     fn numbers(&self, range: SampleRange) -> impl Iterator<Item = u64> + use<> {
         range.below(self.count.div_ceil(self.archives.samples))
     }
@@ -142,12 +142,12 @@ impl<'a> ArchiveLayout<'a> {
         self.folder.join(format!(".archive-{number:06}"))
     }
 
-    /// Takes away what a run that was killed left of a folder whose archive it had moved.
+    /// Deletes what a killed run left of a folder whose archive it had already moved.
     fn sweep(&self, number: u64) {
         let _ = std::fs::remove_dir_all(self.samples_folder(number));
     }
 
-    /// Has the damaged samples of an archive that is not packed yet made again.
+    /// Marks the damaged samples of an archive that is not packed yet to be generated again.
     fn repair_samples(&self, number: u64) -> Result<()> {
         let folder = self.samples_folder(number);
         if folder::identity(&folder)?.is_none() {
@@ -178,7 +178,7 @@ impl<'a> ArchiveLayout<'a> {
     }
 }
 
-/// How samples were shared out; how long a sequence is only the recipe says.
+/// How samples were split; only the recipe has the length of a sequence.
 fn split_of(identity: &Value) -> Result<Split> {
     let frames = &identity["recipe"]["scene"]["belt"]["frames"];
     Ok(Split {
@@ -191,13 +191,13 @@ fn split_of(identity: &Value) -> Result<Split> {
 struct ArchiveRun<'a> {
     plan: &'a Plan,
     layout: ArchiveLayout<'a>,
-    /// Numbers of the archives that are whole.
+    /// Numbers of the complete archives.
     present: BTreeSet<u64>,
-    /// In archives that are whole.
+    /// Counts complete archives only.
     progress: Progress,
-    /// Samples of archives that were begun, by number.
+    /// Samples of archives that were started, by number.
     begun: BTreeMap<u64, u64>,
-    /// Of what this run has made.
+    /// Counts what this run has made.
     made: DatasetCounts,
 }
 
@@ -224,7 +224,7 @@ impl<'a> ArchiveRun<'a> {
         Ok(run)
     }
 
-    /// Notes the samples of an archive that is not whole.
+    /// Notes the samples of an incomplete archive.
     fn count_begun(&mut self, number: u64) {
         let samples = count_listed(&self.layout.samples_folder(number));
         if samples > 0 {
@@ -232,7 +232,7 @@ impl<'a> ArchiveRun<'a> {
         }
     }
 
-    /// With the samples of archives that were begun.
+    /// Including the samples of archives that were started.
     fn so_far(&self) -> Progress {
         Progress {
             done: self.progress.done + self.begun.values().sum::<u64>(),
@@ -240,7 +240,7 @@ impl<'a> ArchiveRun<'a> {
         }
     }
 
-    /// Those of this run's archives that are whole.
+    /// This run's complete archives.
     fn find_present(&self) -> Result<BTreeSet<u64>> {
         if let Some(store) = self.store() {
             let present = archive_store::present(store)?;
@@ -255,7 +255,7 @@ impl<'a> ArchiveRun<'a> {
         self.plan.store.as_deref()
     }
 
-    /// The archives that this run is to make: all, or a machine's share.
+    /// The archives that this run generates: all, or one machine's share.
     fn numbers(&self) -> impl Iterator<Item = u64> + use<> {
         self.layout.numbers(self.plan.range)
     }
@@ -266,13 +266,13 @@ impl<'a> ArchiveRun<'a> {
             .collect()
     }
 
-    /// Samples of an archive.
+    /// Number of samples in an archive.
     fn size(&self, number: u64) -> u64 {
         let (first, end) = self.layout.span(number);
         end - first
     }
 
-    /// Makes an archive, or goes on with it.
+    /// Generates an archive, or resumes it.
     fn add(&mut self, number: u64, files: MakeFiles, progress: Report) -> Result<()> {
         let plan = self.plan_of(number);
         self.begun.remove(&number);
@@ -306,7 +306,7 @@ impl<'a> ArchiveRun<'a> {
         }
     }
 
-    /// An interruption as it concerns the whole dataset.
+    /// Translates an interruption to the whole dataset.
     fn told(&self, error: Error) -> Error {
         match error {
             Error::Interrupted { .. } => Error::Interrupted {
@@ -316,7 +316,7 @@ impl<'a> ArchiveRun<'a> {
         }
     }
 
-    /// Says how far it is; a store has archives alone that are whole.
+    /// Reports progress; a store holds complete archives only.
     fn describe(&self) -> String {
         match self.store() {
             Some(store) => self.progress.describe(Path::new(store.url())),
@@ -324,7 +324,7 @@ impl<'a> ArchiveRun<'a> {
         }
     }
 
-    /// Packs the samples of an archive, in order of number, keeps it, and takes their folder away.
+    /// Packs the samples of an archive in order of number, stores it, and deletes their folder.
     fn pack(&self, number: u64, plan: &Plan) -> Result<()> {
         let lines = lines_of(&plan.folder)?;
         let samples: Vec<Written> = lines.iter().map(|line| line.written()).collect();
@@ -339,7 +339,7 @@ impl<'a> ArchiveRun<'a> {
         std::fs::remove_dir_all(&plan.folder).map_err(|e| Error::file(&plan.folder, e))
     }
 
-    /// Puts the files of an archive, each with the path that it is to have, where they belong.
+    /// Puts the files of an archive, each with its intended path, where they belong.
     fn keep(&self, number: u64, packed: &[(PathBuf, PathBuf)]) -> Result<()> {
         if let Some(store) = self.store() {
             let named = packed
@@ -360,7 +360,7 @@ impl<'a> ArchiveRun<'a> {
         parts.collect::<Vec<_>>().join("/")
     }
 
-    /// What is there now; objects are counted in what this run has made.
+    /// What is present now; objects are counted only in what this run has made.
     fn counts(self) -> DatasetCounts {
         let present = self.present.iter();
         DatasetCounts {

@@ -19,14 +19,13 @@ use std::path::{Path, PathBuf};
 use std::slice;
 use std::sync::Arc;
 
-/// A part of a photo so small is worth a warning where only that fits into the pictures' shape.
+/// Share of a photo below which cropping it to the pictures' shape is worth a warning.
 const SMALL_SHOWN_SHARE: f64 = 0.75;
-/// A rectangle whose corner is cut off by more than this part of a picture's side is not all there
-/// any more.
+/// A rectangle counts as cut off if a corner is outside by more than this part of a picture's side.
 const CUT_OFF_SHARE: f64 = 0.02;
 
-/// A labelled photo: its camera is found once, its pixels are read when a picture needs them and
-/// memory no longer has them.
+/// A labelled photo: its camera is found once; its pixels are read when a picture needs them and
+/// they are no longer in memory.
 #[derive(Debug)]
 pub(crate) struct BackgroundPhoto {
     /// What a recipe sees of it.
@@ -35,25 +34,25 @@ pub(crate) struct BackgroundPhoto {
     pub(crate) label: PathBuf,
     /// The photo's file.
     pub(crate) photo: PathBuf,
-    /// The part of it that is seen.
+    /// The part of it that is shown.
     pub(crate) kept: Roi,
-    /// What a person should know of it, warned of where it was solved and in the report.
+    /// What the user should know about it; warned of when it was solved, and shown in the report.
     pub(crate) notes: Vec<String>,
     taken: [u32; 2],
     image: [u32; 2],
     /// What was measured of the photo at the picture's size, and at larger ones for views that zoom
     /// in.
     measures: Vec<PlateMeasures>,
-    /// The mask of what hides objects, beside the photo.
+    /// The mask of what hides objects, next to the photo.
     pub(crate) front: Option<PathBuf>,
-    /// That of all places.
+    /// Shared by all places.
     memory: Arc<PhotoMemory>,
 }
 
-/// Zoom from one size of a plate to the next: so much larger or smaller than it is seen a plate
-/// neither blurs nor aliases much.
+/// Zoom from one size of a plate to the next: a plate enlarged or reduced by this factor neither
+/// blurs nor aliases much.
 const ZOOM_STEP: f64 = 1.25;
-/// A zoom that is a step but for its last digits needs no more than that step.
+/// A zoom that exceeds a step only in its last digits needs no more than that step.
 const EPSILON: f64 = 1e-9;
 
 /// A photo at one size, and what was measured of it.
@@ -72,11 +71,11 @@ impl ReadPlate<'_> {
 /// How labelled photos are opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct BackgroundOptions {
-    /// Width and height of the pictures to be made, pixels.
+    /// Width and height of the pictures to generate, pixels.
     pub(crate) image: [u32; 2],
-    /// Width and height of the rectangle, metres, for labels that do not say them.
+    /// Width and height of the rectangle, metres, for labels that do not state them.
     pub(crate) surface_size: Option<[f64; 2]>,
-    /// Takes cameras that do not fit their labels.
+    /// Accept cameras that do not fit their labels.
     pub(crate) force: bool,
 }
 
@@ -94,8 +93,8 @@ impl BackgroundPhoto {
         Ok(places)
     }
 
-    /// The labelled photo of this name alone, whose label and camera only have to be right; all of
-    /// them where none has it.
+    /// Only the labelled photo of this name, whose label and camera alone have to be valid; all of
+    /// them if none has the name.
     pub(crate) fn named(
         name: &str,
         folder: &Path,
@@ -125,8 +124,8 @@ impl BackgroundPhoto {
         Ok(places)
     }
 
-    /// All that the labelled photo of this name and the others of its folder are read from, those
-    /// too that were not opened, or whose labels cannot be used.
+    /// All that the labelled photo of this name and the others of its folder are read from,
+    /// including those that were not opened or whose labels cannot be used.
     pub(crate) fn files_beside(
         name: &str,
         folder: &Path,
@@ -134,7 +133,7 @@ impl BackgroundPhoto {
     ) -> Result<Vec<PathBuf>> {
         let (labels, others) = match camera::labels_in(folder, size) {
             Ok(labels) => (labels, Vec::new()),
-            // Nobody knows which of the photos a label that cannot be used is of.
+            // A label that cannot be used may belong to any of the photos.
             Err(_) => (
                 camera::labels_beside(name, folder, size)?,
                 photos_and_labels(folder).collect(),
@@ -198,8 +197,8 @@ impl BackgroundPhoto {
         }
     }
 
-    /// Fails where pictures were made of another photo or mask than those of these checksums; from
-    /// now on none are.
+    /// Fails if pictures were generated from a photo or mask with other checksums; from now on none
+    /// can be.
     pub(crate) fn check_files(&self, photo: u32, front: Option<u32>) -> Result<()> {
         let files = &self.memory.files;
         files.check(&self.photo, photo)?;
@@ -207,14 +206,14 @@ impl BackgroundPhoto {
         front.try_for_each(|(mask, crc32)| files.check(mask, crc32))
     }
 
-    /// The part of the photo that pictures show.
+    /// The share of the photo that pictures show.
     fn part(&self) -> f64 {
         let [w, h] = self.taken.map(f64::from);
         self.kept.width as f64 * self.kept.height as f64 / (w * h)
     }
 
-    /// That only a part of the photo fits into the pictures' shape, and what that leaves of its
-    /// rectangle.
+    /// A note if only a part of the photo fits into the pictures' shape, and what that leaves of
+    /// its rectangle.
     fn shape_note(&self) -> Option<String> {
         if self.part() == 1.0 {
             return None;
@@ -230,7 +229,7 @@ impl BackgroundPhoto {
         ))
     }
 
-    /// A corner of the rectangle that the photo shows is not in the pictures.
+    /// Whether a corner of the rectangle that the photo shows is outside the pictures.
     fn cuts_off(&self) -> bool {
         let CameraSource::Known(camera) = self.background.camera else {
             return false;
@@ -242,7 +241,7 @@ impl BackgroundPhoto {
             .any(|(px, _)| is_within(px, size, whole) && !is_within(px, size, size))
     }
 
-    /// Little of it is shown, or a part of the surface is not.
+    /// Whether little of it is shown, or a part of the surface is not.
     fn is_misshapen(&self) -> bool {
         self.part() < SMALL_SHOWN_SHARE || self.cuts_off()
     }
@@ -265,13 +264,13 @@ impl BackgroundPhoto {
         self.plate_at_level(0)
     }
 
-    /// The photo as large as a view that zooms in needs it, if it has so many pixels.
+    /// The photo at the size that a view that zooms in needs, as far as it has the pixels.
     pub(crate) fn plate_for_zoom(&self, zoom: f64) -> Result<ReadPlate<'_>> {
         self.plate_at_level(self.level_for_zoom(zoom))
     }
 
-    /// What of the place hides objects, as large as the plate for the same zoom, where a mask says
-    /// so.
+    /// What hides objects in this place according to a mask, at the size of the plate for the same
+    /// zoom; none without a mask.
     pub(crate) fn front_mask(&self, zoom: f64) -> Result<Option<Arc<Image<Coverage>>>> {
         let level = self.level_for_zoom(zoom);
         let read = |path: &PathBuf| self.at_level(path, level, &self.memory.masks);
@@ -290,7 +289,7 @@ impl BackgroundPhoto {
         })
     }
 
-    /// The part that is seen of a picture of the photo's size, from memory where that has it.
+    /// The shown part of a picture of the photo's size, from memory if it is there.
     fn at_level<P: FromFile + Mix>(
         &self,
         path: &Path,
@@ -305,7 +304,7 @@ impl BackgroundPhoto {
         Ok(memory.insert(&name, Arc::new(read)))
     }
 
-    /// The picture's size times the zoom, up to that of the photo.
+    /// The picture's size times the zoom, at most that of the photo.
     fn size_at_level(&self, level: usize) -> [usize; 2] {
         let detail = detail_of(self.kept, self.image).max(1.0);
         let scale = ZOOM_STEP.powi(level as i32).min(detail);
@@ -313,7 +312,7 @@ impl BackgroundPhoto {
             .map(|side| (f64::from(side) * scale).round() as usize)
     }
 
-    /// The part that is seen of a picture of the photo's size, at another size.
+    /// The shown part of a picture of the photo's size, resized.
     fn shown_part<P: FromFile + Mix>(
         &self,
         path: &Path,
@@ -335,8 +334,8 @@ impl BackgroundPhoto {
     }
 }
 
-/// Warns of cameras: of each that is stale and not used; of those solved now that have warnings,
-/// once for all. What was reported where a camera was solved is not repeated.
+/// Warns of cameras: of each that is outdated and not used; once for all of those solved now that
+/// have warnings. What was reported when a camera was solved is not repeated.
 fn warn_of_cameras(labels: &[LabelledPhoto], sightings: &[PhotoCamera]) {
     for stale in sightings.iter().filter_map(|seen| seen.stale.as_ref()) {
         log::warn!("{stale}");
@@ -366,8 +365,7 @@ fn unreported_names<'a>(labels: &'a [LabelledPhoto], sightings: &[PhotoCamera]) 
         .collect()
 }
 
-/// Says, once for all, that photos are of another shape than the pictures, where that costs much of
-/// them.
+/// Warns once for all photos whose shape differs from the pictures', if that crops much of them.
 fn warn_of_shapes(places: &[BackgroundPhoto]) {
     let odd: Vec<_> = places.iter().filter(|place| place.is_misshapen()).collect();
     let least = odd.iter().min_by(|a, b| a.part().total_cmp(&b.part()));
@@ -383,7 +381,7 @@ fn warn_of_shapes(places: &[BackgroundPhoto]) {
     }
 }
 
-/// Says, once for all, that photos lie beside the labels which none of these is of.
+/// Warns once for all photos next to the labels that none of these labels belongs to.
 fn warn_of_unlabelled(folder: &Path, places: &[BackgroundPhoto]) {
     let photos = places.iter().filter_map(|place| place.photo.file_stem());
     let labelled: BTreeSet<_> = photos.collect();
@@ -399,8 +397,8 @@ fn warn_of_unlabelled(folder: &Path, places: &[BackgroundPhoto]) {
     }
 }
 
-/// Names of the photos of a folder, in order, that have another name before their extension than
-/// the labelled ones, and are not made for these.
+/// Names of the photos of a folder, in order, whose stem differs from those of the labelled photos
+/// and that were not derived from them.
 fn unlabelled_photos(folder: &Path, labelled: &BTreeSet<&OsStr>) -> Vec<String> {
     let photos = files_in(folder).into_iter().filter(|path| is_photo(path));
     let is_labelled = |path: &PathBuf| path.file_stem().is_some_and(|s| labelled.contains(s));
@@ -426,12 +424,12 @@ fn files_in(folder: &Path) -> Vec<PathBuf> {
     paths.filter(|path| path.is_file()).collect()
 }
 
-/// A picture that is neither hidden, nor an overlay or a mask of a photo, nor of a kind that
-/// environment maps have.
+/// A picture that is neither hidden, nor an overlay or a mask of a photo, nor of a kind used for
+/// environment maps.
 fn is_photo(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let is_made = name.ends_with(".overlay.png") || name.ends_with(".front.png");
-    // Light of the surroundings may lie beside photos.
+    // Environment maps may be in the same folder as the photos.
     let is_other = matches!(
         Format::from_extension(path),
         None | Some(Format::Exr | Format::Hdr)
@@ -445,19 +443,19 @@ fn wall_of(labelled: &LabelledPhoto, size: [f64; 2]) -> Option<Wall> {
     Some(Wall::new(size, wall.height_m, wall.slope_deg))
 }
 
-/// Pixels of a photo for each of its pictures.
+/// Pixels of a photo for each pixel of its pictures.
 fn detail_of(kept: Roi, image: [u32; 2]) -> f64 {
     kept.width as f64 / f64::from(image[0])
 }
 
-/// Room for what is measured of plates of every size up to the photo's.
+/// Room for the measurements of plates of every size up to the photo's.
 fn no_measures(kept: Roi, image: [u32; 2]) -> Vec<PlateMeasures> {
     let steps = detail_of(kept, image).ln() / ZOOM_STEP.ln();
     let larger = steps.ceil().max(0.0) as usize;
     (0..=larger).map(|_| PlateMeasures::default()).collect()
 }
 
-/// The mask beside a photo of what hides objects, `NAME.front.png`, where there is one.
+/// The mask next to a photo of what hides objects, `NAME.front.png`, if there is one.
 fn front_beside(photo: &Path) -> Option<PathBuf> {
     let mask = photo.with_extension("front.png");
     mask.is_file().then_some(mask)
@@ -483,8 +481,8 @@ fn middle_part(photo: [u32; 2], image: [u32; 2]) -> Roi {
     }
 }
 
-/// A pixel lies in a frame of size `seen` about the middle of a picture of size `size`, or close to
-/// it.
+/// Whether a pixel is in a frame of size `seen` about the middle of a picture of size `size`, or
+/// close to it.
 fn is_within(px: Point2<f64>, size: [f64; 2], seen: [f64; 2]) -> bool {
     is_within_side(px.x, size[0], seen[0]) && is_within_side(px.y, size[1], seen[1])
 }

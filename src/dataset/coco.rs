@@ -1,4 +1,4 @@
-//! Labels as COCO writes them: one JSON document for each part of the dataset.
+//! Labels in COCO format: one JSON document for each part of the dataset.
 
 use crate::dataset::formats::is_exact;
 use crate::dataset::paths::{create_part_folders, remove_files};
@@ -13,11 +13,11 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Numbers that one image has for its annotations. Ids are made from the number of the image and of
-/// the object, so they never change, whichever images are there.
+/// Numbers reserved for the annotations of one image. Ids are computed from the number of the image
+/// and of the object, so they never change, whichever images are present.
 const IDS_PER_IMAGE: u64 = 1 << 16;
 
-/// Folder of the parts that are joined.
+/// Folder of the per-image documents that are joined.
 const PARTS_FOLDER: &str = "coco";
 
 /// Folder of the documents.
@@ -30,26 +30,26 @@ fn document(part: Part) -> PathBuf {
 
 /// Writes `annotations/instances_{train,val}.json`, joined from `coco/{train,val}/NNNNNN.json`.
 ///
-/// The id of an image is its number; categories are numbered from 1, since trainers take 0 for
-/// background, and so are annotations, since COCO's evaluation takes 0 for none. An object whose
-/// mask has no pixel has no annotation, whatever its box. Objects that are to be ignored are
-/// `iscrowd`, with run lengths whatever `masks` says. Annotations also have `visible_fraction` and
-/// `topmost`, which other programs pass over; with `labels.max_truncation`
-/// also `truncation` (the share outside of the picture), `amodal_bbox` (around the whole outline,
-/// beyond the picture's edges too) and `visible_bbox` (around what is seen; missing where nothing
-/// is).
+/// The id of an image is its number; categories are numbered from 1, since trainers treat 0 as
+/// background, and so are annotations, since COCO's evaluation treats 0 as none. An object whose
+/// mask has no pixel has no annotation, whatever its box. Objects to be ignored are `iscrowd`, with
+/// run lengths whatever `masks` is. Annotations also have `visible_fraction` and `topmost`, which
+/// other programs ignore; with `labels.max_truncation` also `truncation` (the share outside the
+/// picture), `amodal_bbox` (around the whole outline, including what is beyond the picture's edges)
+/// and `visible_bbox` (around the visible part; missing if nothing is visible).
 ///
-/// On a belt the documents are those of COCO-VID: `videos`, in each image `video_id` and `frame_id`
-/// (from 0), in each annotation `instance_id`, by which an object is known through its sequence.
+/// On a belt the documents are in COCO-VID format: `videos`, in each image `video_id` and
+/// `frame_id` (from 0), in each annotation `instance_id`, which identifies an object throughout its
+/// sequence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Coco {
     /// How masks are written. Default: `rle`.
     pub masks: CocoMask,
-    /// Whether boxes and masks are those of the whole object or of what is seen. Default:
+    /// Whether boxes and masks are those of the whole object or of its visible part. Default:
     /// `amodal`.
     pub boxes: Extent,
-    /// Format of the pictures that it names; in a recipe, that of `pictures`.
+    /// Format of the pictures that it refers to; in a recipe, that of `pictures`.
     #[serde(skip)]
     pub pictures: PictureFormat,
     /// How far polygons may be from the border of a mask, pixels; in a recipe, that of `labels`.
@@ -102,7 +102,7 @@ struct Annotation {
     iscrowd: u8,
     visible_fraction: f64,
     topmost: bool,
-    /// Share of it outside of the picture, and both boxes, where `max_truncation` asks.
+    /// Its share outside the picture, and both boxes, if `max_truncation` is set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     truncation: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -220,7 +220,7 @@ impl Coco {
             CocoMask::Polygon if !ignored => trace::polygons(mask, self.simplify),
             _ => Vec::new(),
         };
-        // Readers do not take a list without polygons.
+        // Readers reject an annotation without polygons.
         if polygons.is_empty() {
             return Segmentation::Runs(mask.clone());
         }
@@ -235,7 +235,7 @@ fn bbox_of(b: &BBox) -> [f64; 4] {
     [b.x0, b.y0, b.width(), b.height()]
 }
 
-/// Beside the box of the whole object; none where nothing of it is seen.
+/// In addition to the box of the whole object; none if nothing of it is visible.
 fn visible_bbox(object: &ObjectLabel) -> Option<[f64; 4]> {
     let is_told = object.truncation.is_some() && !object.visible_box.is_empty();
     is_told.then(|| bbox_of(&object.visible_box))
@@ -254,15 +254,15 @@ fn annotation_id(k: u64, object: u32) -> Result<u64> {
         })
 }
 
-/// The number of an object in all pictures of its sequence; none without one.
+/// The number of an object throughout its sequence; none without a sequence.
 fn instance_id(entry: &Entry<'_>, object: u32) -> Result<Option<u64>> {
     let belt = entry.belt();
     belt.map(|belt| annotation_id(belt.sequence, object))
         .transpose()
 }
 
-/// Writes the document of a part, one image or annotation a line; holds one image's share at a
-/// time.
+/// Writes the document of a part, one image or annotation a line; holds one image's share in memory
+/// at a time.
 fn join<'a>(
     out: &mut dyn Write,
     folder: &Path,
@@ -291,7 +291,7 @@ fn join<'a>(
     writeln!(out, "]}}")
 }
 
-/// The list of sequences, where there are any.
+/// The list of sequences, if there are any.
 fn write_videos(out: &mut dyn Write, images: &[CocoImage]) -> std::io::Result<()> {
     let ids: BTreeSet<u64> = images.iter().filter_map(|image| image.video_id).collect();
     let mut comma = "],\n\"videos\":[\n";
@@ -310,7 +310,7 @@ fn read_share(folder: &Path, sample: &Written) -> std::io::Result<ImageShare> {
     io::read_json(file).map_err(std::io::Error::other)
 }
 
-/// Writes an entry of a list, each in a line of its own.
+/// Writes an entry of a list on a line of its own.
 fn write_entry(
     out: &mut dyn Write,
     comma: &mut &str,

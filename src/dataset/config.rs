@@ -11,16 +11,17 @@ use crate::scene::{Ablation, Recipe};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What a dataset is made from and how: the recipe file. It only says what it wants otherwise than
-/// by default.
+/// What a dataset is made from and how: the recipe file. It holds only the values that differ from
+/// the defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DatasetConfig {
-    /// Folder that the recipe lies in, which names of files in it are relative to; in no file.
-    /// Default: the working folder.
+    /// Folder of the recipe, which file names in it are relative to; not written to files. Default:
+    /// the working folder.
     #[serde(skip)]
     pub folder: PathBuf,
-    /// What the recipe was laid over; the other fields hold its values. Default: `paper`.
+    /// The preset that the recipe is based on; the other fields include its values. Default:
+    /// `paper`.
     #[serde(skip_serializing)]
     pub preset: Preset,
     /// Folder of assets, relative to the file. Default: `assets`.
@@ -28,11 +29,11 @@ pub struct DatasetConfig {
     /// Folder of photos of the place with their labels (`NAME.label.json`), relative to the file.
     /// Default: `backgrounds`.
     pub backgrounds: PathBuf,
-    /// Width and height of the labelled rectangle, metres, for labels that do not say them: those
+    /// Width and height of the labelled rectangle, metres, for labels that do not state them: those
     /// of other programs. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface_size: Option<[f64; 2]>,
-    /// Takes photos of the place whose cameras do not fit their labels. Default: false, an error.
+    /// Use photos of the place whose cameras do not fit their labels. Default: false, an error.
     pub force_cameras: bool,
     /// What scenes are drawn from.
     pub scene: Recipe,
@@ -65,20 +66,19 @@ impl Default for DatasetConfig {
 }
 
 impl DatasetConfig {
-    /// Reads a recipe file, some of its values replaced, and checks it; its folders become relative
+    /// Reads a recipe file, replaces some of its values, and checks it; its folders become relative
     /// to the working folder.
     ///
-    /// A recipe is its author's own: the folders and environment maps that it names may lie
-    /// anywhere.
+    /// A recipe is trusted: the folders and environment maps that it names may be anywhere.
     ///
     /// # Errors
-    /// A file that cannot be read; an unknown key; a range that cannot be right.
+    /// A file that cannot be read; an unknown key; an invalid range.
     pub fn read(path: impl AsRef<Path>, overrides: &[io::Override]) -> Result<Self> {
         let path = path.as_ref();
         Self::parse(&io::read_text(path)?, path, overrides)
     }
 
-    /// The text of a recipe as if it were the file at `path`.
+    /// Parses the text of a recipe as if it were the file at `path`.
     ///
     /// # Errors
     /// As [`read`](Self::read).
@@ -94,11 +94,11 @@ impl DatasetConfig {
         Ok(config)
     }
 
-    /// A recipe in memory, some of its values replaced, laid over the preset that it names; its
+    /// Parses a recipe, some of its values replaced, on top of the preset that it names; its
     /// folders are relative to the working folder.
     ///
     /// # Errors
-    /// An unknown key; a range that cannot be right; an override that leads nowhere.
+    /// An unknown key; an invalid range; an override whose key does not exist.
     #[doc(hidden)]
     pub fn from_table(recipe: toml::Table, overrides: &[io::Override]) -> Result<Self> {
         let mut recipe: toml::Table = io::from_table_with(recipe, overrides)?;
@@ -108,7 +108,8 @@ impl DatasetConfig {
         Ok(config)
     }
 
-    /// The same with absolute paths: files are read late, whatever the working folder is then.
+    /// The same config with absolute paths: files are read late, whatever the working folder is
+    /// then.
     ///
     /// # Errors
     /// Without a working folder.
@@ -119,7 +120,7 @@ impl DatasetConfig {
         Ok(self)
     }
 
-    /// Fails on the first value that cannot be right, by its path: `render.subsamples`.
+    /// Fails on the first invalid value, by its path: `render.subsamples`.
     ///
     /// # Errors
     /// [`Error::Value`](crate::error::Error::Value) with the value and what was expected.
@@ -132,7 +133,7 @@ impl DatasetConfig {
         self.pictures.check().map_err(|e| e.within("pictures"))
     }
 
-    /// Fails where tracks are asked for and there is nothing that moves.
+    /// Fails if tracks are requested and nothing moves.
     fn check_sequences(&self) -> Result<()> {
         match self.scene.belt {
             None if self.labels.formats.contains(&Format::Mot) => Err(no_sequence()),
@@ -140,15 +141,15 @@ impl DatasetConfig {
         }
     }
 
-    /// A recipe file that says what every default is, with its unit: to be changed by hand.
+    /// A recipe file that lists every default with its unit, to be edited by hand.
     pub fn template() -> &'static str {
         include_str!("template.toml")
     }
 
-    /// Writes a recipe file that gives this config when it is read.
+    /// Writes a recipe file that gives this config when read.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If it cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
         io::write_text(path, &self.text(path)?)
@@ -157,14 +158,14 @@ impl DatasetConfig {
     /// Whether a file is what [`write`](Self::write) would write there.
     ///
     /// # Errors
-    /// When it cannot be read.
+    /// If it cannot be read.
     #[doc(hidden)]
     pub fn is_written(&self, path: impl AsRef<Path>) -> Result<bool> {
         let path = path.as_ref();
         Ok(io::read_text(path)? == self.text(path)?)
     }
 
-    /// The recipe as a file at a place has it.
+    /// The recipe as written in a file at this place.
     fn text(&self, path: &Path) -> Result<String> {
         let place = io::absolute(path)?;
         let folder = folder_of(&place);
@@ -177,8 +178,8 @@ impl DatasetConfig {
         toml::to_string_pretty(&config).map_err(|e| Error::file(path, e))
     }
 
-    /// The same in pictures of another size: what it says in pixels grows or shrinks with their
-    /// longer side.
+    /// The same config for pictures of another size: its values in pixels scale with the longer
+    /// side.
     #[doc(hidden)]
     pub fn with_image(mut self, image: [u32; 2]) -> Self {
         let longer = |[w, h]: [u32; 2]| f64::from(w.max(h));
@@ -189,7 +190,8 @@ impl DatasetConfig {
         self
     }
 
-    /// The same in pictures of half the width and height, for a first look: the same scenes.
+    /// The same config with pictures of half the width and height, for a first look: the same
+    /// scenes.
     pub fn preview(mut self) -> Self {
         let halved = self.scene.image.map(|side| (side / 2).max(MIN_SIDE_PX));
         self = self.with_image(halved);
@@ -199,14 +201,14 @@ impl DatasetConfig {
         self
     }
 
-    /// The setups of the paper's ablations: this one with one source of variation after another
-    /// switched off, the scenes in pairs.
+    /// The setups of the paper's ablations: this one with each source of variation switched off in
+    /// turn, the scenes in pairs.
     pub fn ablations(&self) -> impl Iterator<Item = (Ablation, Self)> {
         let ablations = Ablation::PAPER.into_iter();
         ablations.map(|ablation| (ablation, self.without(&ablation)))
     }
 
-    /// The recipe with what an ablation switches off.
+    /// The recipe without what an ablation switches off.
     fn without(&self, ablation: &Ablation) -> Self {
         let mut config = self.clone();
         config.scene.off.extend(ablation.off);
@@ -228,7 +230,7 @@ mod tests {
         DatasetConfig::parse(text, "recipe.toml".as_ref(), overrides)
     }
 
-    /// Whole numbers and broken ones that are equal are the same.
+    /// Whole and fractional numbers that are equal are the same.
     fn same(a: &Value, b: &Value) -> bool {
         match (a, b) {
             (Value::Integer(a), Value::Float(b)) | (Value::Float(b), Value::Integer(a)) => {
@@ -243,7 +245,7 @@ mod tests {
         }
     }
 
-    /// What one table says and the other does not.
+    /// What one table has and the other does not, or has with another value.
     fn missing(from: &Table, all: &Table, at: &str) -> Vec<String> {
         let key = |key: &String| field_path(at, key);
         let of = |(name, value): (&String, &Value)| match (value, from.get(name)) {
@@ -284,7 +286,7 @@ mod tests {
             "not in template.toml, or otherwise"
         );
         let mut only_told = missing(&all, &told, "");
-        // A key that files need not have is there by its default.
+        // A key that files may omit is present by its default.
         only_told.retain(|line| {
             toml::from_str::<DatasetConfig>(line).ok() != Some(DatasetConfig::default())
         });
@@ -328,7 +330,7 @@ mod tests {
         table.iter().flat_map(of).collect()
     }
 
-    /// Keys without a default, of which the template has an example: `path = value`.
+    /// Keys without a default that the template shows by an example: `path = value`.
     fn examples() -> Vec<String> {
         let mut examples: Vec<_> = told_keys()
             .filter(|told| told.is_example)
@@ -350,7 +352,8 @@ mod tests {
         }
     }
 
-    /// What the template says a key may be: its path, and the ends of "A to B" in its comment.
+    /// What the template says about a key's values: its path, and the ends of "A to B" in its
+    /// comment.
     fn told_bounds() -> Vec<(String, [f64; 2])> {
         told_keys()
             .filter_map(|told| Some((told.path, told.ends?)))

@@ -21,7 +21,7 @@ const PAPER: Srgb8 = draw::rgb(0x1C, 0x1E, 0x22);
 const INK: Srgb8 = draw::rgb(0xF2, 0xF2, 0xF2);
 const PALE_INK: Srgb8 = draw::rgb(0xA8, 0xAD, 0xB5);
 
-/// Pixels around the sheet.
+/// Margin of the sheet, pixels.
 const MARGIN_PX: usize = 28;
 
 /// Pixels between pictures.
@@ -30,13 +30,13 @@ const GAP_PX: usize = 16;
 /// Pixels between a picture and its caption.
 const CAPTION_GAP_PX: usize = 4;
 
-/// Widest a picture may be, pixels; larger ones are made smaller.
+/// Maximum width of a picture, pixels; larger ones are reduced.
 const PICTURE_WIDTH_PX: usize = 320;
 
 /// A picture of a sheet.
 struct ContactTile {
     picture: Image<LinearRgb>,
-    /// What is where in it, in pixels of the size that the labels name.
+    /// Its labels, in pixels of the size that they name.
     labels: Labels,
     /// Objects that are drawn with a box; the others get a thin grey outline.
     labelled: Vec<ObjectId>,
@@ -60,7 +60,7 @@ impl ContactTile {
     }
 }
 
-/// The picture no wider than `width`.
+/// The picture, reduced to at most `width`.
 pub(super) fn shrunk(
     picture: Cow<'_, Image<LinearRgb>>,
     width: usize,
@@ -88,9 +88,8 @@ fn contact_sheet(tiles: &[ContactTile], classes: &[String]) -> Image<Srgb8> {
 /// The contact sheet of a dataset on disk: at most `most` of its pictures, evenly spread.
 ///
 /// # Errors
-/// When the folder is no dataset or one of archives alone, or was written without the
-/// [`Pictures`](crate::dataset::Pictures) or the [`Sidecar`](crate::dataset::Sidecar) that the sheet
-/// is made from.
+/// If the folder is no dataset or one of archives only, or was written without the
+/// [`Pictures`](crate::dataset::Pictures) or the [`Sidecar`](crate::dataset::Sidecar) that the sheet is made from.
 pub fn contact_sheet_of(folder: &Path, most: usize) -> Result<Image<Srgb8>> {
     let identity = folder::identity_of_files(folder)?;
     let classes = folder::known_classes(&identity);
@@ -122,7 +121,7 @@ fn tile_caption(line: &JournalLine, record: &SampleRecord) -> String {
     format!("{k:06} {part:5} {labelled}/{all} labelled")
 }
 
-/// Where everything is on a sheet, pixels.
+/// Layout of a sheet, pixels.
 struct SheetLayout {
     width: usize,
     height: usize,
@@ -181,7 +180,7 @@ fn cell_size(tiles: &[ContactTile]) -> [usize; 2] {
 }
 
 /// The number of columns with which a sheet comes closest to 3:2, the shape of screens; an empty
-/// place at its end weighs as much as being too wide by two pictures.
+/// cell at its end counts as much as an excess width of two pictures.
 fn pleasing_columns(count: usize, cell: [usize; 2]) -> usize {
     (1..=count.max(1))
         .min_by_key(|&columns| shape_error(count, columns, cell))
@@ -201,13 +200,13 @@ const MARK_PX: usize = 12;
 struct LegendEntry {
     color: Srgb8,
     text: String,
-    /// Pixels from the margin.
+    /// Distance from the margin, pixels.
     x: usize,
     line: usize,
 }
 
 impl LegendEntry {
-    /// Beside the entry before it, or in the next line where the width ends.
+    /// Next to the previous entry, or in the next line if the width is exceeded.
     fn after(before: Option<&Self>, color: Srgb8, text: String, width: usize) -> Self {
         let (x, line) = before.map_or((0, 0), |e| (e.end() + 2 * GAP_PX, e.line));
         let entry = Self {
@@ -230,7 +229,7 @@ impl LegendEntry {
         MARK_PX + 8 + draw::text_width(&self.text)
     }
 
-    /// Where it ends, pixels from the margin.
+    /// Its end, pixels from the margin.
     fn end(&self) -> usize {
         self.x + self.width()
     }
@@ -251,7 +250,7 @@ fn legend_entries(classes: &[String], tiles: &[ContactTile], width: usize) -> Ve
     placed
 }
 
-/// Truncation takes a label only where it was measured.
+/// Truncation removes a label only if it was measured.
 fn why_unlabelled(tiles: &[ContactTile]) -> &'static str {
     let mut objects = tiles.iter().flat_map(|tile| &tile.labels.objects);
     if objects.any(ObjectLabel::is_too_truncated) {

@@ -9,31 +9,31 @@ use std::path::PathBuf;
 /// What a dataset holds.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DatasetCounts {
-    /// Images asked for.
+    /// Images requested.
     pub asked: u64,
     /// Images in the folder.
     pub images: u64,
-    /// Of these, images for validation.
+    /// Images for validation among them.
     pub val: u64,
-    /// Images made by this run; the others were there.
+    /// Images made by this run; the others already existed.
     pub made: u64,
-    /// Images whose objects are counted: all that are there, or, of archives, those of this run.
+    /// Images whose objects are counted: all that are present or, for archives, those of this run.
     pub counted: u64,
     /// Objects in these images, labelled or not.
     pub objects: u64,
-    /// Objects that have a label; those that are to be ignored do not count.
+    /// Objects that have a label; those to be ignored do not count.
     pub labelled: u64,
     /// Objects that are obstructed, labelled or not.
     pub obstructed: u64,
-    /// Objects in cyclic overlap: something lies over each of them.
+    /// Objects in cyclic overlap: something covers each of them.
     pub knotted: u64,
     /// Scenes that were drawn and rejected.
     pub retries: u64,
-    /// The same by class, in order.
+    /// Counts by class, in order.
     pub classes: Vec<ClassCount>,
-    /// What became of the labels of obstructed objects.
+    /// What happened to the labels of obstructed objects.
     pub policy: Obstructed,
-    /// Files below the folder that trainers are given, as far as they are there.
+    /// Files to give to trainers, below the folder, as far as they exist.
     pub for_trainers: Vec<PathBuf>,
 }
 
@@ -54,9 +54,9 @@ impl DatasetCounts {
         self.objects.saturating_sub(self.labelled)
     }
 
-    /// Objects that got no label, or under `ignore` one to be ignored, but not for being obstructed:
-    /// too much of them lies outside of the picture, or nothing of them is seen. Where obstructed
-    /// ones are labelled (`keep`, `class`), they may be among them.
+    /// Objects that got no label, or under `ignore` one to be ignored, for a reason other than obstruction: too much of
+    /// them is outside the picture, or nothing of them is visible. If obstructed ones are labelled (`keep`, `class`),
+    /// they may be among them.
     pub fn left_out(&self) -> u64 {
         let accounted = match self.policy {
             Obstructed::Drop | Obstructed::Ignore => self.labelled + self.obstructed,
@@ -65,7 +65,7 @@ impl DatasetCounts {
         self.objects.saturating_sub(accounted)
     }
 
-    /// Counts what the lines of a plan's journal say; `made` of the `asked` images are this run's.
+    /// Counts the lines of a plan's journal; `made` of the `asked` images are this run's.
     pub(crate) fn new(lines: &[JournalLine], plan: &Plan, asked: u64, made: u64) -> Self {
         let classes = ClassCount::for_classes(&plan.classes, lines);
         Self {
@@ -113,7 +113,7 @@ impl ClassCount {
             .collect()
     }
 
-    /// Of the class with this name and number.
+    /// Counts of the class with this name and number.
     fn new(name: &str, class: usize, lines: &[JournalLine]) -> Self {
         let counts = lines.iter().filter_map(|line| line.classes.get(class));
         let [objects, labelled] = sum_by_part(counts.map(|counts| counts.map(u64::from)));
@@ -125,7 +125,7 @@ impl ClassCount {
     }
 }
 
-/// The files that trainers are given, as far as they are there.
+/// The files to give to trainers, as far as they exist.
 fn files_for_trainers(plan: &Plan) -> Vec<PathBuf> {
     let archives = plan.archives.iter().flat_map(Writer::for_trainers);
     let writers = plan.writers.iter().flat_map(|w| w.for_trainers());

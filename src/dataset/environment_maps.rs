@@ -9,7 +9,7 @@ use crate::lru::{InMemory, LruCache};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Bytes of pictures that are kept.
+/// Maximum size of the pictures kept in memory, bytes.
 const KEPT_BYTES: usize = 1 << 30;
 
 /// The environment maps of a recipe.
@@ -47,8 +47,7 @@ impl EnvironmentMaps {
             .map(|name| (name.as_str(), self.folder.join(name)))
     }
 
-    /// Fails where light was taken from another picture than that of this checksum; from now on
-    /// none is.
+    /// Fails if light was taken from a picture with another checksum; from now on none can be.
     pub(crate) fn check_file(&self, path: &Path, crc32: u32) -> Result<()> {
         self.known.check(path, crc32)
     }
@@ -56,8 +55,8 @@ impl EnvironmentMaps {
     /// The picture that a scene names.
     ///
     /// # Errors
-    /// A name that the recipe does not list and that leads out of its folder; a file that is no
-    /// panorama, or has other bytes than it is known by.
+    /// A name that the recipe does not list and that is outside its folder; a file that is not a
+    /// panorama, or whose checksum is not the known one.
     pub(crate) fn picture(&self, name: &str) -> Result<Arc<Panorama>> {
         if let Some(picture) = self.kept.get(name) {
             return Ok(picture);
@@ -68,8 +67,8 @@ impl EnvironmentMaps {
         self.keep(name, picture, &path)
     }
 
-    /// What a recipe lists may lie anywhere; what a scene names beside that, in the recipe's
-    /// folder.
+    /// What a recipe lists may be anywhere; anything else that a scene names must be in the
+    /// recipe's folder.
     fn path(&self, name: &str) -> Result<PathBuf> {
         if self.listed.iter().any(|listed| listed == name) {
             return Ok(self.folder.join(name));

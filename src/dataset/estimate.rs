@@ -1,29 +1,29 @@
-//! What the rest of a run takes, by what it took since its first pictures.
+//! Estimates the time for the rest of a run from its pace since its first pictures.
 
 use crate::dataset::Progress;
 use std::fmt;
 use std::time::{Duration, Instant};
 
-/// A job that takes longer is one to be asked about first.
+/// A run that takes longer should be confirmed first.
 const LONG_RUN: Duration = Duration::from_secs(3600);
-/// Time that pictures are counted for before anything is said of the rest.
+/// Minimum time of measurement before the rest is estimated.
 const MIN_ELAPSED: Duration = Duration::from_secs(5);
-/// The same for the first pictures, for which photos are read: none takes so long to read.
+/// The same during the first pictures, for which photos are read: reading takes less than this.
 const MIN_FIRST_ELAPSED: Duration = Duration::from_secs(60);
 
-/// How fast a run is. The pictures with which each thread begins are left out, once they are made.
+/// The pace of a run. The first picture of each thread is excluded once it is made.
 #[derive(Clone, Copy, Debug)]
 pub struct RunPace {
     threads: u64,
     last: Progress,
-    /// From when on pictures are counted, and how many there were then.
+    /// Start of the measurement, and the number of pictures made by then.
     since: (Instant, u64),
-    /// The first pictures are made.
+    /// Whether the first pictures are made.
     is_warm: bool,
 }
 
 impl RunPace {
-    /// That of a run on so many threads that is about to make its first picture.
+    /// The pace of a run on `threads` threads that is about to make its first picture.
     pub fn new(threads: usize, progress: Progress, now: Instant) -> Self {
         Self {
             threads: threads.max(1) as u64,
@@ -33,7 +33,7 @@ impl RunPace {
         }
     }
 
-    /// Notes how far the run is now.
+    /// Records the current progress of the run.
     pub fn note(&mut self, progress: Progress, now: Instant) {
         self.last = progress;
         if !self.is_warm && progress.made >= self.threads {
@@ -42,10 +42,10 @@ impl RunPace {
         }
     }
 
-    /// The run, if its pace so far says that the rest takes longer than an hour.
+    /// The run, if its pace so far suggests that the rest takes longer than an hour.
     ///
-    /// Once each thread has made a picture, the rest is in proportion; before, every picture takes
-    /// at least as long as those that are still being made.
+    /// Once each thread has made a picture, the rest is proportional; before that, every picture is
+    /// assumed to take at least as long as those still being made.
     pub fn long_run(&self, now: Instant) -> Option<LongRun> {
         let (began, before) = self.since;
         let elapsed = now.saturating_duration_since(began);
@@ -63,18 +63,18 @@ impl RunPace {
 /// A run that would take longer than an hour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LongRun {
-    /// What it is expected to take yet, seconds.
+    /// Expected remaining time, seconds.
     pub seconds: f64,
-    /// Pictures that are left.
+    /// Pictures that remain.
     pub left: u64,
-    /// Seconds between two pictures so far.
+    /// Mean time between two pictures so far, seconds.
     pub each: f64,
-    /// No picture is finished yet: it takes this long at least.
+    /// Whether the time is only a lower bound: fewer pictures than threads are finished.
     pub at_least: bool,
 }
 
 impl LongRun {
-    /// The rest of a run that made so many pictures in this time.
+    /// The rest of a run that made this many pictures in this time.
     fn of(left: u64, made: u64, elapsed: Duration, threads: u64) -> Self {
         let at_least = made < threads;
         let each = elapsed.as_secs_f64() / if at_least { threads } else { made } as f64;
@@ -135,7 +135,7 @@ mod tests {
             }
         }
 
-        /// Has made so many pictures after so many seconds.
+        /// Has made this many pictures after this many seconds.
         fn note(mut self, made: u64, seconds: f64) -> Self {
             let progress = Progress {
                 done: self.earlier + made,
@@ -151,7 +151,7 @@ mod tests {
             self.began + Duration::from_secs_f64(seconds)
         }
 
-        /// What is said after so many seconds.
+        /// The message after this many seconds.
         fn told(&self, seconds: f64) -> Option<String> {
             let run = self.pace.long_run(self.at(seconds));
             run.map(|run| run.to_string())
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn the_rest_is_in_proportion_to_what_was_made_since_the_first_pictures() {
-        // Two that take 20 s, as they read large photos, and 20 in a second from then on.
+        // Two that take 20 s, since they read large photos, and 20 a second from then on.
         let cold = |count| {
             let run = TestRun::new(0, count).note(2, 20.0);
             run.note(102, 25.0)

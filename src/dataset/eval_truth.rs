@@ -1,5 +1,5 @@
-//! The truth that detections are measured against, however it is named: by labels, by a choice of
-//! images, by a COCO document.
+//! Ground truth for detections, however it is named: by labels, by a selection of images, or by a
+//! COCO document.
 
 use crate::dataset::YoloSet;
 use crate::dataset::listing::{images_in, is_list, whole_path};
@@ -12,7 +12,7 @@ use crate::eval::{
 use crate::io;
 use std::path::{Path, PathBuf};
 
-/// What detections of any number of runs are measured against.
+/// Ground truth for the detections of any number of runs.
 #[derive(Debug)]
 pub struct EvalTruth {
     boxes: Boxes,
@@ -30,22 +30,22 @@ enum Boxes {
 }
 
 impl EvalTruth {
-    /// Whether a path is that of a COCO document, by its name.
+    /// Whether a path is that of a COCO document, judged by its name.
     pub fn is_coco(path: &Path) -> bool {
         path.extension().is_some_and(|e| e == "json")
     }
 
-    /// Reads a COCO document, a folder of YOLO labels, or a choice of images: a list of them
-    /// (`.txt`), or a folder with a `data.yaml` and no labels of its own, whose images for
-    /// validation count.
+    /// Reads a COCO document, a folder of YOLO labels, or a selection of images: a list of them
+    /// (`.txt`), or a folder with a `data.yaml` and no labels of its own, of which the validation
+    /// images count.
     ///
-    /// The images are in the folder `images`, if not where they are by custom; `size` is the width
-    /// and height of all, pixels, for YOLO labels without images. A choice takes neither.
+    /// The images are in the folder `images`, by default in the conventional place; `size` is the
+    /// width and height of all, pixels, for YOLO labels without images. A selection allows neither.
     ///
     /// # Errors
     /// Those of [`read_coco_truth`] and [`read_yolo_truth`](crate::eval::read_yolo_truth);
-    /// [`Error::File`] for a `data.yaml` with keypoints that is the choice (a list of such images
-    /// is taken), a list that cannot be read, a choice without images, and [`Error::Field`] for one
+    /// [`Error::File`] for a selection by a `data.yaml` with keypoints (a list of such images is
+    /// accepted), a list that cannot be read, a selection without images; [`Error::Field`] for one
     /// with `images` or `size`.
     pub fn read(path: &Path, images: Option<&Path>, size: Option<[u32; 2]>) -> Result<Self> {
         if Self::is_coco(path) {
@@ -95,7 +95,7 @@ impl EvalTruth {
         }
     }
 
-    /// The images with what a run found in them: COCO results, or a folder of YOLO labels with
+    /// The images with a run's detections: COCO results, or a folder of YOLO labels with
     /// confidences.
     ///
     /// # Errors
@@ -115,7 +115,7 @@ impl EvalTruth {
         }
     }
 
-    /// Gives a report the pictures, and the names of the classes where it has none.
+    /// Adds the pictures to a report's options, and the names of the classes if they have none.
     pub fn describe(&self, options: &mut EvalReportOptions) {
         options.pictures.clone_from(&self.pictures);
         if options.classes.is_empty() {
@@ -123,7 +123,7 @@ impl EvalTruth {
         }
     }
 
-    /// None where nothing tells them.
+    /// Empty if they are not known.
     fn class_names(&self) -> Vec<String> {
         match &self.boxes {
             Boxes::Coco(truth) => truth.classes.clone(),
@@ -135,20 +135,20 @@ impl EvalTruth {
     }
 }
 
-/// Whether a folder has a `data.yaml` and no labels: it chooses images of others.
+/// Whether a folder has a `data.yaml` and no labels: it selects images from elsewhere.
 fn is_choice(folder: &Path) -> Result<bool> {
     if !folder.join("data.yaml").is_file() {
         return Ok(false);
     }
     let folder = whole_path(folder)?;
-    // A data.yaml that trainers would not take chooses nothing.
+    // A data.yaml that trainers would reject selects nothing.
     let lists = YoloSet::choosing_files(&folder).unwrap_or_default();
     let is_label =
         |path: &Path| is_list(path) && !is_class_list(path) && !lists.iter().any(|l| l == path);
     Ok(io::files_below(&folder, is_label, usize::MAX)?.is_empty())
 }
 
-/// A choice names its images, which tell their sizes.
+/// A selection names its images, whose files give their sizes.
 fn check_alone(images: Option<&Path>, size: Option<[u32; 2]>) -> Result<()> {
     for (name, is_given) in [("images", images.is_some()), ("size", size.is_some())] {
         if is_given {
@@ -159,7 +159,7 @@ fn check_alone(images: Option<&Path>, size: Option<[u32; 2]>) -> Result<()> {
     Ok(())
 }
 
-/// In the order that a folder of labels gives them, each once.
+/// In the order that a folder of labels would give, each once.
 fn by_name(mut images: Vec<PathBuf>) -> Vec<PathBuf> {
     images.sort_by(|a, b| (a.file_stem(), a).cmp(&(b.file_stem(), b)));
     images.dedup();
@@ -171,7 +171,7 @@ mod tests {
     use super::*;
     use crate::{Image, LinearRgb};
 
-    /// A set of three images and a choice of two of them, beside each other.
+    /// A set of three images and a selection of two of them, side by side.
     fn set_and_choice() -> tempfile::TempDir {
         let root = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| {

@@ -1,4 +1,5 @@
-//! Falls that were computed before: what does not change how objects fall needs no new one.
+//! Falls that were computed before: a change that does not affect how objects fall needs no new
+//! one.
 #![cfg_attr(
     not(feature = "settle"),
     allow(dead_code, reason = "without physics nothing falls")
@@ -9,7 +10,8 @@ use crate::scene::{Grade, Placement, Scene, SettleOptions};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Where objects came to rest, of the last scenes that fell; of none by default.
+/// Resting places of the objects of the most recently settled scenes; by default none are
+/// remembered.
 #[derive(Debug, Default)]
 pub(crate) struct Falls {
     most: usize,
@@ -21,14 +23,14 @@ pub(crate) struct Falls {
 type Fall = Mutex<Option<Vec<Placement>>>;
 
 impl Falls {
-    /// Of so many scenes.
+    /// Remembers this many scenes.
     pub(crate) fn of_last(most: usize) -> Self {
         let known = Mutex::default();
         Self { most, known }
     }
 
-    /// The scene with its objects at rest, by `fall` where that is not known. What falls in several
-    /// threads at once falls in one of them, and the others wait.
+    /// The scene with its objects at rest, computed by `fall` unless it is known. If several
+    /// threads need the same fall at once, one computes it and the others wait.
     pub(crate) fn settled(
         &self,
         scene: Scene,
@@ -68,8 +70,8 @@ impl Falls {
     }
 }
 
-/// All of a scene that decides how it falls, and the process in which: a fork has none of the threads
-/// that made its parent's falls, and would wait for them for ever.
+/// Everything in a scene that decides how it falls, and the process: a fork has none of the threads that compute its
+/// parent's falls, and would wait for them forever.
 fn what_falls(scene: &Scene, options: &SettleOptions) -> String {
     let mut scene = scene.clone().unlit();
     for object in &mut scene.objects {

@@ -5,12 +5,12 @@ use crate::error::Error;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Something in a dataset that a trainer would refuse, drop or misread.
+/// Something in a dataset that a trainer would reject, drop or misread.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
     /// The file, below the dataset's folder.
     pub path: PathBuf,
-    /// Its line, from 1, where the finding is about one.
+    /// Its line, from 1, if the finding is about one.
     pub line: Option<usize>,
     /// What is wrong, and what was expected.
     pub diagnostic: Diagnostic,
@@ -39,7 +39,7 @@ impl Finding {
         }
     }
 
-    /// A file of the dataset in `folder` that cannot be read.
+    /// A finding about a file of the dataset in `folder` that cannot be read.
     pub(crate) fn unreadable(folder: &Path, path: impl AsRef<Path>, error: &Error) -> Self {
         Self::in_file(path, Code::UnreadableFile, without_folder(folder, error))
     }
@@ -54,7 +54,7 @@ impl Finding {
     }
 }
 
-/// As compilers print it: `labels/train/000001.txt:2: 4 columns, expected 5
+/// In the format of compilers: `labels/train/000001.txt:2: 4 columns, expected 5
 /// [dataset.bad_label_row]`.
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -66,7 +66,7 @@ impl fmt::Display for Finding {
     }
 }
 
-/// The message of an error without the path that a finding names anyway.
+/// The message of an error without the path, which a finding names anyway.
 fn without_folder(folder: &Path, error: &Error) -> String {
     match error {
         Error::File { what, .. } => what.clone(),

@@ -1,4 +1,4 @@
-//! What a dataset is made from, by content: all that decides a picture or a label.
+//! What a dataset is made from, by content: everything that decides a picture or a label.
 
 use crate::asset::{Asset, Library, Photo};
 use crate::dataset::background_photo::BackgroundPhoto;
@@ -12,14 +12,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Everything that decides what a picture or its labels are: values as they are, pictures by
-/// checksum; not where folders lie. Two datasets of equal fingerprint, seed and program have the
+/// checksum; not where folders are. Two datasets of equal fingerprint, seed and program have the
 /// same samples.
 ///
-/// Lists are in the order that draws choose by, so an entry that is added, lost or moved shows.
+/// Lists are in the order that draws choose by, so a new, missing or moved entry shows.
 ///
 /// # Errors
-/// A photo or an environment map that cannot be read, or that pictures were made of when it had
-/// other bytes.
+/// A photo or an environment map that cannot be read, or that has changed since pictures were made
+/// from it.
 pub(super) fn fingerprint(
     config: &DatasetConfig,
     library: &Library,
@@ -90,7 +90,7 @@ fn of_places(places: &[BackgroundPhoto], inputs: &mut Inputs) -> Result<Vec<Valu
         .collect()
 }
 
-/// The masks beside backgrounds of what hides objects, by the names of their inputs.
+/// The masks next to backgrounds of what hides objects, by the names of their inputs.
 fn front_files(places: &[BackgroundPhoto]) -> Vec<(String, &Path)> {
     let masks = places.iter().filter_map(|place| {
         let name = format!("front of {}", place.background.name);
@@ -138,7 +138,7 @@ fn camera_digest(background: &Background, kept: [usize; 4]) -> String {
     }
 }
 
-/// What a person should know of the backgrounds, by their names: the report shows it.
+/// What the user should know about the backgrounds, by their names: the report shows it.
 fn notes(places: &[BackgroundPhoto]) -> BTreeMap<&str, &[String]> {
     let noted = places.iter().filter(|place| !place.notes.is_empty());
     noted
@@ -162,7 +162,7 @@ fn of_surroundings(surroundings: &EnvironmentMaps, inputs: &mut Inputs) -> Resul
         .collect()
 }
 
-/// Checksum of a value by its text: numbers are told to the last bit.
+/// Checksum of a value's text, which has numbers to the last bit.
 fn digest(value: &impl Serialize) -> String {
     shown(crc32fast::hash(json!(value).to_string().as_bytes()))
 }

@@ -1,4 +1,5 @@
-//! A dataset's folder: claimed by one run at a time, and only for the plan that it was begun with.
+//! A dataset's folder: claimed by one run at a time, and only for the plan that it was started
+//! with.
 
 use crate::dataset::times::RUNS;
 use crate::dataset::{Plan, SampleRange, Shard, SplitOrder, Writer};
@@ -10,7 +11,7 @@ use std::ffi::OsStr;
 use std::fs::{DirEntry, File, TryLockError};
 use std::path::{Path, PathBuf};
 
-/// Name of the file that says what a dataset was made from.
+/// Name of the file that records what a dataset was made from.
 pub(crate) const IDENTITY: &str = "dataset.json";
 
 /// Name of the journal in a dataset's folder.
@@ -23,12 +24,12 @@ const LOCK: &str = ".lock";
 /// have checksums.
 const FORMAT_VERSION: u64 = 2;
 
-/// A claimed folder; free again when this is dropped.
+/// A claimed folder; released on drop.
 pub(crate) struct FolderClaim {
     _lock: File,
 }
 
-/// Claims the folder of a plan: makes or checks it, locks it, and lets the writers begin.
+/// Claims the folder of a plan: creates or checks it, locks it, and lets the writers begin.
 pub(crate) fn claim(plan: &Plan) -> Result<FolderClaim> {
     let folder = plan.folder.as_path();
     let before = enter(folder)?;
@@ -40,14 +41,14 @@ pub(crate) fn claim(plan: &Plan) -> Result<FolderClaim> {
     Ok(FolderClaim { _lock: lock })
 }
 
-/// Makes or checks the folder of a plan that several runs write to at once, no two of them the same
-/// file.
+/// Creates or checks the folder of a plan that several runs write to at once, no two of them the
+/// same file.
 pub(crate) fn share(plan: &Plan) -> Result<()> {
     let before = enter(&plan.folder)?;
     sign(plan, before)
 }
 
-/// Makes a folder if it is not there, and returns what it was made from otherwise.
+/// Creates a folder if it is missing; returns what it was made from otherwise.
 fn enter(folder: &Path) -> Result<Option<Value>> {
     refuse_url(folder)?;
     let before = claimable_identity(folder)?;
@@ -63,7 +64,7 @@ fn refuse_url(folder: &Path) -> Result<()> {
     }
 }
 
-/// Says in the folder what it is made from, if that is what it was begun with.
+/// Records in the folder what it is made from; fails if it was started with something else.
 fn sign(plan: &Plan, before: Option<Value>) -> Result<()> {
     let folder = plan.folder.as_path();
     let now = plan_identity(plan)?;
@@ -83,14 +84,14 @@ fn begin_writers(plan: &Plan) -> Result<()> {
     writers.try_for_each(|writer| writer.begin(&plan.folder, &plan.classes))
 }
 
-/// What a folder was made from; fails for one that holds something else.
+/// What a folder was made from; fails if it holds something else.
 fn claimable_identity(folder: &Path) -> Result<Option<Value>> {
     check_is_folder(folder)?;
     let before = identity(folder)?;
     if before.is_some() || !holds_something(folder)? {
         return Ok(before);
     }
-    // Another shard may have begun it in between.
+    // Another shard may have started it in between.
     let begun = identity(folder)?;
     if begun.is_none() {
         let what = format!("is not empty and has no {IDENTITY}, expected a new or empty folder");
@@ -107,19 +108,19 @@ fn check_is_folder(folder: &Path) -> Result<()> {
     Err(Error::file(folder, what))
 }
 
-/// Fails where the folder was begun with another plan, naming the field.
+/// Fails if the folder was started with another plan, naming the field.
 pub(super) fn check_same_plan(before: &Value, now: &Value, folder: &Path) -> Result<()> {
     of_this_format(before, folder)?;
     same(before, now, "")
         .map_err(|(at, what)| Error::value(at, what).in_file(identity_file(folder)))
 }
 
-/// The file that says what the dataset in a folder was made from.
+/// The file that records what the dataset in a folder was made from.
 pub(super) fn identity_file(folder: &Path) -> PathBuf {
     folder.join(IDENTITY)
 }
 
-/// Claims the folder of a dataset that was begun before.
+/// Claims the folder of a dataset that was started before.
 pub(crate) fn reclaim(folder: &Path) -> Result<FolderClaim> {
     begun(folder)?;
     Ok(FolderClaim {
@@ -127,7 +128,7 @@ pub(crate) fn reclaim(folder: &Path) -> Result<FolderClaim> {
     })
 }
 
-/// What a dataset that was begun before is made from.
+/// What a dataset that was started before is made from.
 pub(crate) fn begun(folder: &Path) -> Result<Value> {
     let before = known_identity(folder, "a dataset that was started before")?;
     io::refuse_links(folder)?;
@@ -135,7 +136,7 @@ pub(crate) fn begun(folder: &Path) -> Result<Value> {
     Ok(before)
 }
 
-/// The folder was begun before every input was recorded and lines had checksums.
+/// Whether the folder was started before every input was recorded and lines had checksums.
 pub(crate) fn is_older(folder: &Path) -> Result<bool> {
     Ok(identity(folder)?.is_some_and(|before| format_of(&before) < FORMAT_VERSION))
 }
@@ -144,8 +145,8 @@ fn format_of(identity: &Value) -> u64 {
     identity["format"].as_u64().unwrap_or(1)
 }
 
-/// Refuses what another petcomp recorded otherwise: nobody could tell whether its inputs are still
-/// the same.
+/// Rejects what another version of petcomp recorded differently: nobody could tell whether its
+/// inputs are unchanged.
 pub(crate) fn of_this_format(identity: &Value, folder: &Path) -> Result<()> {
     let (what, others) = match format_of(identity) {
         FORMAT_VERSION => return Ok(()),
@@ -159,7 +160,7 @@ pub(crate) fn of_this_format(identity: &Value, folder: &Path) -> Result<()> {
     Err(Error::file(identity_file(folder), what))
 }
 
-/// What a folder was made from; none where it is no dataset yet.
+/// What a folder was made from; none if it is no dataset yet.
 pub(crate) fn identity(folder: &Path) -> Result<Option<Value>> {
     match std::fs::symlink_metadata(identity_file(folder)) {
         Err(_) => Ok(None),
@@ -167,10 +168,10 @@ pub(crate) fn identity(folder: &Path) -> Result<Option<Value>> {
     }
 }
 
-/// What a dataset, or whatever is expected, was made from.
+/// What a dataset, or what should be one, was made from.
 ///
 /// # Errors
-/// A folder that is none.
+/// A folder that is not a dataset.
 pub(crate) fn known_identity(folder: &Path, expected: &str) -> Result<Value> {
     let identity = identity(folder)?;
     identity.ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected {expected}")))
@@ -184,7 +185,7 @@ pub(super) fn field<T: DeserializeOwned>(document: &Value, name: &str) -> Result
 /// What a dataset whose samples have files of their own was made from.
 ///
 /// # Errors
-/// As [`known_identity`]; a dataset of archives alone.
+/// As [`known_identity`]; a dataset of archives only.
 pub(crate) fn identity_of_files(folder: &Path) -> Result<Value> {
     let identity = known_identity(folder, "a dataset")?;
     let has_files = [JOURNAL, "images"]
@@ -248,7 +249,7 @@ fn is_half_written(name: &OsStr) -> bool {
     name.starts_with(".petcomp-") && name.ends_with(".tmp")
 }
 
-/// Everything that decides the bytes of a dataset's samples, as it reads back from a file.
+/// Everything that decides the bytes of a dataset's samples, as read back from a file.
 pub(super) fn plan_identity(plan: &Plan) -> Result<Value> {
     let mut identity = json!({
         "format": FORMAT_VERSION,
@@ -280,7 +281,7 @@ fn writer_settings(plan: &Plan) -> Vec<Value> {
     writers.chain(archives).collect()
 }
 
-/// Where two documents differ, and how, if they do.
+/// The first place where two documents differ, and how, if they do.
 type FieldComparison = std::result::Result<(), (String, String)>;
 
 /// Compares two documents and names the first field in which they differ; entries of lists by their
@@ -320,14 +321,14 @@ fn same_entries(a: &[Value], b: &[Value], at: &str) -> FieldComparison {
     Err((at.to_owned(), what))
 }
 
-/// What an entry of a list is called.
+/// The name of an entry of a list.
 fn name_of(entry: &Value) -> Option<&str> {
     ["name", "file"]
         .iter()
         .find_map(|key| entry.get(key)?.as_str())
 }
 
-/// Longest value that a message shows whole, letters.
+/// Maximum length of a value that a message shows whole, characters.
 const MAX_SHOWN_LETTERS: usize = 80;
 
 fn brief(value: &Value) -> String {
@@ -338,12 +339,13 @@ fn brief(value: &Value) -> String {
     }
 }
 
-/// The key that is compared before the others: a picture's size is in what is told of cameras, too.
+/// The key that is compared before the others: a picture's size also affects what is recorded of
+/// cameras.
 const FIRST_KEY: &str = "scene";
 
 fn same_keys(a: &Map<String, Value>, b: &Map<String, Value>, at: &str) -> FieldComparison {
     let keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
-    // Notes are words for people about what is compared by itself.
+    // Notes are text for people about values that are compared themselves.
     let keys = keys.filter(|key| !field_path(at, key).ends_with("recipe.notes"));
     let mut keys: Vec<&String> = keys.collect();
     keys.sort_by_key(|key| *key != FIRST_KEY);

@@ -1,4 +1,4 @@
-//! The part of a recipe that says how labels are made and written: its table `[labels]`.
+//! The part of a recipe that controls how labels are made and written: its table `[labels]`.
 
 use crate::bounds::Bounds;
 use crate::dataset::label_table::LabelTable;
@@ -19,10 +19,10 @@ pub struct LabelConfig {
     /// How objects are labelled: the keys `overlap_iou` or `min_visible`, `max_truncation`,
     /// `alpha_threshold`, `amodal` and `outline`.
     pub options: LabelOptions,
-    /// How far polygons (YOLO's `segment`, COCO's `polygon`) may be from the border of a mask,
-    /// pixels: fewer corners. Default: 0, along the edges of pixels.
+    /// Maximum distance of polygons (YOLO's `segment`, COCO's `polygon`) from the border of a mask,
+    /// pixels: saves corners. Default: 0, along the edges of pixels.
     pub simplify: f64,
-    /// Layouts to write beside the images and their scenes. Default: `["yolo"]`.
+    /// Layouts to write in addition to the images and their scenes. Default: `["yolo"]`.
     pub formats: Vec<Format>,
     /// Settings of YOLO.
     pub yolo: Yolo,
@@ -56,14 +56,14 @@ pub enum Format {
     WebDataset,
 }
 
-/// How much of an object a label tells.
+/// How much of an object a label covers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Extent {
-    /// The whole object as far as it lies in the picture.
+    /// The whole object as far as it is in the picture.
     #[default]
     Amodal,
-    /// What is seen of it; an object of which nothing is seen has no label.
+    /// Its visible part; an object of which nothing is visible has no label.
     Visible,
 }
 
@@ -76,12 +76,12 @@ impl Extent {
         }
     }
 
-    /// Whether there is anything of an object to label.
+    /// Whether anything of an object can be labelled.
     pub(super) fn has_box(self, object: &ObjectLabel) -> bool {
         !self.of(object).0.is_empty()
     }
 
-    /// Whether there is anything of an object to label with a mask.
+    /// Whether anything of an object can be labelled with a mask.
     pub(super) fn has_mask(self, object: &ObjectLabel) -> bool {
         self.has_box(object) && !self.of(object).1.is_empty()
     }
@@ -106,7 +106,7 @@ impl Default for LabelConfig {
 
 impl LabelConfig {
     /// # Errors
-    /// [`Error::Value`](crate::Error::Value) for the first number that cannot be right.
+    /// [`Error::Value`](crate::Error::Value) for the first invalid number.
     pub fn check(&self) -> Result<()> {
         let options = &self.options;
         options.obstruction.check()?;
@@ -129,13 +129,13 @@ impl LabelConfig {
             .collect()
     }
 
-    /// The archives that samples are written to as they are made, where nothing else is asked for.
+    /// The archives that samples are written to as they are made, if no other layout is requested.
     pub fn archives(&self) -> Option<WebDataset> {
         (self.distinct_formats() == [Format::WebDataset]).then_some(self.webdataset)
     }
 
-    /// How much of an object labels in memory tell: as much as YOLO's where that or no layout with
-    /// boxes is written, else as those of the first one.
+    /// The extent of labels in memory: YOLO's if that or no layout with boxes is written, else that
+    /// of the first one.
     pub fn extent(&self) -> Extent {
         // YOLO is the first of all.
         let writers = self.writers(&Pictures::default());
@@ -178,7 +178,7 @@ impl LabelConfig {
     }
 }
 
-/// Coverage is never more than 1: above a threshold of 1 nothing has a label.
+/// Coverage is never more than 1: above a threshold of 1 nothing would get a label.
 fn check_threshold(threshold: f32) -> Result<()> {
     if (0.0..1.0).contains(&threshold) {
         return Ok(());
@@ -187,7 +187,7 @@ fn check_threshold(threshold: f32) -> Result<()> {
     Err(Error::value("alpha_threshold", what))
 }
 
-/// Whether polygons keep every corner: a setting that need not be told.
+/// Whether polygons keep every corner: a setting that need not be recorded.
 pub(super) fn is_exact(tolerance_px: &f64) -> bool {
     *tolerance_px == 0.0
 }

@@ -1,4 +1,4 @@
-//! Makes a dataset, many samples at a time, in a folder that survives any interruption.
+//! Generates a dataset, many samples at a time, in a folder that survives any interruption.
 
 use crate::dataset::archive_store::ArchiveStore;
 use crate::dataset::archives::generate_archives;
@@ -15,42 +15,41 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// A dataset to make.
+/// A dataset to generate.
 #[derive(Clone)]
 pub struct Plan {
-    /// Where; made if it is not there.
+    /// Where; created if missing.
     pub folder: PathBuf,
     /// Number of samples of the whole dataset.
     pub count: u64,
     /// Which of them this run makes.
     pub range: SampleRange,
-    /// Seed, as it is told in the files; the samples come from the closure.
+    /// Seed, as recorded in the files; the samples come from the closure.
     pub seed: u64,
     /// Everything else that decides what a sample is: a run into a folder that was made from
-    /// another is refused.
+    /// something else is rejected.
     pub recipe: serde_json::Value,
     /// Names of the classes, in order.
     pub classes: Vec<String>,
     /// Which samples are for validation.
     pub split: Split,
-    /// What happens to the labels of objects that something lies over.
+    /// What happens to the labels of objects that something covers.
     pub obstructed: Obstructed,
     /// The files to write of each sample, in this order.
     pub writers: Vec<Arc<dyn Writer>>,
-    /// Archives that the files of samples are moved into as they are made, so that none lies about;
-    /// by default files stay where they are.
+    /// Archives that the files of samples are moved into as they are made, so that no single files
+    /// remain; by default files stay where they are.
     pub archives: Option<WebDataset>,
-    /// Where finished archives are kept, while `folder` holds what is not finished; by default it
-    /// keeps both.
+    /// Where finished archives are kept, while `folder` holds what is unfinished; by default
+    /// `folder` keeps both.
     pub store: Option<Arc<dyn ArchiveStore>>,
-    /// Checksums of files that `recipe` tells of, to be kept in the folder. By default there are
-    /// none.
+    /// Checksums of the files that `recipe` describes, to be kept in the folder. Default: none.
     pub inputs: Inputs,
 }
 
 impl Plan {
-    /// `count` samples in `folder` with labels of these classes, shared out by the default
-    /// [`Split`]; its writers are still to be named.
+    /// `count` samples in `folder` with labels of these classes, split by the default [`Split`];
+    /// its writers are still to be set.
     pub fn new(folder: impl Into<PathBuf>, count: u64, classes: Vec<String>) -> Self {
         Self {
             folder: folder.into(),
@@ -76,7 +75,7 @@ impl Plan {
         )
     }
 
-    /// Those of the writers; objects as far as they lie in the picture, where none has one.
+    /// The extents of the writers; objects as far as they are in the picture if no writer has one.
     fn extents(&self) -> Vec<Extent> {
         let extents: Vec<_> = self.writers.iter().filter_map(|w| w.extent()).collect();
         if extents.is_empty() {
@@ -85,7 +84,7 @@ impl Plan {
         extents
     }
 
-    /// Whether any of the writers has a label of an object; where none writes labels, all have one.
+    /// Whether any of the writers has a label of an object; if none writes labels, all have one.
     fn has_label_of(&self, object: &ObjectLabel) -> bool {
         let mut writers = self
             .writers
@@ -96,26 +95,27 @@ impl Plan {
     }
 }
 
-/// Makes the samples that the plan asks for and that are not in its folder yet, and returns what
-/// the folder then holds.
+/// Generates the samples of the plan that are missing from its folder, and returns what the folder
+/// then holds.
 ///
-/// `make(k)` gives sample `k`; it is called from several threads, for each `k` at most once, in no
-/// fixed order, and must depend on nothing but `k`. `progress` is called once at the start and
-/// after each sample, one call at a time. Once `stop` is true, samples in hand are finished and no
-/// more are begun.
+/// `make(k)` returns sample `k`; it is called from several threads, for each `k` at most once, in
+/// no fixed order, and must depend on nothing but `k`. `progress` is called once at the start and
+/// after each sample, one call at a time. Once `stop` is true, samples in progress are finished and
+/// no more are started.
 ///
 /// The files depend on the plan alone: not on threads, order, time, or how often the run was
-/// interrupted. As many samples are in memory as the current rayon pool has threads; each works on
-/// its own, since pictures beside each other keep processors busier than rows of one picture. Files
-/// of many samples are joined when all are there; those of a shard stay apart until it is
-/// [merged](crate::dataset::merge). With [`Plan::archives`] each archive is there whole or not at
-/// all, shards write theirs into one folder, and [`DatasetCounts::counted`] are those of this run;
-/// [`Plan::store`] has them sent away as they are finished.
+/// interrupted. As many samples are in memory as the current rayon pool has threads; each thread
+/// works on its own sample, since that keeps processors busier than sharing the rows of one
+/// picture. Files of many samples are joined when all are present; those of a shard stay apart
+/// until it is [merged](crate::dataset::merge). With [`Plan::archives`] each archive is present
+/// whole or not at all, shards write theirs into one folder, and [`DatasetCounts::counted`] are
+/// those of this run; [`Plan::store`] receives them as they are finished.
 ///
 /// # Errors
-/// [`Error::Interrupted`] after a stop; the first error of `make` or of a writer, in order of `k`
-/// among those in hand; a single sample beyond the plan's; a folder that is a file, holds something else, was made from another plan
-/// (the message names the field), or is being written by another run; a disk without room. In every
+/// [`Error::Interrupted`] after a stop; the first error of `make` or of a writer, in order of `k` among the samples in
+/// progress; a single sample outside the plan's; a folder that is a file, holds something else, was made from another
+/// plan (the message names the field), or is being written by another run; a full disk. In every case the folder stays
+/// valid, and the same call resumes it.
 /// case the folder stays valid, and the same call continues it.
 pub fn generate(
     plan: &Plan,
@@ -188,7 +188,7 @@ fn write_sample(plan: &Plan, recipe_hash: &str, k: u64, sample: &Sample) -> Resu
     JournalLine::new(&entry, folder, &files)
 }
 
-/// Meets what the writers take for granted.
+/// The writers rely on this.
 fn check_image_size(sample: &Sample) -> Result<()> {
     let (w, h) = sample.frame.size();
     let [lw, lh] = sample.labels.image;

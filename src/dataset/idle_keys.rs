@@ -1,15 +1,15 @@
-//! Keys of a recipe that change nothing.
+//! Keys of a recipe that have no effect.
 
 use crate::dataset::{
     Coco, CocoMask, Format, LabelConfig, Layers, Mot, Pipeline, Voc, WebDataset, Yolo, YoloTask,
 };
 use crate::scene::{Background, EnvironmentRanges, LensRanges, Recipe, Wall};
 
-/// Most names in a message.
+/// Maximum number of names in a message.
 const MAX_SHOWN_NAMES: usize = 5;
 
 impl Pipeline {
-    /// What the recipe says that changes nothing in the dataset, and why.
+    /// The recipe's keys that have no effect on the dataset, and why.
     #[doc(hidden)]
     pub fn idle_keys(&self) -> Vec<String> {
         let recipe = &self.config().scene;
@@ -70,7 +70,7 @@ fn has_polygons(labels: &LabelConfig) -> bool {
     })
 }
 
-/// Settings of a depth of field and of a picture of the surroundings where there is none.
+/// Settings of a depth of field or an environment map that is not used.
 fn idle_partners(recipe: &Recipe) -> Vec<String> {
     let mut idle = Vec::new();
     if recipe.lens.f_number.is_none() {
@@ -113,8 +113,8 @@ fn idle_surroundings(environment: &EnvironmentRanges) -> Vec<String> {
     .collect()
 }
 
-/// Why the recipe's `scene.light_direction` leaves light where it is drawn, and in which places;
-/// none where it does not.
+/// Why the recipe's `scene.light_direction` does not change the drawn light, and in which places;
+/// none if it does.
 fn idle_light_direction<'a>(
     recipe: &Recipe,
     backgrounds: impl Iterator<Item = &'a Background>,
@@ -137,7 +137,7 @@ fn idle_light_direction<'a>(
     })
 }
 
-/// Whether there is anything on the edges of a surface whose label says `labelled`.
+/// Whether a surface has any walls or lip, given its label's wall.
 fn has_walls(recipe: &Recipe, labelled: Option<Wall>) -> bool {
     let labelled = labelled.map(|wall| wall.height);
     match recipe.walls {

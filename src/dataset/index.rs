@@ -1,5 +1,4 @@
-//! Which pictures a folder holds, listed without opening them; what is in a picture is read when
-//! somebody asks.
+//! The pictures in a folder, listed without opening them; a picture's contents are read on demand.
 
 pub use crate::dataset::page::labelled_pictures::ShareBox;
 pub use crate::dataset::page::outlier::Outlier;
@@ -24,49 +23,49 @@ use std::path::{Path, PathBuf};
 pub struct DatasetIndex {
     /// The folder.
     pub folder: PathBuf,
-    /// Names of the classes, in order; none where nobody says them.
+    /// Names of the classes, in order; empty if unknown.
     pub classes: Vec<String>,
     /// The pictures, in order.
     pub pictures: Vec<IndexedPicture>,
     labelling: Labelling,
 }
 
-/// A picture that nobody has opened.
+/// A picture in the list, not opened.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IndexedPicture {
     /// Its number, or its file's name.
     pub name: String,
-    /// The part that it belongs to, if that is said.
+    /// The part that it belongs to, if known.
     pub part: Option<Part>,
     /// Its file, below the dataset's folder for petcomp's own.
     pub file: PathBuf,
-    /// What petcomp wrote of it.
+    /// What petcomp recorded about it.
     pub written: Option<WrittenPicture>,
 }
 
-/// What the list of petcomp's own pictures says of one.
+/// What the list of petcomp's own pictures records about one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WrittenPicture {
     /// The file of its record, below the dataset's folder.
     pub record: String,
     /// Objects of each class, and how many of them have a label.
     pub classes: Vec<[u32; 2]>,
-    /// Objects that something lies over.
+    /// Objects that something covers.
     pub obstructed: u32,
     /// Objects in cyclic overlap.
     pub knotted: u32,
     /// Scenes that were rejected before this one.
     pub rejected: u32,
-    /// Size of the picture's file.
+    /// Size of the picture's file, bytes.
     pub bytes: u64,
 }
 
-/// What is in a picture, in brief.
+/// Summary of a picture's contents.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PictureFacts {
-    /// Name of the photo of the place; empty where that is not known.
+    /// Name of the photo of the place; empty if unknown.
     pub background: String,
-    /// Its objects with or without a label.
+    /// Its objects, with or without a label.
     pub objects: Vec<ObjectFacts>,
     /// Objects without a class that are in the way.
     pub distractors: usize,
@@ -74,22 +73,22 @@ pub struct PictureFacts {
     pub is_labelled: bool,
 }
 
-/// An object of a picture, in brief.
+/// Summary of an object of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ObjectFacts {
     /// Index into the class list.
     pub class: u32,
-    /// It has a label.
+    /// Whether it has a label.
     pub labelled: bool,
-    /// Seen share of it, 0 to 1; none where that is not known.
+    /// Visible share, 0 to 1; none if unknown.
     pub visible: Option<f32>,
-    /// Centre, width and height of the box of its label, shares of the picture's; of the whole
-    /// object where it has none.
+    /// Centre, width and height of the box of its label as shares of the picture's; of the whole
+    /// object if it has no label.
     pub bbox: [f32; 4],
 }
 
 impl DatasetIndex {
-    /// Lists a dataset of petcomp's, a YOLO dataset, or a folder of images.
+    /// Lists a dataset made by petcomp, a YOLO dataset, or a folder of images.
     ///
     /// # Errors
     /// A list or folder that cannot be read; no image.
@@ -130,7 +129,7 @@ impl DatasetIndex {
     /// The file of a picture.
     ///
     /// # Errors
-    /// A picture of petcomp's that is not in the folder any more.
+    /// A picture of petcomp's that is no longer in the folder.
     pub fn file(&self, row: usize) -> Result<PathBuf> {
         let picture = &self.pictures[row];
         match picture.written {
@@ -139,7 +138,7 @@ impl DatasetIndex {
         }
     }
 
-    /// What is in a picture.
+    /// Summary of a picture's contents.
     ///
     /// # Errors
     /// A record or label that cannot be read.
@@ -154,8 +153,8 @@ impl DatasetIndex {
         }
     }
 
-    /// Everything that petcomp wrote of a picture; none for one from elsewhere. Objects with a label
-    /// have the class and, as `amodal_box`, the box of that.
+    /// Everything that petcomp recorded about a picture; none for one from elsewhere. Objects with a label have the
+    /// label's class and, as `amodal_box`, the label's box.
     ///
     /// # Errors
     /// A record that cannot be read.
@@ -178,13 +177,13 @@ impl DatasetIndex {
         Ok(picture.boxes)
     }
 
-    /// The pictures that are unlike the others, the strangest first, by what the list and `facts`
-    /// say.
+    /// The pictures that are unlike the others, the most unusual first, judged by the list and
+    /// `facts`.
     pub fn unlike<'f>(&self, facts: impl Fn(usize) -> Option<&'f PictureFacts>) -> Vec<Outlier> {
         outliers(&self.features(facts))
     }
 
-    /// What pictures are compared by.
+    /// The numbers that pictures are compared by.
     fn features<'f>(
         &self,
         facts: impl Fn(usize) -> Option<&'f PictureFacts>,
@@ -207,7 +206,7 @@ impl DatasetIndex {
         ]
     }
 
-    /// A number of each picture; none where it is not known.
+    /// A number for each picture; NaN if unknown.
     fn feature(
         &self,
         name: &'static str,
@@ -221,7 +220,7 @@ impl DatasetIndex {
         }
     }
 
-    /// How many objects (0) or labels (1) a picture has, as far as it is known.
+    /// How many objects (0) or labels (1) a picture has, if known.
     fn count(&self, row: usize, facts: Option<&PictureFacts>, which: usize) -> Option<f64> {
         let written = self.pictures[row].written.as_ref();
         let written = written.map(|written| f64::from(written.count(which)));
@@ -281,7 +280,7 @@ impl PictureFacts {
         }
     }
 
-    /// Of the labelled object that is seen least.
+    /// Visible percentage of the least visible labelled object.
     fn least_visible_percent(&self) -> Option<f64> {
         let labelled = self.objects.iter().filter(|object| object.labelled);
         let visible = labelled.filter_map(|object| object.visible);
@@ -291,7 +290,7 @@ impl PictureFacts {
     }
 }
 
-/// What of a record tells what is in the picture, without masks and scenes.
+/// The parts of a record that describe a picture's contents, without masks and scenes.
 #[derive(Deserialize)]
 struct BriefRecord {
     labelled: Vec<ObjectId>,

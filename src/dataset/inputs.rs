@@ -1,5 +1,5 @@
-//! Checksums of the files that a dataset is made from: each file is read once, and again only when
-//! it has changed.
+//! Checksums of the files that a dataset is made from: each file is read once, and again only if it
+//! has changed.
 
 use crate::error::{Error, Result};
 use crate::io::{self, Checksum};
@@ -10,8 +10,8 @@ use std::fs::Metadata;
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// Name of the file that keeps the checksums: of the machine and its clock, and no part of the
-/// dataset.
+/// Name of the file that keeps the checksums: specific to the machine and its clock, and no part of
+/// the dataset.
 pub(crate) const INPUTS: &str = ".inputs.json";
 
 /// A file that changed less than this ago may change again within the same tick of its file
@@ -20,7 +20,7 @@ const SETTLED_AGE: Duration = Duration::from_secs(2);
 
 /// Checksums of a dataset's input files, kept in its folder from one run to the next.
 ///
-/// A checksum is taken as it was while the file has the same size, times and place on the disk.
+/// A checksum is reused while the file has the same size, times and place on the disk.
 #[derive(Clone, Debug, Default)]
 pub struct Inputs {
     before: BTreeMap<String, Input>,
@@ -33,7 +33,7 @@ struct Input {
     /// Size, times and place on the disk.
     stamp: String,
     crc32: u32,
-    /// The file had not changed for a while when it was read.
+    /// Whether the file had not changed for a while when it was read.
     #[serde(skip, default = "settled")]
     is_settled: bool,
 }
@@ -43,7 +43,7 @@ fn settled() -> bool {
 }
 
 impl Inputs {
-    /// What an earlier run kept in a dataset's folder; nothing where there is none.
+    /// What an earlier run kept in a dataset's folder; empty if there is nothing.
     pub(crate) fn kept(folder: &Path) -> Self {
         let before = io::inside(folder, INPUTS)
             .and_then(io::read_json)
@@ -109,14 +109,14 @@ impl Inputs {
         inputs.filter(|(_, input)| input.is_settled).collect()
     }
 
-    /// Has every file read again by the next run.
+    /// Makes the next run read every file again.
     pub(crate) fn forget(folder: &Path) {
-        // Where there is none, or it cannot be taken away, no harm is done.
+        // If it does not exist or cannot be deleted, no harm is done.
         let _ = std::fs::remove_file(folder.join(INPUTS));
     }
 }
 
-/// Everything that the system says of a file's content without reading it.
+/// Everything that the system reports about a file's content without reading it.
 #[cfg(unix)]
 fn stamp(meta: &Metadata) -> String {
     use std::os::unix::fs::MetadataExt as M;
@@ -130,7 +130,7 @@ fn stamp(meta: &Metadata) -> String {
     format!("{} {times} {} {}", meta.len(), M::dev(meta), M::ino(meta))
 }
 
-/// Everything that the system says of a file's content without reading it.
+/// Everything that the system reports about a file's content without reading it.
 #[cfg(not(unix))]
 fn stamp(meta: &Metadata) -> String {
     format!("{} {:?}", meta.len(), meta.modified().ok())
@@ -143,7 +143,7 @@ fn is_settled(meta: &Metadata, now: SystemTime) -> bool {
     age.is_some_and(|age| age > SETTLED_AGE)
 }
 
-/// When a file's content or its names changed last: a time that nobody can set back.
+/// When a file's content or its names last changed: a time that nobody can set back.
 #[cfg(unix)]
 fn changed(meta: &Metadata) -> Option<SystemTime> {
     use std::os::unix::fs::MetadataExt as M;
@@ -154,7 +154,7 @@ fn changed(meta: &Metadata) -> Option<SystemTime> {
     ))
 }
 
-/// Not told here.
+/// Not available on this system.
 #[cfg(not(unix))]
 fn changed(_: &Metadata) -> Option<SystemTime> {
     None
@@ -179,7 +179,7 @@ mod tests {
         std::fs::write(&file, "one").unwrap();
         let later = SystemTime::now() + Duration::from_secs(60);
         assert_eq!(run(dir.path(), &file, later), crc32fast::hash(b"one"));
-        // Known by its stamp: what is kept is believed.
+        // Known by its stamp, so the kept checksum is used.
         let kept = dir.path().join(INPUTS);
         let wrong = io::read_text(&kept)
             .unwrap()

@@ -1,15 +1,15 @@
 //! The journal: which samples of a dataset are finished.
 //!
-//! A sample exists if and only if its line is whole and its files have the size that the line says.
-//! Lines are added in the order in which samples finish; [`Journal::close`] puts them in order of
-//! number, so a finished folder does not show how it was made.
+//! A sample exists if and only if its line is intact and its files have the size given in the line.
+//! Lines are added in the order in which samples finish; [`Journal::close`] sorts them by number,
+//! so a finished folder does not show how it was made.
 //!
 //! # After a power cut
-//! Files are not put on the disk one by one but with those of [`UNSYNCED_LINES`] samples at once,
-//! and before lines are put in order. So at most the last so many lines may tell of files that were
-//! lost or torn; a run that goes on compares those by checksum, and puts on the disk what a killed
-//! one left in memory. A sample that has a line already is the exception: its files are put on the
-//! disk each before it takes the place of the old one, or that line would be taken for theirs.
+//! Files are not synced to disk one by one but with those of [`UNSYNCED_LINES`] samples at once,
+//! and before lines are sorted. So at most the last that many lines may refer to files that were
+//! lost or torn; a resumed run compares those by checksum, and syncs what a killed one left in
+//! memory. A sample that already has a line is the exception: each of its files is synced before it
+//! replaces the old one; otherwise that line would be mistaken for theirs.
 
 use crate::dataset::Inputs;
 use crate::dataset::folder::{self, JOURNAL};
@@ -22,7 +22,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
-/// Most lines, the last ones, whose files may not be on the disk yet.
+/// Maximum number of lines, the last ones, whose files may not be synced yet.
 const UNSYNCED_LINES: usize = 256;
 
 /// An open journal.
@@ -30,17 +30,17 @@ pub(crate) struct Journal {
     path: PathBuf,
     file: File,
     lines: BTreeMap<u64, JournalLine>,
-    /// How the system puts the files of many samples on the disk.
+    /// How the system syncs the files of many samples.
     syncing: Syncing,
-    /// Lines whose files may not be on the disk yet.
+    /// Lines whose files may not be synced yet.
     unsynced: usize,
-    /// The disk lost something: it says so once alone.
+    /// Whether the disk lost something: the system reports that only once.
     has_lost: bool,
 }
 
 impl Journal {
-    /// Opens the journal of a folder, or starts one. Lines that are torn, or whose files are not
-    /// there, are forgotten.
+    /// Opens the journal of a folder, or starts one. Lines that are torn, or whose files are
+    /// missing, are dropped.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(JOURNAL);
         let file = io::open_own(&path)?;
@@ -50,7 +50,7 @@ impl Journal {
         warn_of_damage(&read, &path, "their samples are generated again");
         let lines = lines_with_files(undamaged(read).collect(), folder);
         if lines.len() < count {
-            // Or new lines would push those that are forgotten out of what the next run compares.
+            // Otherwise new lines would push those to be dropped out of what the next run compares.
             write_lines(&path, lines.values())?;
         }
         let mut file = io::open_own(&path)?;
@@ -65,7 +65,7 @@ impl Journal {
         })
     }
 
-    /// Sample `k` is finished.
+    /// Whether sample `k` is finished.
     pub(crate) fn has(&self, k: u64) -> bool {
         self.lines.contains_key(&k)
     }
@@ -78,7 +78,7 @@ impl Journal {
             .map_or(0, |k| k.saturating_add(1))
     }
 
-    /// How the files of sample `k` are put on the disk.
+    /// How the files of sample `k` are synced.
     pub(crate) fn syncing(&self, k: u64) -> Syncing {
         if self.has(k) {
             return Syncing::Alone;
@@ -98,7 +98,7 @@ impl Journal {
         Ok(())
     }
 
-    /// Number of finished samples below `count` that are wanted.
+    /// Number of requested samples below `count` that are finished.
     pub(crate) fn count(&self, count: u64, wanted: impl Fn(u64) -> bool) -> u64 {
         self.lines
             .range(..count)
@@ -106,7 +106,7 @@ impl Journal {
             .count() as u64
     }
 
-    /// Puts the lines in order and returns those of the samples below `count`.
+    /// Sorts the lines and returns those of the samples below `count`.
     pub(crate) fn close(mut self, count: u64) -> Result<Vec<JournalLine>> {
         self.sync()?;
         write_lines(&self.path, self.lines.values())?;
@@ -114,7 +114,7 @@ impl Journal {
         Ok(self.lines.into_values().collect())
     }
 
-    /// Puts the files of all samples on the disk. After it lost some, lines stay as they were added.
+    /// Syncs the files of all samples. After a loss, lines stay in the order in which they were added.
     fn sync(&mut self) -> Result<()> {
         if self.has_lost {
             let what = "the disk lost some of the last samples";
@@ -126,7 +126,7 @@ impl Journal {
     }
 }
 
-/// Puts the files of all samples on the disk; says how the system can do that.
+/// Syncs the files of all samples; returns how the system can do that.
 fn sync(journal: &File, path: &Path) -> Result<Syncing> {
     match io::sync_file_system(journal) {
         Ok(true) => Ok(Syncing::Together),
@@ -140,7 +140,7 @@ fn sync(journal: &File, path: &Path) -> Result<Syncing> {
     }
 }
 
-/// Ends a last line without an end: what follows would be read as a part of it.
+/// Terminates an unterminated last line; otherwise the next one would be read as a part of it.
 fn end_last_line(file: &mut File) -> std::io::Result<()> {
     let mut last = *b"\n";
     if file.metadata()?.len() > 0 {
@@ -153,7 +153,7 @@ fn end_last_line(file: &mut File) -> std::io::Result<()> {
     Ok(())
 }
 
-/// The lines whose files are there, by number.
+/// The lines whose files are present, by number.
 fn lines_with_files(known: Vec<JournalLine>, folder: &Path) -> BTreeMap<u64, JournalLine> {
     let synced = known.len().saturating_sub(UNSYNCED_LINES);
     let held: Vec<JournalLine> = known
@@ -165,22 +165,22 @@ fn lines_with_files(known: Vec<JournalLine>, folder: &Path) -> BTreeMap<u64, Jou
     keyed_by_number(held)
 }
 
-/// Of one number the last.
+/// The last line for each number.
 fn keyed_by_number(lines: impl IntoIterator<Item = JournalLine>) -> BTreeMap<u64, JournalLine> {
     lines.into_iter().map(|line| (line.k, line)).collect()
 }
 
-/// Compares the files of a dataset with what was written and marks samples that differ to be made
-/// again: returns how many samples are good and how many the next run makes again. That run also
-/// reads every input file anew.
+/// Compares the files of a dataset with what was written and marks samples that differ to be
+/// generated again; returns how many samples are good and how many the next run generates again.
+/// That run also rereads every input file.
 ///
 /// # Errors
-/// A folder that holds no dataset, one that an older petcomp began, or one that a run is writing.
+/// A folder that holds no dataset, one that an older petcomp started, or one that a run is writing.
 pub fn repair(folder: &Path) -> Result<(usize, usize)> {
     let _lock = folder::reclaim(folder)?;
     Inputs::forget(folder);
     let path = folder.join(JOURNAL);
-    // Made where it is not there: a run may have ended before its first sample.
+    // Created if missing: a run may have ended before its first sample.
     let file = io::open_own(&path)?;
     sync(&file, &path)?;
     let read = read_journal(&file, &path, false)?;
@@ -194,14 +194,14 @@ pub fn repair(folder: &Path) -> Result<(usize, usize)> {
     Ok((good.len(), all - good.len()))
 }
 
-/// The whole lines of a folder's journal, in order of number.
+/// The intact lines of a folder's journal, in order of number.
 pub(crate) fn lines_of(folder: &Path) -> Result<Vec<JournalLine>> {
     let read = numbered_lines(folder)?;
     warn_of_damage(&read, &folder.join(JOURNAL), "left out");
     Ok(by_number(read))
 }
 
-/// Samples that a folder's journal lists; none where there is no journal.
+/// Number of samples that a folder's journal lists; 0 without a journal.
 pub(crate) fn count_listed(folder: &Path) -> u64 {
     numbered_lines(folder).map_or(0, |read| by_number(read).len() as u64)
 }
@@ -216,7 +216,7 @@ pub fn listed_files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files.map(|file| folder.join(file)).collect())
 }
 
-/// Lines by their place in the file, from 1: what each says, or what is wrong with it.
+/// Lines by their number in the file, from 1: the content of each, or what is wrong with it.
 pub(crate) type NumberedLines = Vec<(usize, std::result::Result<JournalLine, String>)>;
 
 /// Every line of a folder's journal.
@@ -231,12 +231,12 @@ fn read_journal(file: &File, path: &Path, is_older: bool) -> Result<NumberedLine
     read_lines(BufReader::new(file), is_older).map_err(|e| Error::file(path, e))
 }
 
-/// The lines that are not damaged, in the order of the file.
+/// The undamaged lines, in the order of the file.
 fn undamaged(read: NumberedLines) -> impl Iterator<Item = JournalLine> {
     read.into_iter().filter_map(|(_, line)| line.ok())
 }
 
-/// The lines that are not damaged, in order of number; of one number the last.
+/// The undamaged lines, in order of number; for each number the last.
 fn by_number(read: NumberedLines) -> Vec<JournalLine> {
     keyed_by_number(undamaged(read)).into_values().collect()
 }
@@ -248,10 +248,10 @@ fn warn_of_damage(read: &NumberedLines, path: &Path, consequence: &str) {
     }
 }
 
-/// Longest line of a journal: a sample has a handful of files.
+/// Maximum length of a line of a journal: a sample has a handful of files.
 const MAX_LINE_BYTES: u64 = 1 << 20;
 
-/// The lines of a journal; `is_older` says that lines without a checksum are taken as well.
+/// The lines of a journal; `is_older` also accepts lines without a checksum.
 pub(crate) fn read_lines(mut from: impl BufRead, is_older: bool) -> std::io::Result<NumberedLines> {
     let mut lines = Vec::new();
     for i in 1.. {
@@ -267,7 +267,7 @@ pub(crate) fn read_lines(mut from: impl BufRead, is_older: bool) -> std::io::Res
     Ok(lines)
 }
 
-/// The next line with its end; nothing at the end of the file.
+/// The next line with its end; empty at the end of the file.
 fn read_line(from: &mut impl BufRead, i: usize) -> std::io::Result<Vec<u8>> {
     let mut text = Vec::new();
     let mut limited = from.by_ref().take(MAX_LINE_BYTES);
@@ -279,7 +279,7 @@ fn read_line(from: &mut impl BufRead, i: usize) -> std::io::Result<Vec<u8>> {
     Ok(text)
 }
 
-/// Writes a journal anew.
+/// Rewrites a journal.
 fn write_lines<'a>(path: &Path, mut lines: impl Iterator<Item = &'a JournalLine>) -> Result<()> {
     io::write_through(path, |out| {
         lines.try_for_each(|line| out.write_all(line.text().as_bytes()))
@@ -292,7 +292,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     use crate::dataset::journal_line::test_line;
 
-    /// Other systems put each file on the disk by itself.
+    /// Other systems sync each file by itself.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_forgotten_sample_has_no_line_and_one_that_has_is_put_on_the_disk_first() {

@@ -1,8 +1,8 @@
 //! A line of the journal: what is known of a finished sample, sealed by a checksum.
 //!
 //! A line is a JSON object whose last key, `crc32`, is the checksum of the bytes before it: a line
-//! that was torn or edited is ignored, and its sample is made again. Lines of datasets that were
-//! begun before there were checksums are read as they are, by what reads only.
+//! that was torn or edited is ignored, and its sample is generated again. Lines of datasets that
+//! were started before there were checksums are accepted as they are, by read-only functions.
 
 use crate::dataset::folder::{IDENTITY, JOURNAL};
 use crate::dataset::{Entry, Part, Written};
@@ -12,7 +12,7 @@ use crate::label::cyclic_overlaps;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What the journal says of one finished sample.
+/// What the journal records of one finished sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JournalLine {
@@ -23,12 +23,12 @@ pub(crate) struct JournalLine {
     /// Objects of each class in the picture (of the class they are labelled as, if they are), and
     /// how many have a label that is not to be ignored.
     pub(crate) classes: Vec<[u32; 2]>,
-    /// Objects that something lies over.
+    /// Objects that something covers.
     #[serde(default)]
     pub(crate) obstructed: u32,
     /// Objects in cyclic overlap.
     pub(crate) knotted: u32,
-    /// Rejected scenes.
+    /// Number of rejected scenes.
     pub(crate) retries: u32,
     /// Its files.
     pub(crate) files: Vec<WrittenFile>,
@@ -65,8 +65,8 @@ impl JournalLine {
         })
     }
 
-    /// Reads a line, if it is as it was written; `is_older` says that lines without a checksum are
-    /// taken as well.
+    /// Reads a line if it is unchanged since it was written; `is_older` also accepts lines without
+    /// a checksum.
     pub(crate) fn parse(text: &[u8], is_older: bool) -> std::result::Result<Self, String> {
         let line = without_seal(text, is_older)?;
         let line: Self = serde_json::from_slice(&line).map_err(|e| e.to_string())?;
@@ -74,14 +74,14 @@ impl JournalLine {
         Ok(line)
     }
 
-    /// Its text with the checksum, and the end of the line.
+    /// Its text with the checksum and the line end.
     pub(crate) fn text(&self) -> String {
         let json = serde_json::to_string(self).expect("numbers, strings and lists are JSON");
         let body = &json[..json.len() - 1];
         format!("{body}{SEAL}{}}}\n", crc32fast::hash(body.as_bytes()))
     }
 
-    /// What a writer needs to know to join it with others.
+    /// What a writer needs to join it with others.
     pub(crate) fn written(&self) -> Written {
         Written {
             k: self.k,
@@ -90,10 +90,10 @@ impl JournalLine {
         }
     }
 
-    /// The sample's file in a folder of the dataset (`images/`), as the journal has it.
+    /// The sample's file in a folder of the dataset (`images/`), as recorded in the journal.
     ///
     /// # Errors
-    /// When it has none, or none that lies in the dataset.
+    /// If it has none, or none that is in the dataset.
     pub(crate) fn file_name(&self, folder: &Path, kind: &str) -> Result<&str> {
         let Some(file) = self.files.iter().find(|file| file.path.starts_with(kind)) else {
             let what = format!("sample {} has no {kind}", self.k);
@@ -103,7 +103,7 @@ impl JournalLine {
         Ok(&file.path)
     }
 
-    /// The path of the same.
+    /// The path of that file.
     ///
     /// # Errors
     /// As [`file_name`](Self::file_name).
@@ -111,14 +111,14 @@ impl JournalLine {
         io::inside(folder, self.file_name(folder, kind)?)
     }
 
-    /// Every file is there with its very bytes.
+    /// Whether every file is present with exactly the recorded bytes.
     pub(crate) fn has_same_bytes(&self, folder: &Path) -> bool {
         let mut files = self.files.iter();
         files.all(|file| file.difference(folder).is_none())
     }
 
-    /// Every file is there: in its full size where it is on the disk for sure, else with its very
-    /// bytes.
+    /// Whether every file is present: with its full size if it is certainly synced, else with
+    /// exactly the recorded bytes.
     pub(crate) fn has_files(&self, folder: &Path, is_synced: bool) -> bool {
         if !is_synced {
             return self.has_same_bytes(folder);
@@ -129,7 +129,7 @@ impl JournalLine {
 }
 
 /// For each class its objects in the picture, and how many of them have a label that is not to be
-/// ignored, which YOLO has none of.
+/// ignored (YOLO has no labels to be ignored).
 fn count_by_class(entry: &Entry<'_>) -> Vec<[u32; 2]> {
     let mut classes = vec![[0; 2]; entry.classes.len()];
     for object in &entry.sample.labels.objects {
@@ -143,7 +143,7 @@ fn count_by_class(entry: &Entry<'_>) -> Vec<[u32; 2]> {
 }
 
 impl WrittenFile {
-    /// Its path below the dataset's folder, as this system writes it.
+    /// Its path below the dataset's folder, in this system's notation.
     fn local_path(&self) -> PathBuf {
         self.path.split('/').collect()
     }
@@ -159,7 +159,7 @@ impl WrittenFile {
         })
     }
 
-    /// What it was when it was written.
+    /// Its checksum when it was written.
     pub(crate) fn checksum(&self) -> Checksum {
         Checksum {
             bytes: self.bytes,
@@ -167,7 +167,7 @@ impl WrittenFile {
         }
     }
 
-    /// Its length now; none where it is not there.
+    /// Its length now; none if it is missing.
     fn length(&self, folder: &Path) -> Option<u64> {
         io::length_inside(folder, &self.path).ok()
     }
@@ -191,8 +191,8 @@ impl WrittenFile {
         }
     }
 
-    /// Fails where the path is none of a sample's: outside of the folder, hidden, or a file of the
-    /// dataset as a whole.
+    /// Fails if the path cannot be a sample's: outside the folder, hidden, or a file of the dataset
+    /// as a whole.
     fn check_path(&self) -> std::result::Result<(), String> {
         io::below("", &self.path).map_err(|e| e.to_string())?;
         let path = self.path.as_str();
@@ -204,11 +204,11 @@ impl WrittenFile {
     }
 }
 
-/// What stands before a line's checksum.
+/// What precedes a line's checksum.
 const SEAL: &str = ",\"crc32\":";
 
-/// The line without its seal, if that is the checksum of its bytes; lines of older datasets have
-/// none.
+/// The line without its seal, if the checksum matches its bytes; lines of older datasets have no
+/// seal.
 fn without_seal(text: &[u8], is_older: bool) -> std::result::Result<Vec<u8>, String> {
     match split_seal(text) {
         Some((body, crc32)) if crc32fast::hash(body) == crc32 => Ok([body, b"}"].concat()),
@@ -218,7 +218,7 @@ fn without_seal(text: &[u8], is_older: bool) -> std::result::Result<Vec<u8>, Str
     }
 }
 
-/// The part of a line that its checksum is of, and the checksum.
+/// The part of a line that its checksum covers, and the checksum.
 fn split_seal(text: &[u8]) -> Option<(&[u8], u32)> {
     let (body, crc32) = std::str::from_utf8(text)
         .ok()?
@@ -259,7 +259,7 @@ mod tests {
         }
     }
 
-    /// The lines of a text that are whole.
+    /// The intact lines of a text.
     fn whole(text: &str, is_older: bool) -> Vec<JournalLine> {
         text.lines()
             .filter_map(|line| JournalLine::parse(line.as_bytes(), is_older).ok())

@@ -1,4 +1,4 @@
-//! Files that pictures are made from: the bytes that each had when it was first looked at.
+//! Files that pictures are made from: the bytes that each had when it was first read.
 
 use crate::asset;
 use crate::error::{Error, Result};
@@ -8,17 +8,17 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// CRC-32 of files by their paths: as a dataset's plan tells them, or as pictures were first made.
+/// CRC-32 of files by their paths: as recorded in a dataset's plan, or as pictures were first made.
 #[derive(Debug, Default)]
 pub(crate) struct KnownFiles {
     checksums: Mutex<BTreeMap<PathBuf, u32>>,
 }
 
 impl KnownFiles {
-    /// Reads a picture and makes something of it. A file that nothing can be made of is not known
-    /// from then on: it may be repaired.
+    /// Reads a picture and makes something of it. A file that `make` fails on is not recorded: it
+    /// may be repaired.
     ///
-    /// # Errors
+    /// As [`io::read`], and those of `make`; a file whose bytes differ from those recorded.
     /// As [`io::read`], and those of `make`; other bytes than the file is known by.
     pub(crate) fn read<P: FromFile, T>(
         &self,
@@ -35,15 +35,14 @@ impl KnownFiles {
         Ok(made)
     }
 
-    /// Fails where a file is known by another checksum than this one, by which it is known from now
-    /// on.
+    /// Fails if a file is known by another checksum; records this one if it is not known yet.
     pub(crate) fn check(&self, path: &Path, crc32: u32) -> Result<()> {
         let known = *self.lock().entry(path.to_owned()).or_insert(crc32);
         let compared = asset::check_unchanged(crc32, known);
         compared.map_err(|what| Error::file(path, what))
     }
 
-    /// Fails where a file is known by another checksum than this one.
+    /// Fails if a file is known by another checksum.
     fn compare(&self, path: &Path, crc32: u32) -> std::result::Result<(), String> {
         let known = self.lock().get(path).copied();
         asset::check_unchanged(crc32, known.unwrap_or(crc32))

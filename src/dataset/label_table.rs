@@ -1,10 +1,10 @@
-//! The table `[labels]` as files have it: one rule, of which each variant has a key of its own.
+//! The table `[labels]` in files: one rule, of which each variant has a key of its own.
 
 use crate::dataset::{Coco, Format, LabelConfig, Layers, Mot, Obstructed, Voc, WebDataset, Yolo};
 use crate::label::{AmodalBox, LabelOptions, OutlineKind, RuleInFile};
 use serde::{Deserialize, Serialize};
 
-/// A [`LabelConfig`] by the keys of a file.
+/// A [`LabelConfig`] with the keys of a file.
 #[derive(Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct LabelTable {
@@ -30,7 +30,7 @@ pub(super) struct LabelTable {
     layers: Layers,
 }
 
-/// What is as it would be without a word of it is not written: datasets made before are the same.
+/// Values that are the default are not written: datasets made before stay the same.
 fn has_no_settings(mot: &Mot) -> bool {
     *mot == Mot::default()
 }

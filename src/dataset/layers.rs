@@ -13,8 +13,8 @@ use crate::render::Cryptomatte;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Writes `layers/{train,val}/NNNNNN.exr`: the scene-linear picture and what it was put together
-/// from, as 32-bit floats.
+/// Writes `layers/{train,val}/NNNNNN.exr`: the scene-linear picture and what it was composed from,
+/// as 32-bit floats.
 ///
 /// | channels | meaning |
 /// | --- | --- |
@@ -26,17 +26,17 @@ use std::path::{Path, PathBuf};
 /// | `object003.Z`, `amodal003.A` | its depth, and its coverage as if alone (`cards`) |
 ///
 /// Objects are called `object003_CLASS` in the Cryptomatte's list, distractors
-/// `object003_distractor`; what is too faint for a label is among them. Without film,
-/// `RGB = sum of object RGB + background * shadow * (1 - sum of object A)`: all but the picture is
-/// of the sharp objects at rest, before Poisson blending, blur, depth of field, a belt's exposure
-/// and finish; with those the sum does not give the picture.
+/// `object003_distractor`; what is too faint for a label is among them. Without film, `RGB = sum of
+/// object RGB + background * shadow * (1 - sum of object A)`: all but the picture is of the sharp
+/// objects at rest, before Poisson blending, blur, depth of field, a belt's exposure and finish;
+/// with those the sum does not give the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Layers {
-    /// Also the layers of each object. Default: no.
+    /// Also write the layers of each object. Default: no.
     pub cards: bool,
-    /// An object is seen in a pixel of which it covers more than this share; in a recipe, that of
-    /// `labels`. Default: 0.1.
+    /// An object is visible in a pixel of which it covers more than this share; in a recipe, that
+    /// of `labels`. Default: 0.1.
     #[serde(skip_deserializing, skip_serializing_if = "is_default")]
     pub alpha_threshold: f32,
 }
@@ -50,7 +50,7 @@ impl Default for Layers {
     }
 }
 
-/// A setting that need not be told.
+/// A setting that need not be recorded.
 fn is_default(alpha_threshold: &f32) -> bool {
     *alpha_threshold == LabelOptions::default().alpha_threshold
 }
@@ -97,7 +97,7 @@ fn name(id: ObjectId, class: Option<u32>, entry: &Entry<'_>) -> String {
     format!("object{:03}_{what}", id.0)
 }
 
-/// What the file says of where it comes from.
+/// Provenance recorded in the file.
 fn provenance(entry: &Entry<'_>) -> [(String, String); 3] {
     [
         ("petcomp:recipe".into(), entry.recipe_hash.into()),
@@ -106,7 +106,7 @@ fn provenance(entry: &Entry<'_>) -> [(String, String); 3] {
     ]
 }
 
-/// Fails for a sample without deep samples: its layers cannot be told apart.
+/// Fails for a sample without deep samples: its layers cannot be separated.
 fn check_deep(sample: &Sample) -> Result<()> {
     let (w, h) = sample.frame.size();
     let (deep_w, deep_h) = (sample.deep.width(), sample.deep.height());
@@ -117,7 +117,7 @@ fn check_deep(sample: &Sample) -> Result<()> {
     Err(Error::value("deep", what))
 }
 
-/// The name of a channel and how a pixel gives its value.
+/// The name of a channel and how its value is computed from a pixel.
 type Channel<P> = (&'static str, fn(&P) -> f32);
 
 /// The picture, its depth and its shadows.
@@ -157,7 +157,7 @@ fn cryptomatte(entry: &Entry<'_>) -> Cryptomatte {
     Cryptomatte::new(&entry.sample.deep, "CryptoObject", &object_names(entry))
 }
 
-/// Names of all that the picture shows, whether or not it has a label.
+/// Names of everything that the picture shows, whether or not it has a label.
 fn object_names(entry: &Entry<'_>) -> Vec<(ObjectId, String)> {
     let labels = &entry.sample.labels;
     let objects = labels.objects.iter().map(|o| (o.id, Some(o.class)));
@@ -168,7 +168,7 @@ fn object_names(entry: &Entry<'_>) -> Vec<(ObjectId, String)> {
         .collect()
 }
 
-/// Depth of the first sample of a pixel of which enough is seen to belong to a mask.
+/// Depth of a pixel's first sample that is visible enough to belong to a mask.
 fn nearest(samples: &[DeepSample], threshold: f32) -> f32 {
     samples
         .iter()
@@ -181,7 +181,7 @@ struct ObjectChannel {
     layer: &'static str,
     name: &'static str,
     value: fn(&DeepSample) -> f32,
-    /// Where the object is not.
+    /// Value where the object is absent.
     none: f32,
 }
 

@@ -1,4 +1,4 @@
-//! The images that a folder holds or a list names, and what lies beside one.
+//! The images that a folder holds or a list names, and the files next to an image.
 
 use crate::dataset::SampleRecord;
 use crate::dataset::paths::folder_of;
@@ -7,10 +7,10 @@ use crate::eval::is_image;
 use crate::io;
 use std::path::{Component, Path, PathBuf};
 
-/// Where a folder or list of a part is, for a `data.yaml` with this root.
+/// Path of a folder or list of a part, for a `data.yaml` with this root.
 ///
-/// Roboflow's is `../train/images` beside the folder `train`: where that is not there, Ultralytics
-/// passes over the first `../`, and so do we.
+/// Roboflow's is `../train/images` although `train` is next to the file: if the path does not
+/// exist, Ultralytics ignores the first `../`, and so do we.
 pub(crate) fn place_of(root: &Path, part: &str) -> PathBuf {
     let place = without_dots(&root.join(part));
     match part.strip_prefix("../") {
@@ -45,7 +45,8 @@ pub(crate) fn whole_path(path: &Path) -> Result<PathBuf> {
     Ok(without_dots(&io::absolute(path)?))
 }
 
-/// The same path without `.`, and without `..` but for those that lead out of where it begins.
+/// The same path without `.`, and without `..` except for those that lead out of its starting
+/// point.
 fn without_dots(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for step in path.components() {
@@ -61,12 +62,12 @@ fn without_dots(path: &Path) -> PathBuf {
 /// What is known of an image: its sidecar.
 ///
 /// # Errors
-/// When there is none beside it.
+/// If there is none next to it.
 pub(crate) fn record_of(image: &Path) -> Result<SampleRecord> {
     io::read_json(sidecar_of(image))
 }
 
-/// Where the sidecar of an image is, if it has one.
+/// Path of an image's sidecar, if it has one.
 pub(crate) fn sidecar_of(image: &Path) -> PathBuf {
     io::with_last_step(image, "images", "scenes").with_extension("json")
 }

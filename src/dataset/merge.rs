@@ -1,4 +1,4 @@
-//! Joins the shards of a dataset: the folder that a single run would have made.
+//! Joins the shards of a dataset into the folder that a single run would have made.
 
 use crate::dataset::folder::{self, JOURNAL, field};
 use crate::dataset::journal::numbered_lines;
@@ -18,16 +18,16 @@ use std::sync::atomic::AtomicBool;
 /// Copies the samples of shards into one folder, checks each file against its checksum, and joins
 /// the files of many samples.
 ///
-/// The folder is then, byte for byte, what one run without shards makes. Nothing is taken from the
-/// shards. A merge that was interrupted goes on when it is called again.
+/// The folder is then, byte for byte, what one run without shards makes. The shards are not
+/// changed. To resume an interrupted merge, call it again.
 ///
-/// A shard is a folder that anybody may have made: what its journal names is looked for in the
-/// shard alone, and only regular files are read.
+/// A shard may come from anyone: the files in its journal are looked for only in the shard itself,
+/// and only regular files are read.
 ///
 /// # Errors
-/// Folders that are no shards, or not all of one dataset: another recipe, seed or program (the
+/// Folders that are not shards, or not all of one dataset: another recipe, seed or program (the
 /// message names the field), a shard that is missing or given twice, a sample that is missing or
-/// not the shard's; a line of a journal or a file that is not as it was written. As
+/// not the shard's; a line of a journal or a file that has changed since it was written. As
 /// [`generate`](crate::dataset::generate) for the folder that is written.
 pub fn merge(
     shards: &[PathBuf],
@@ -58,7 +58,7 @@ fn copy_sample(
     Ok((line.clone(), Times::default()))
 }
 
-/// The lines of a shard's journal, all of them as they were written.
+/// The lines of a shard's journal, all of which must be intact.
 fn lines_in(folder: &Path, shard: Shard, count: u64) -> Result<Vec<JournalLine>> {
     let mut lines = Vec::new();
     for (i, line) in numbered_lines(folder)? {
@@ -72,7 +72,7 @@ fn lines_in(folder: &Path, shard: Shard, count: u64) -> Result<Vec<JournalLine>>
     Ok(lines)
 }
 
-/// The line, if its sample is one of the shard.
+/// The line, if its sample belongs to the shard.
 fn own_line(
     line: JournalLine,
     shard: Shard,
@@ -88,7 +88,7 @@ fn own_line(
     }
 }
 
-/// What all shards say of themselves.
+/// What all shards have in common.
 struct ShardedDataset {
     /// What the dataset was made from, without the shard.
     document: Value,
@@ -138,7 +138,7 @@ impl ShardedDataset {
     }
 }
 
-/// Fails where a shard is there twice or not at all.
+/// Fails if a shard is given twice or missing.
 fn check_complete(folders: &[PathBuf], shares: &[Shard], of: u64) -> Result<()> {
     let mut places = BTreeMap::new();
     for (i, shard) in shares.iter().enumerate() {
@@ -156,7 +156,7 @@ fn check_complete(folders: &[PathBuf], shares: &[Shard], of: u64) -> Result<()> 
     }
 }
 
-/// Fails on the first field in which a shard's dataset is not the first shard's.
+/// Fails on the first field in which a shard's dataset differs from the first shard's.
 fn check_same_dataset(
     (first, of, count): (&Value, u64, u64),
     (document, share): (&Value, &ShardShare),
@@ -169,7 +169,7 @@ fn check_same_dataset(
     })
 }
 
-/// What the folder of a shard says of its share.
+/// What the folder of a shard records about its share.
 #[derive(Deserialize)]
 struct ShardShare {
     #[serde(flatten)]
@@ -178,7 +178,7 @@ struct ShardShare {
 }
 
 impl ShardShare {
-    /// Fails where there can be no such share.
+    /// Fails if the share is impossible.
     fn from_value(value: Value) -> Result<Self> {
         let share: Self = serde_json::from_value(value).map_err(|e| Error::value("shard", e))?;
         Shard::new(share.shard.index, share.shard.of)?;
@@ -198,7 +198,7 @@ fn open_shard(path: &Path) -> Result<(Value, ShardShare)> {
     Ok((document, share))
 }
 
-/// The plan that a dataset was made with, but for where its samples come from.
+/// The plan that a dataset was made with, except for where its samples come from.
 fn merged_plan(document: &Value, count: u64, folder: &Path) -> Result<Plan> {
     let classes = field(document, "classes")?;
     Ok(Plan {
@@ -228,7 +228,7 @@ fn pictures_of(settings: &[Map<String, Value>]) -> Result<Pictures> {
         .unwrap_or_default())
 }
 
-/// The writer of a name and settings, as [`Writer::settings`] told them.
+/// The writer with a name and settings, as returned by [`Writer::settings`].
 fn writer_of(name: &str, settings: Value, pictures: &Pictures) -> Result<Arc<dyn Writer>> {
     match name {
         "pictures" => Ok(Arc::new(pictures.clone())),
@@ -245,7 +245,7 @@ fn label_writer(
 ) -> std::result::Result<Arc<dyn Writer>, String> {
     let mut config = json!({ "formats": [format] });
     if let Some(map) = settings.as_object_mut().filter(|map| !map.is_empty()) {
-        // Settings of all layouts, told by each that goes by them.
+        // Settings of all layouts, recorded by each that follows them.
         for key in ["simplify", "alpha_threshold"] {
             if let Some(value) = map.remove(key) {
                 config[key] = value;
@@ -258,7 +258,7 @@ fn label_writer(
     writers.next().ok_or_else(|| "no such layout".into())
 }
 
-/// Copies a file, if it is as it was written.
+/// Copies a file if it has not changed since it was written.
 fn copy(shard: &Path, folder: &Path, file: &WrittenFile) -> Result<()> {
     let from = io::inside(shard, &file.path)?;
     let to = io::below(folder, &file.path)?;

@@ -1,12 +1,11 @@
 //! Dataset: images and labels in the layouts that trainers read.
 //!
-//! A [`Pipeline`] opens what a recipe file ([`DatasetConfig`]) names and makes sample `k` of it:
-//! draws the scene, lets it settle, lights, renders and labels it.
+//! A [`Pipeline`] opens what a recipe file ([`DatasetConfig`]) names and generates sample `k` from
+//! it: draws the scene, lets it settle, lights, renders and labels it.
 //!
-//! [`generate`] makes samples, many at a time, and hands each to [`Writer`]s: [`Pictures`] writes
-//! the images, [`Sidecar`] everything that was drawn, [`Yolo`], [`Coco`], [`Voc`], [`Mot`],
-//! [`WebDataset`] and [`Layers`] the labels. Sample `k` has the same files, to the byte, whatever the number of
-//! threads, and after any interruption:
+//! [`generate`] generates samples, many at a time, and hands each to [`Writer`]s: [`Pictures`] writes the images,
+//! [`Sidecar`] everything that was drawn, [`Yolo`], [`Coco`], [`Voc`], [`Mot`], [`WebDataset`] and [`Layers`] the
+//! labels. Sample `k` has the same files, to the byte, whatever the number of threads, and after any interruption:
 //!
 //! ```text
 //! data.yaml                      what trainers are given
@@ -157,22 +156,22 @@ use std::path::{Path, PathBuf};
 pub struct Sample {
     /// The picture, scene-linear.
     pub frame: Image<PremulRgba>,
-    /// What it was put together from; without pixels where nobody is to write it.
+    /// What it was composed from; without pixels if nobody is to write it.
     pub deep: DeepImage,
     /// What is where in it.
     pub labels: Labels,
-    /// The scene behind it; none for a picture that was made in another way.
+    /// The scene behind it; none for a picture that was made some other way.
     pub provenance: Option<Provenance>,
-    /// How long it took; in no file of the dataset.
+    /// How long it took; not written to the dataset's files.
     pub times: Times,
 }
 
-/// Where a picture comes from: the scene as it was drawn, and what became of it.
+/// Where a picture comes from: the scene as it was drawn, and what it became.
 #[derive(Clone, Debug)]
 pub struct Provenance {
     /// What was drawn: objects not settled yet, exposure still open.
     pub drawn: Scene,
-    /// What that became, with nothing left open.
+    /// The same scene with nothing left open.
     pub scene: Scene,
     /// Seed that the scene was drawn with: the dataset's own, unless scenes were rejected.
     pub scene_seed: u64,
@@ -183,7 +182,7 @@ pub struct Provenance {
 }
 
 impl Provenance {
-    /// Of a scene in which nothing was left to chance.
+    /// The provenance of a scene without any random draws.
     pub fn from_scene(scene: Scene) -> Self {
         Self {
             drawn: scene.clone(),
@@ -198,8 +197,7 @@ impl Provenance {
 impl Sample {
     /// A picture from anywhere with its labels: all that most layouts need.
     ///
-    /// [`Layers`] needs `deep` as well, [`Sidecar`] writes a file only where there is a
-    /// `provenance`.
+    /// [`Layers`] also needs `deep`; [`Sidecar`] writes a file only if there is a `provenance`.
     pub fn new(frame: Image<PremulRgba>, labels: Labels) -> Self {
         Self {
             frame,
@@ -210,7 +208,7 @@ impl Sample {
         }
     }
 
-    /// Scenes that were rejected before this one.
+    /// Number of scenes that were rejected before this one.
     pub(crate) fn rejected_scenes(&self) -> usize {
         self.provenance
             .as_ref()
@@ -261,7 +259,7 @@ impl Entry<'_> {
     }
 }
 
-/// A sample whose files are all there: what a [`Writer`] joins.
+/// A sample whose files are all present: what a [`Writer`] joins.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
     /// Its number.
@@ -273,11 +271,11 @@ pub struct Written {
 }
 
 impl Written {
-    /// The sample's file in a folder of the dataset: the first of `coco` is the one that COCO
+    /// The sample's file in a folder of the dataset: the first in `coco` is the one that COCO
     /// joins.
     ///
     /// # Errors
-    /// When there is none.
+    /// If there is none.
     pub fn file(&self, kind: &str) -> std::io::Result<&Path> {
         let found = self.files.iter().find(|file| file.starts_with(kind));
         found.map(PathBuf::as_path).ok_or_else(|| {
@@ -288,19 +286,19 @@ impl Written {
 
 /// A layout that a dataset is written in.
 ///
-/// A layout with one file for many samples writes a file of its own for each sample first, and
-/// joins those when all are there: so every file of a sample can be made again alone, on any
-/// machine, and no run has to remember another.
+/// A layout with one file for many samples first writes a separate file for each sample, and joins
+/// those when all are present: so each sample's files can be regenerated alone, on any machine, and
+/// no run has to remember another.
 pub trait Writer: Send + Sync {
     /// Its name and settings: written into `dataset.json`, and compared before a dataset is
     /// continued.
     fn settings(&self) -> serde_json::Value;
 
-    /// Writes what belongs to no one sample: folders, lists of classes. Called once in each run,
+    /// Writes what belongs to no single sample: folders, lists of classes. Called once in each run,
     /// before any sample.
     ///
     /// # Errors
-    /// When a file cannot be written.
+    /// If a file cannot be written.
     fn begin(&self, folder: &Path, classes: &[String]) -> Result<()>;
 
     /// Writes the files of one sample and returns their paths below the folder.
@@ -308,10 +306,10 @@ pub trait Writer: Send + Sync {
     /// The bytes depend on nothing but the entry.
     ///
     /// # Errors
-    /// When a file cannot be written, or the sample is one that the layout cannot hold.
+    /// If a file cannot be written, or the layout cannot hold the sample.
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>>;
 
-    /// How much of an object its labels tell; none, as by default, where it writes no labels.
+    /// How much of an object its labels cover; none, the default, if it writes no labels.
     fn extent(&self) -> Option<Extent> {
         None
     }
@@ -322,31 +320,31 @@ pub trait Writer: Send + Sync {
         self.extent().is_some_and(|extent| extent.has_box(object))
     }
 
-    /// The files that trainers are given, below the dataset's folder: those that name all others.
-    /// By default none.
+    /// The files to give to trainers, below the dataset's folder: those that name all others.
+    /// Default: none.
     fn for_trainers(&self) -> Vec<PathBuf> {
         Vec::new()
     }
 
-    /// Takes away the files that [`finish`](Self::finish) writes: samples are added that those do
-    /// not tell of. By default there are none.
+    /// Deletes the files that [`finish`](Self::finish) writes, since they do not include the
+    /// samples that are about to be added. By default there are none.
     ///
     /// # Errors
-    /// When a file cannot be taken away.
+    /// If a file cannot be deleted.
     fn reopen(&self, folder: &Path) -> Result<()> {
         let _ = folder;
         Ok(())
     }
 
-    /// Writes the files that hold many samples, from `samples`' own files, which are in order of
-    /// number and all there; takes away what an earlier call left and this one has no use for.
-    /// By default there are no such files.
+    /// Writes the files that hold many samples, from the files of `samples`, which are in order of
+    /// number and all present; deletes what an earlier call left and is no longer needed. By
+    /// default there are no such files.
     ///
     /// Called when a dataset is complete: at the end of a run, and after shards were joined. The
     /// bytes depend on nothing but the samples' files, the classes and the settings.
     ///
     /// # Errors
-    /// When a file cannot be read or written.
+    /// If a file cannot be read or written.
     fn finish(&self, folder: &Path, classes: &[String], samples: &[Written]) -> Result<()> {
         let _ = (folder, classes, samples);
         Ok(())

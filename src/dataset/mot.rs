@@ -1,4 +1,4 @@
-//! Labels as the MOTChallenge has them: a folder for each sequence of pictures.
+//! Labels in MOTChallenge format: a folder for each sequence of pictures.
 
 use crate::dataset::paths::{create_part_folders, remove_file, remove_files};
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
@@ -13,17 +13,17 @@ use std::path::{Path, PathBuf};
 
 /// Writes `mot/{train,val}/SSSSSS/`, a folder for each sequence of a belt: `gt/gt.txt`,
 /// `seqinfo.ini`, and the pictures as `img1/NNNNNN.png` (links to those in `images/`, which take no
-/// room, where the disk has links); joined from `mot_frames/{train,val}/NNNNNN.json`.
+/// space, if the disk supports links); joined from `mot_frames/{train,val}/NNNNNN.json`.
 ///
-/// A line of `gt.txt` is an object in a picture: picture, object, left, top, width, height, 1 (0 for
-/// what is to be ignored), class, visible share. Pictures, objects, pixels and classes are counted
-/// from 1; an object keeps its number through the sequence.
+/// A line of `gt.txt` is an object in a picture: picture, object, left, top, width, height, 1 (0 for objects to be
+/// ignored), class, visible share. Pictures, objects, pixels and classes are counted from 1; an object keeps its number
+/// throughout the sequence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mot {
-    /// Whether boxes are those of the whole object or of what is seen. Default: `amodal`.
+    /// Whether boxes are those of the whole object or of its visible part. Default: `amodal`.
     pub boxes: Extent,
-    /// Format of the pictures that it names; in a recipe, that of `pictures`.
+    /// Format of the pictures that it refers to; in a recipe, that of `pictures`.
     #[serde(skip)]
     pub pictures: PictureFormat,
 }
@@ -31,10 +31,11 @@ pub struct Mot {
 /// Its folder.
 const KIND: &str = "mot";
 
-/// Folder of the shares that are joined: where sequences are, readers take every name for one.
+/// Folder of the shares that are joined; not among the sequences, since readers treat every name
+/// there as one.
 const SHARES_FOLDER: &str = "mot_frames";
 
-/// What readers know a sequence by, in its folder: its tracks and its description.
+/// The files in a sequence's folder by which readers recognise it: its tracks and its description.
 const TRACKS: &str = "gt/gt.txt";
 const INFO: &str = "seqinfo.ini";
 
@@ -162,7 +163,8 @@ impl Mot {
     }
 }
 
-/// Takes the tracks of a part's sequences away; their pictures stay, and what others put there.
+/// Deletes the tracks of a part's sequences; their pictures stay, and so do files that others put
+/// there.
 fn remove_tracks(folder: &Path) -> Result<()> {
     let entries = io::entries(folder)?;
     let mut sequences = entries.iter().filter(|entry| {
@@ -176,7 +178,7 @@ fn is_number(name: &OsStr) -> bool {
     name.as_encoded_bytes().iter().all(u8::is_ascii_digit)
 }
 
-/// A second name of a file; a copy of it where there are no links.
+/// A second name for a file; a copy of it if there are no links.
 fn link(file: &Path, name: &Path) -> Result<()> {
     remove_file(name)?;
     let linked = std::fs::hard_link(file, name);

@@ -14,29 +14,29 @@ use std::path::{Path, PathBuf};
 /// Two images that are nearly the same.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NearDuplicate {
-    /// The one for validation.
+    /// The validation image.
     pub val: PathBuf,
-    /// The one for training that it is nearest to.
+    /// The training image that it is nearest to.
     pub train: PathBuf,
     /// Root mean square difference of their small copies, 8-bit grey values.
     pub codes: f64,
 }
 
-/// Images that differ by less than this, in 8-bit grey values, are nearly the same: photos of a
-/// scene that nobody touched differ by noise, which the small copies average to below one code; an
-/// object of 1 % of the picture and a tenth of the full scale of contrast, moved, changes it by 3.
-/// Fainter ones do not, so images whose label files say that they show other things are not the
-/// same, unless they differ by less than saving one again costs.
+/// Images that differ by less than this, in 8-bit grey values, are near-duplicates: photos of an
+/// untouched scene differ by noise, which the small copies average to below one code; an object of
+/// 1 % of the picture and a tenth of full-scale contrast, moved, changes it by 3. Fainter ones do
+/// not, so images whose label files show different contents are not duplicates, unless they differ
+/// by less than saving one again costs.
 pub const NEAR_DUPLICATE_RMS: f64 = 2.0;
 
 /// Saving a picture again costs less than this, in 8-bit grey values: images nearer than that are
-/// one, whatever two people have labelled in it.
+/// the same one, however two people have labelled it.
 const SAVED_AGAIN_RMS: f64 = 0.3;
 
-/// Nor does it change any pixel of a thumbnail by more than this; a small object does.
+/// Nor does saving change any pixel of a thumbnail by more than this; a small object does.
 const SAVED_AGAIN_MOST: u8 = 3;
 
-/// Boxes around the same thing, drawn twice, share more than this of their union.
+/// Two boxes around the same thing have more than this IoU.
 const MIN_OVERLAP: f64 = 0.5;
 
 /// Sides of the small copies, pixels.
@@ -83,7 +83,7 @@ impl Thumbnail {
 #[derive(Clone, Debug)]
 pub(crate) struct Look {
     pub(crate) thumbnail: Thumbnail,
-    /// As [`boxes_in`] has them; none also without a label file.
+    /// As returned by [`boxes_in`]; none also without a label file.
     pub(crate) boxes: Option<Vec<GroundTruth>>,
 }
 
@@ -96,13 +96,13 @@ impl Look {
         })
     }
 
-    /// It has a label file without rows.
+    /// Whether it has a label file without rows.
     fn is_empty(&self) -> bool {
         self.boxes.as_ref().is_some_and(Vec::is_empty)
     }
 
-    /// The place of the nearest in a list of those that may show the same, the first of those as
-    /// near, and how far it is.
+    /// Index of the nearest image in a list among those that may show the same, the first in case
+    /// of a tie, and its distance.
     fn nearest_within(&self, all: &[Self], codes: f64) -> Option<(usize, f64)> {
         let mut limit = self.thumbnail.squared_error_limit(codes);
         let mut nearest = None;
@@ -117,8 +117,8 @@ impl Look {
         Some((place, distance)).filter(|_| distance < codes)
     }
 
-    /// Whether another whose small copy has this squared error may show the same. Empty scenes of a
-    /// place look the same and are not.
+    /// Whether another image whose small copy has this squared error may show the same. Empty
+    /// scenes of a place look the same but are not duplicates.
     fn may_show_the_same(&self, other: &Self, squared_error: u64) -> bool {
         let is_copy = squared_error < self.thumbnail.squared_error_limit(SAVED_AGAIN_RMS)
             && self.thumbnail.greatest_error(&other.thumbnail) <= SAVED_AGAIN_MOST;
@@ -138,19 +138,19 @@ impl Look {
     }
 }
 
-/// The boxes in the text of a label file, shares of the image; none where a row is bad.
+/// The boxes in the text of a label file, shares of the image; none if a row is bad.
 pub(crate) fn boxes_in(text: &str) -> Option<Vec<GroundTruth>> {
     let sheet = yolo_sheet(text, "", [1, 1]).ok()?;
     Some(sheet.truth)
 }
 
-/// Whether each box lies over one of the other image, and none of those is left.
+/// Whether each box matches one of the other image, and none of those is left.
 fn are_alike(own: &[GroundTruth], others: &[GroundTruth]) -> bool {
     let mut left = others.to_vec();
     own.len() == others.len() && own.iter().all(|b| take_partner(b, &mut left))
 }
 
-/// Takes out the box of the same class that lies best over one, and says whether there is any.
+/// Removes the box of the same class with the greatest overlap, and returns whether there is one.
 fn take_partner(own: &GroundTruth, left: &mut Vec<GroundTruth>) -> bool {
     let overlaps = left.iter().map(|other| match other.class == own.class {
         true => iou(&own.bbox, &other.bbox),
@@ -161,7 +161,7 @@ fn take_partner(own: &GroundTruth, left: &mut Vec<GroundTruth>) -> bool {
     partner.map(|(i, _)| left.swap_remove(i)).is_some()
 }
 
-/// For each of `val` the nearest of `train` that may show the same, as places in the lists, where
+/// For each of `val` the nearest of `train` that may show the same, as indices into the lists, if
 /// it is nearer than `codes`.
 pub(crate) fn nearest(train: &[Look], val: &[Look], codes: f64) -> Vec<(usize, usize, f64)> {
     val.par_iter()
@@ -173,7 +173,7 @@ pub(crate) fn nearest(train: &[Look], val: &[Look], codes: f64) -> Vec<(usize, u
         .collect()
 }
 
-/// The images of `val` that are nearly the same as one of `train`.
+/// The images of `val` that are near-duplicates of one of `train`.
 pub(crate) fn near_pairs(
     train: &[PathBuf],
     val: &[PathBuf],

@@ -14,20 +14,20 @@ pub(crate) const OBSTRUCTED: &str = "obstructed";
 /// What happens to the labels of obstructed objects, those that are not
 /// [topmost](ObjectLabel::is_topmost).
 ///
-/// Objects that are [too truncated](ObjectLabel::is_too_truncated) have no label, obstructed or not;
-/// under `ignore` they are labelled as to be ignored.
+/// Objects that are [too truncated](ObjectLabel::is_too_truncated) have no label, obstructed or not; under `ignore`
+/// they are labelled as objects to be ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Obstructed {
-    /// They get none: a detector of what can be picked, as in the paper. A trainer takes them for
-    /// background.
+    /// They get none, for a detector of what can be picked, as in the paper. A trainer treats them
+    /// as background.
     #[default]
     Drop,
     /// They are labelled like the others.
     Keep,
-    /// They are labelled as to be ignored where a format can say so (COCO `iscrowd`, Pascal VOC
-    /// `difficult`): finding them is neither right nor wrong. YOLO cannot; there they get no
-    /// label.
+    /// They are labelled as objects to be ignored in formats that support it (COCO `iscrowd`,
+    /// Pascal VOC `difficult`): detecting them is neither right nor wrong. YOLO does not; there
+    /// they get no label.
     Ignore,
     /// They are labelled as a class of their own, the last: `obstructed`.
     Class,
@@ -40,15 +40,15 @@ pub struct LabelledObject<'a> {
     pub object: &'a ObjectLabel,
     /// Class that it is labelled as.
     pub class: u32,
-    /// Finding it is neither right nor wrong.
+    /// Whether detecting it is neither right nor wrong.
     pub ignored: bool,
 }
 
 impl Obstructed {
-    /// The classes of the labels, from those of the objects.
+    /// The classes of the labels, given those of the objects.
     ///
     /// # Errors
-    /// A class of the objects that is called as the one that would be added.
+    /// A class of the objects that has the name of the class that would be added.
     pub fn classes(self, classes: &[String]) -> Result<Vec<String>> {
         let mut classes = classes.to_vec();
         if self == Self::Class {
@@ -58,8 +58,8 @@ impl Obstructed {
         Ok(classes)
     }
 
-    /// The objects that get a label, `class_count` classes of labels being there: none that has no
-    /// box in any of `extents`.
+    /// The objects that get a label, given `class_count` classes of labels: none without a box in
+    /// any of `extents`.
     pub fn labelled<'a>(
         self,
         labels: &'a Labels,
@@ -99,7 +99,7 @@ impl Obstructed {
     }
 }
 
-/// How a dataset labels its objects: for readers of its records, where objects have their own
+/// How a dataset labels its objects: for readers of its records, in which objects have their own
 /// classes and every box.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Labelling {
@@ -108,7 +108,7 @@ pub(crate) struct Labelling {
     extent: Extent,
 }
 
-/// Every object as its record has it.
+/// Labels every object as its record has it.
 impl Default for Labelling {
     fn default() -> Self {
         Self {
@@ -120,7 +120,7 @@ impl Default for Labelling {
 }
 
 impl Labelling {
-    /// As the identity of a dataset says.
+    /// As recorded in the identity of a dataset.
     pub(crate) fn of_identity(identity: &Value) -> Self {
         let obstructed = serde_json::from_value(identity["obstructed"].clone());
         Self {
@@ -130,8 +130,8 @@ impl Labelling {
         }
     }
 
-    /// Class and box that an object with a label is labelled with; none where it is to be ignored
-    /// or has no such box.
+    /// Class and box that an object is labelled with; none if it has no label, is to be ignored or
+    /// has no such box.
     pub(crate) fn label_of(self, object: &ObjectLabel) -> Option<(u32, BBox)> {
         let label = self.obstructed.label(object, self.class_count)?;
         let (bbox, _) = self.extent.of(object);
@@ -139,8 +139,8 @@ impl Labelling {
     }
 }
 
-/// What the boxes of a dataset are around, as `LabelConfig::extent` says of a recipe: those of YOLO,
-/// else of its first format with boxes.
+/// What the boxes of a dataset are around, as `LabelConfig::extent` for a recipe: those of YOLO, else of its first
+/// format with boxes.
 fn extent_of(identity: &Value) -> Extent {
     let writers = identity["writers"].as_array().into_iter().flatten();
     let formats = writers.filter_map(Value::as_object).flatten();
@@ -151,7 +151,7 @@ fn extent_of(identity: &Value) -> Extent {
         .unwrap_or_default()
 }
 
-/// Fails where the assets have a class of the name that is added.
+/// Fails if the assets have a class with the name that is added.
 fn check_is_free(classes: &[String]) -> Result<()> {
     if classes.iter().all(|name| name != OBSTRUCTED) {
         return Ok(());

@@ -14,14 +14,14 @@ use std::str::FromStr;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Partition {
     /// The first ones for training, the last for validation, as the paper does with series of
-    /// photos; so many between them for neither.
+    /// photos; a gap between them for neither.
     Consecutive {
-        /// Images that are left out.
+        /// Number of images in the gap.
         guard: usize,
     },
     /// Groups stay together.
     Grouped(Group),
-    /// Each for itself.
+    /// Each image for itself.
     Random,
 }
 
@@ -30,7 +30,7 @@ pub enum Partition {
 pub enum Group {
     /// The photo of the place.
     Background,
-    /// The choice of objects and their photos; a scene without objects is a group of its own.
+    /// The selection of objects and their photos; a scene without objects is a group of its own.
     Selection,
 }
 
@@ -46,7 +46,7 @@ impl Group {
         }
     }
 
-    /// What a scene has in common with the others of its group; none where nothing is chosen.
+    /// What a scene has in common with the others of its group; none if nothing was selected.
     fn key_of(self, scene: &Scene) -> Option<String> {
         match self {
             Self::Background => Some(scene.plate.clone()),
@@ -70,15 +70,15 @@ impl FromStr for Group {
 /// What training and validation have in common.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Leakage {
-    /// For each [`Group`] that is known of the images: groups of the images for validation, and
-    /// how many of them also occur in training.
+    /// For each [`Group`] that is known for the images: number of groups of the validation images,
+    /// and how many of them also occur in training.
     pub groups: Vec<(&'static str, [usize; 2])>,
-    /// Images for validation that look like one for training.
+    /// Validation images that look like a training image.
     pub near_duplicates: Vec<NearDuplicate>,
 }
 
 impl YoloSet {
-    /// Shares the images out anew, in natural order of name: `ratio` of them, rounded down, for
+    /// Splits the images anew, in natural order of name: the share `ratio`, rounded down, for
     /// training.
     ///
     /// # Errors
@@ -94,10 +94,10 @@ impl YoloSet {
         }))
     }
 
-    /// What leaks from training to validation; images are near when they differ by less than
-    /// `max_codes` (root mean square of 8-bit grey values of a small copy) and their label files,
-    /// where both have one, say the same or they differ by no more than a picture that was saved
-    /// again. Two images whose label files have no rows are never near.
+    /// What leaks from training to validation; images are near-duplicates if they differ by less
+    /// than `max_codes` (root mean square of 8-bit grey values of a small copy) and their label
+    /// files, if both have one, agree, or if they differ by no more than a picture that was saved
+    /// again. Two images whose label files have no rows are never near-duplicates.
     ///
     /// # Errors
     /// An image or a sidecar that cannot be read.
@@ -108,7 +108,7 @@ impl YoloSet {
         })
     }
 
-    /// None where an image has no sidecar.
+    /// Empty if an image has no sidecar.
     fn leaked_groups(&self) -> Result<Vec<(&'static str, [usize; 2])>> {
         let mut images = self.train.iter().chain(&self.val);
         if !images.all(|image| sidecar_of(image).exists()) {
@@ -120,7 +120,7 @@ impl YoloSet {
             .collect()
     }
 
-    /// Groups of the images for validation, and how many of them occur in training.
+    /// Number of groups of the validation images, and how many of them occur in training.
     fn shared_groups(&self, group: Group) -> Result<[usize; 2]> {
         let train = distinct_groups(&self.train, group)?;
         let val = distinct_groups(&self.val, group)?;
@@ -132,7 +132,7 @@ fn distinct_groups(images: &[PathBuf], group: Group) -> Result<BTreeSet<String>>
     Ok(keys(images, group)?.into_iter().flatten().collect())
 }
 
-/// The group of each image; one without a key is alone in a group named by its place.
+/// The group of each image; one without a key is alone in a group named by its index.
 fn groups(images: &[PathBuf], group: Group) -> Result<Vec<String>> {
     let keys = keys(images, group)?.into_iter().enumerate();
     Ok(keys
@@ -148,7 +148,7 @@ fn keys(images: &[PathBuf], group: Group) -> Result<Vec<Option<String>>> {
         .collect()
 }
 
-/// Groups in a random order go to validation until it has its share; the rest is for training.
+/// Groups in a random order go to validation until it has its share; the rest go to training.
 fn grouped(images: &[PathBuf], groups: &[String], train: usize, seed: u64) -> [Vec<PathBuf>; 2] {
     let val = groups_for_validation(groups, images.len() - train, seed);
     let mut parts = [Vec::new(), Vec::new()];
@@ -158,11 +158,11 @@ fn grouped(images: &[PathBuf], groups: &[String], train: usize, seed: u64) -> [V
     parts
 }
 
-/// Groups in a random order, until they have about so many images.
+/// Groups in a random order, until they have about this many images.
 fn groups_for_validation(groups: &[String], wanted: usize, seed: u64) -> BTreeSet<&str> {
     let (mut val, mut taken) = (BTreeSet::new(), 0);
     for (group, size) in shuffled_groups(groups, seed) {
-        // A group is taken when the share comes closer by it.
+        // A group is taken if that brings the count closer to the share.
         if taken < wanted && (taken + size).abs_diff(wanted) <= wanted - taken {
             taken += size;
             val.insert(group);
@@ -190,7 +190,7 @@ fn check_ratio(ratio: f64) -> Result<()> {
     Err(Error::value("ratio", what))
 }
 
-/// The photos of a scene's objects, in an order of their own; none without objects.
+/// The photos of a scene's objects, sorted; none without objects.
 fn selection_of(scene: &Scene) -> Option<String> {
     let photos = scene.objects.iter();
     let photos = photos.map(|object| format!("{}/{}", object.asset, object.photo));
@@ -199,7 +199,7 @@ fn selection_of(scene: &Scene) -> Option<String> {
     (!photos.is_empty()).then(|| photos.join(" "))
 }
 
-/// The first images, and those behind the ones that are left out.
+/// The first images, and those after the gap.
 fn consecutive(images: &[PathBuf], train: usize, guard: usize) -> [Vec<PathBuf>; 2] {
     let first_val = train.saturating_add(guard).min(images.len());
     [images[..train].to_vec(), images[first_val..].to_vec()]
@@ -224,7 +224,7 @@ mod tests {
         }
     }
 
-    /// So many images, four fifths of them for training.
+    /// This many images, four fifths of them for training.
     fn cut(n: usize, guard: usize) -> YoloSet {
         let how = Partition::Consecutive { guard };
         listing(n).partitioned(how, 0.8, 0).unwrap()

@@ -6,12 +6,12 @@ use crate::io;
 use std::io::ErrorKind;
 use std::path::Path;
 
-/// The folder that a file lies in; empty for a bare name.
+/// The folder of a file; empty for a bare name.
 pub(super) fn folder_of(file: &Path) -> &Path {
     file.parent().unwrap_or(Path::new(""))
 }
 
-/// A file or folder as a recipe in some folder names it.
+/// The path of a file or folder that a recipe in some folder names.
 pub(super) fn seen_from(folder: &Path, path: &Path) -> Result<String> {
     let seen = io::relative_on_disk(path, folder)?;
     io::path_text(&seen).map(str::to_owned)
@@ -24,7 +24,7 @@ pub(super) fn create_part_folders(folder: &Path, kind: &str) -> Result<()> {
         .try_for_each(|part| io::create_folder(folder.join(kind).join(part.name())))
 }
 
-/// Takes away those of the files below a folder that are there.
+/// Deletes those of the files below a folder that exist.
 pub(super) fn remove_files(
     folder: &Path,
     files: impl IntoIterator<Item = impl AsRef<Path>>,
@@ -33,7 +33,7 @@ pub(super) fn remove_files(
     files.try_for_each(|file| remove_file(&folder.join(file)))
 }
 
-/// Takes a file away if it is there.
+/// Deletes a file if it exists.
 pub(super) fn remove_file(file: &Path) -> Result<()> {
     match std::fs::remove_file(file) {
         Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::file(file, e)),

@@ -1,4 +1,4 @@
-//! What of the photos of places is in memory: the plates and masks that pictures showed last.
+//! Photos of places kept in memory: the plates and masks that pictures used last.
 
 use crate::dataset::known_files::KnownFiles;
 use crate::image::Image;
@@ -6,7 +6,7 @@ use crate::lru::{InMemory, LruCache};
 use crate::pixel::{Coverage, LinearRgb};
 use std::sync::Arc;
 
-/// Plates and masks of all places of a recipe, at each size that was asked for.
+/// Plates and masks of all places of a recipe, at each requested size.
 #[derive(Debug)]
 pub(crate) struct PhotoMemory {
     pub(crate) plates: LruCache<Arc<Image<LinearRgb>>>,
@@ -16,7 +16,8 @@ pub(crate) struct PhotoMemory {
 }
 
 impl PhotoMemory {
-    /// Room for so many bytes, as many plates as masks, beside what pictures in the making show.
+    /// Room for this many bytes, as many plates as masks, in addition to those in use by pictures
+    /// in progress.
     pub(crate) fn of_bytes(most_bytes: usize) -> Self {
         let [plate_px, mask_px] = [size_of::<LinearRgb>(), size_of::<Coverage>()];
         let pixels = most_bytes / (plate_px + mask_px);

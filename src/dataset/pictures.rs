@@ -13,8 +13,8 @@ use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Writes `images/{train,val}/NNNNNN.png` or `.jpg`, 8-bit sRGB, on black where nothing lies behind
-/// the objects, and on request the scene-linear picture beside it as `exr/{train,val}/NNNNNN.exr`.
+/// Writes `images/{train,val}/NNNNNN.png` or `.jpg`, 8-bit sRGB, on black where nothing is behind
+/// the objects, and on request also the scene-linear picture as `exr/{train,val}/NNNNNN.exr`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Pictures {
@@ -22,8 +22,8 @@ pub struct Pictures {
     pub format: PictureFormat,
     /// Quality of a `jpg`, 1 to 100, drawn for each picture. Default: 95.
     pub jpeg_quality: Range,
-    /// Samples of colour in a `jpg`, one of these drawn for each picture: `4:4:4`, `4:2:2`, and
-    /// `4:2:0`, as most cameras write. Default: none, which is `4:4:4`.
+    /// Chroma subsampling of a `jpg`, one of these drawn for each picture: `4:4:4`, `4:2:2`, or
+    /// `4:2:0`, which most cameras write. Default: none, which is `4:4:4`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub jpeg_chroma: Vec<Chroma>,
     /// Also write the scene-linear picture with its alpha. Default: no.
@@ -45,10 +45,10 @@ impl Default for Pictures {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PictureFormat {
-    /// Without loss.
+    /// Lossless.
     #[default]
     Png,
-    /// Smaller.
+    /// Smaller files.
     Jpg,
 }
 
@@ -75,11 +75,11 @@ impl Pictures {
         }
     }
 
-    /// Picture `k` of a dataset as its file is read: 8-bit sRGB, on black where nothing lies behind
-    /// the objects, with what a JPEG of its quality and chroma has lost.
+    /// Picture `k` of a dataset as read from its file: 8-bit sRGB, on black where nothing is behind
+    /// the objects, with the losses of a JPEG of its quality and chroma.
     ///
     /// # Errors
-    /// [`Error::Value`] for a picture that no JPEG holds, as one without pixels.
+    /// [`Error::Value`] for a picture that a JPEG cannot hold, such as one without pixels.
     pub fn shown(&self, frame: &Image<PremulRgba>, seed: u64, k: u64) -> Result<Image<Srgb8>> {
         let codes = color::to_srgb8(&frame.map(|p| p.color()));
         if self.format == PictureFormat::Png {
@@ -95,8 +95,8 @@ impl Pictures {
         })
     }
 
-    /// For a picture outside of a dataset: the middle quality, and the first of several choices of
-    /// colour.
+    /// For a picture outside a dataset: the middle of the quality range, and the first of the
+    /// chroma subsamplings.
     #[doc(hidden)]
     pub fn middle_options(&self) -> WriteOptions {
         WriteOptions {
@@ -106,14 +106,14 @@ impl Pictures {
         }
     }
 
-    /// That of a picture of a dataset.
+    /// The quality of a picture of a dataset.
     fn quality(&self, seed: u64, k: u64) -> u8 {
         let draws = Draws::new(seed, k);
         self.jpeg_quality
             .draw_count(&draws, "pictures.jpeg_quality") as u8
     }
 
-    /// That of a picture of a dataset.
+    /// The chroma subsampling of a picture of a dataset.
     fn chroma(&self, seed: u64, k: u64) -> Chroma {
         match self.jpeg_chroma.len() {
             0 => Chroma::default(),

@@ -39,36 +39,38 @@ pub struct Pipeline {
     catalog: Arc<[AssetVariant]>,
     surroundings: Arc<EnvironmentMaps>,
     falls: Arc<Falls>,
-    /// Turns true when no picture is to be finished any more.
+    /// Becomes true when no more pictures are to be finished.
     stop: &'static AtomicBool,
 }
 
-/// Nobody stops a pipeline by itself.
+/// By default a pipeline is never stopped.
 static NEVER: AtomicBool = AtomicBool::new(false);
 
-/// So many falls are remembered while a recipe is tuned.
+/// Number of falls that are remembered while a recipe is tuned.
 const REMEMBERED_FALLS: usize = 256;
 
-/// And so many of the sequences on a belt, several of which are made at a time.
+/// Number of falls that are remembered for sequences on a belt, several of which are made at a
+/// time.
 const REMEMBERED_SEQUENCES: usize = 64;
 
-/// Scenes that do not settle are resampled this often.
+/// How often a scene that does not settle is resampled.
 const MAX_RESAMPLES: usize = 8;
 
 impl Pipeline {
-    /// Opens the folders that a config names: from then on by absolute paths, so that the working
-    /// folder may change.
+    /// Opens the folders that a config names, by absolute paths, so that the working folder may
+    /// change afterwards.
     ///
     /// # Errors
-    /// A folder, manifest, label or cut-out that cannot be used; each names the file, the field and
-    /// what was expected.
+    /// A folder, manifest, label or cut-out that cannot be used; the message names the file, the
+    /// field and what was expected.
     pub fn open(config: DatasetConfig) -> Result<Self> {
         let config = config.with_absolute_paths()?;
         let library = Library::open(&config.assets)?;
         Self::with_library(config, library)
     }
 
-    /// The same with the assets in memory, which [`build`](crate::asset::build) returns.
+    /// As [`open`](Self::open), with the assets in memory, as returned by
+    /// [`build`](crate::asset::build).
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -79,9 +81,9 @@ impl Pipeline {
         Self::new(config, library.into(), places).with_sizes_checked_in(image)
     }
 
-    /// The same for pictures that may be smaller than the recipe's own of `whole` pixels: objects
-    /// need be large enough in those alone. Paths stay as the config has them, in messages too: the
-    /// working folder must not change.
+    /// As [`open`](Self::open), for pictures that may be smaller than the recipe's own of `whole`
+    /// pixels: only in those must objects be large enough. Paths, including those in messages, stay
+    /// as the config has them: the working folder must not change.
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -105,14 +107,15 @@ impl Pipeline {
         })
     }
 
-    /// The same with another config: what both name is not opened again, and objects that fall as
-    /// they fell before do not fall again. `whole` is as in [`open_reduced`](Self::open_reduced).
+    /// The same pipeline with another config: what both configs name is not opened again, and falls
+    /// that have not changed are not computed again. `whole` is as in
+    /// [`open_reduced`](Self::open_reduced).
     ///
     /// # Errors
     /// As [`open`](Self::open).
     #[doc(hidden)]
     pub fn with_config(&self, config: DatasetConfig, whole: [u32; 2]) -> Result<Self> {
-        // What was opened by absolute paths is known by those.
+        // What was opened by absolute paths is known by them.
         let config = match self.config.folder.is_absolute() {
             true => config.with_absolute_paths()?,
             false => config,
@@ -146,8 +149,8 @@ impl Pipeline {
         Ok(self)
     }
 
-    /// Refuses a place in whose pictures of `w` x `h` pixels the median object is too small to have
-    /// an outline: a length is in another unit.
+    /// Rejects a place in whose pictures of `w` x `h` pixels the median object is too small to have
+    /// an outline: probably a length is in the wrong unit.
     fn check_size_at(&self, place: &BackgroundPhoto, [w, h]: [u32; 2]) -> Result<()> {
         let (Some(median), CameraSource::Known(camera)) =
             (self.median_object_m(), &place.background.camera)
@@ -170,7 +173,7 @@ impl Pipeline {
         Err(Error::value("surface", what).in_file(&place.label))
     }
 
-    /// Median length of the objects in the library, distractors left out.
+    /// Median length of the objects in the library, without distractors.
     fn median_object_m(&self) -> Option<f64> {
         let objects = self.library.assets.iter().filter(|a| a.role.is_object());
         let photos = objects.flat_map(|asset| &asset.photos);
@@ -178,8 +181,8 @@ impl Pipeline {
         median(lengths, f64::total_cmp)
     }
 
-    /// The same for one scene that is there already: only cut-outs of the assets that it names are
-    /// read, and known, and of the labelled photos its own.
+    /// As [`open`](Self::open), for one existing scene: only the cut-outs of the assets that it
+    /// names are read and known, and of the labelled photos only its own.
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -211,12 +214,12 @@ impl Pipeline {
         }
     }
 
-    /// The same, whose falls end with [`Error::Interrupted`] once a flag is true.
+    /// The same pipeline, whose falls end with [`Error::Interrupted`] once a flag is true.
     pub fn stopped_by(self, stop: &'static AtomicBool) -> Self {
         Self { stop, ..self }
     }
 
-    /// What it was opened from.
+    /// The config that it was opened from.
     pub fn config(&self) -> &DatasetConfig {
         &self.config
     }
@@ -227,7 +230,7 @@ impl Pipeline {
     }
 
     /// The files that pictures of a scene may be made from: the assets' manifest and cut-outs, the
-    /// photos of the place with what lies beside them, the environment maps.
+    /// photos of the place with the files next to them, the environment maps.
     ///
     /// # Errors
     /// A manifest or label that cannot be read.
@@ -254,12 +257,12 @@ impl Pipeline {
         Ok(files.chain(listed).chain(named).collect())
     }
 
-    /// A dataset of `count` pictures to be made in `folder` with the config's formats.
+    /// The plan for a dataset of `count` pictures in `folder` with the config's formats.
     ///
     /// # Errors
-    /// Classes that the config's policy for obstructed objects cannot add to; an asset that fits
-    /// between the walls of some background in no direction; a photo or an environment map that
-    /// cannot be read, or from which pictures were made when it had other bytes.
+    /// Classes that the config's policy for obstructed objects cannot extend; an asset that does
+    /// not fit between the walls of some background in any direction; a photo or an environment map
+    /// that cannot be read, or that has changed since pictures were made from it.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
         let (scene, labels) = (&self.config.scene, &self.config.labels);
         self.check_room_with(scene)?;
@@ -320,7 +323,7 @@ impl Pipeline {
         self.explain_with(&self.config.scene, seed, k)
     }
 
-    /// The same of another recipe for the same assets and photos.
+    /// The same for another recipe with the same assets and photos.
     pub(super) fn explain_with(
         &self,
         recipe: &Recipe,
@@ -330,7 +333,7 @@ impl Pipeline {
         recipe.explained(seed, k, &self.backgrounds, &self.catalog)
     }
 
-    /// Fails where a scene of another recipe could not be composed of the same assets and photos.
+    /// Fails if a scene of another recipe could not be composed of the same assets and photos.
     pub(super) fn check_room_with(&self, recipe: &Recipe) -> Result<()> {
         let checked = recipe.check_room(&self.backgrounds, &self.catalog);
         checked.map_err(|e| e.within("scene"))
@@ -341,7 +344,7 @@ impl Pipeline {
         &self.places
     }
 
-    /// Whether somebody has stopped it.
+    /// Whether it was stopped.
     pub(super) fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
@@ -349,7 +352,7 @@ impl Pipeline {
     /// Sample `k`: a pure function of what was opened, `seed` and `k`.
     ///
     /// # Errors
-    /// Files that cannot be read; objects that would not come to rest in any of several scenes.
+    /// Files that cannot be read; objects that did not come to rest in any of several scenes.
     pub fn sample(&self, seed: u64, k: u64) -> Result<Sample> {
         let mut rejected = Vec::new();
         let allowance = self.allowance();
@@ -381,10 +384,10 @@ impl Pipeline {
         }
     }
 
-    /// Finds out what is unknown in a scene, renders it and labels it.
+    /// Resolves what is unknown in a scene, renders it and labels it.
     ///
     /// # Errors
-    /// As the stages: no camera, no rest, a name that is not in the folders.
+    /// Those of the stages: no camera, no rest, a name that is not in the folders.
     pub fn take(&self, scene: Scene) -> Result<Sample> {
         self.take_within(scene, &self.allowance())
     }
@@ -420,7 +423,7 @@ impl Pipeline {
         })
     }
 
-    /// Labels of a shot with these deep samples, whatever becomes of its edges.
+    /// Labels of a shot with these deep samples, regardless of how its edges are treated.
     fn label_shot(&self, deep: &DeepImage, shot: &Shot) -> Labels {
         let options = self.config.labels.options;
         if !shot.edges.reshape_cut_outs() {
@@ -434,12 +437,11 @@ impl Pipeline {
         label::label(&deep, &plain, &options)
     }
 
-    /// Labels a scene without making its picture: nothing is lit, and neither plate nor environment
-    /// is read.
+    /// Labels a scene without rendering its picture: nothing is lit, and neither plate nor environment is read.
     ///
-    /// The labels are those of [`take`](Self::take), but for rounding: without light, coverage is
-    /// summed in another order, so that numbers (`visible_fraction`, `depth`) agree to 1e-6. Masks and
-    /// boxes are the same unless a pixel is that close to the threshold.
+    /// The labels are those of [`take`](Self::take) except for rounding: without light, coverage is summed in another
+    /// order, so numbers (`visible_fraction`, `depth`) agree to 1e-6. Masks and boxes are the same unless a pixel is
+    /// that close to the threshold.
     ///
     /// # Errors
     /// As [`take`](Self::take).
@@ -455,7 +457,7 @@ impl Pipeline {
         ))
     }
 
-    /// Renders a shot and finishes its frame as the scene asks.
+    /// Renders a shot and applies the scene's finish to its frame.
     pub fn shoot(&self, scene: &Scene, shot: &Shot) -> (DeepImage, Image<PremulRgba>) {
         let free = render::render_unhidden(shot, &self.config.render);
         let exposed = Exposed::new(free, shot, &self.config.render);
@@ -463,7 +465,7 @@ impl Pipeline {
         (exposed.into_deep(), frame)
     }
 
-    /// Finds out what is unknown in a scene: its camera, where its objects come to rest, its
+    /// Resolves what is unknown in a scene: its camera, the resting places of its objects, its
     /// exposure.
     ///
     /// # Errors
@@ -472,7 +474,7 @@ impl Pipeline {
         self.resolve_within(scene, &self.allowance())
     }
 
-    /// What one picture may take.
+    /// The work that one picture may take.
     fn allowance(&self) -> Allowance<'static> {
         Allowance::new(self.config.scene.settle.most_work).stopped_by(self.stop)
     }
@@ -486,7 +488,7 @@ impl Pipeline {
         if let Some(place) = place {
             let environment = scene.environment_map(panorama.clone())?;
             let detailed = place.plate_for_zoom(scene.zoom_used())?;
-            // By the pixels that are seen, which may be more than the picture has.
+            // By the pixels that are shown, of which there may be more than in the picture.
             scene = detailed.measured().grained(scene);
             scene = light::match_plate(scene, place.plate()?.measured(), environment.as_ref());
             plate = Some(detailed.image);
@@ -500,8 +502,8 @@ impl Pipeline {
         Ok((scene, shot))
     }
 
-    /// A shot whose objects are behind what the mask beside the plate says, where there is one: it
-    /// takes the place of what the walls hide.
+    /// The shot with its objects behind what the plate's mask marks, if there is a mask, which
+    /// replaces what the walls hide.
     fn behind_front(&self, plate: &str, scene: &Scene, shot: Shot) -> Result<Shot> {
         let place = self.place(plate);
         let mask = place.map_or(Ok(None), |place| place.front_mask(scene.zoom_used()))?;
@@ -534,7 +536,7 @@ impl Pipeline {
         Ok(scene)
     }
 
-    /// The picture of the surroundings that a scene names.
+    /// The environment map that a scene names.
     fn panorama(&self, scene: &Scene) -> Result<Option<Arc<Panorama>>> {
         let shining = scene.environment.as_ref().filter(|map| map.shines());
         shining
@@ -542,7 +544,7 @@ impl Pipeline {
             .transpose()
     }
 
-    /// The place of this name; none for no name.
+    /// The place of this name; none for an empty name.
     fn known_place(&self, name: &str) -> Result<Option<&BackgroundPhoto>> {
         match self.place(name) {
             None if !name.is_empty() => Err(self.unknown_plate(name)),
@@ -569,7 +571,7 @@ impl Pipeline {
     }
 }
 
-/// Only on a belt do the same objects fall for several pictures.
+/// Only on a belt do several pictures share a fall.
 fn falls_of(config: &DatasetConfig) -> Falls {
     match config.scene.belt {
         Some(_) => Falls::of_last(REMEMBERED_SEQUENCES),
@@ -590,13 +592,13 @@ fn background_options(config: &DatasetConfig) -> BackgroundOptions {
     }
 }
 
-/// Whether two configs take the same photos in the same way.
+/// Whether two configs use the same photos in the same way.
 fn has_same_places(a: &DatasetConfig, b: &DatasetConfig) -> bool {
     a.backgrounds == b.backgrounds && background_options(a) == background_options(b)
 }
 
 /// The seed of the `n`-th try of scene `k`: the first is the dataset's own. On a belt all pictures
-/// of a sequence have that of its first.
+/// of a sequence have that of its first picture.
 fn redraw_seed(seed: u64, k: u64, n: usize) -> u64 {
     match n {
         0 => seed,

@@ -1,18 +1,17 @@
-//! Presets: recipes that others are laid over.
+//! Presets: recipes that others are based on.
 
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-/// What a recipe takes where it says nothing itself: the values of a recipe of ours, and the
-/// defaults where that says nothing either.
+/// The values that a recipe uses for keys it does not set itself: those of a built-in recipe, and
+/// the defaults for the rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Preset {
     /// The defaults, which are those of the paper.
     #[default]
     Paper,
-    /// What made the best detectors of those that were compared (`experiments/` in the
-    /// repository).
+    /// The values of the best detectors among those compared (`experiments/` in the repository).
     Real,
 }
 
@@ -32,7 +31,7 @@ impl Preset {
         self.text().parse().expect("a document of ours")
     }
 
-    /// Lays a recipe over the preset that it names, if it names one that there is.
+    /// Completes a recipe with the preset that it names, if it names an existing one.
     pub(super) fn lay_under(recipe: &mut Table) {
         let name = recipe.get("preset").and_then(Value::as_str);
         if let Some(preset) = name.and_then(Self::named) {
@@ -41,8 +40,8 @@ impl Preset {
     }
 }
 
-/// Keys of one table of which only one can be given: a recipe with one of them does without the
-/// preset's other one.
+/// Pairs of keys in one table that exclude each other: a recipe with one of them does not get the
+/// other from the preset.
 const ALTERNATIVES: [[&str; 2]; 2] = [["min_visible", "overlap_iou"], ["spread", "positions"]];
 
 fn has_alternative(table: &Table, key: &str) -> bool {
@@ -50,7 +49,7 @@ fn has_alternative(table: &Table, key: &str) -> bool {
     pairs.any(|pair| pair.into_iter().any(|other| table.contains_key(other)))
 }
 
-/// Adds what a table does not hold; inner tables alike.
+/// Adds the keys that a table lacks, in inner tables too.
 fn fill_in(table: &mut Table, below: Table) {
     let given = table.clone();
     for (key, value) in below {

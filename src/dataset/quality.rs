@@ -1,9 +1,9 @@
 //! What each [`Quality`] stands for, stage by stage.
 //!
 //! Each stage has settings on its own curve of error against time (`petcomp-report all` measures
-//! them); a [`Quality`] names one point on every curve at once. [`Quality::table`] lists them. What
-//! is not in it is exact, or so quick that nothing is gained: colour transfer, the keyer, labels
-//! (masks and boxes), and the camera, which is solved to its end in a fifth of a millisecond.
+//! them); a [`Quality`] selects one point on every curve. [`Quality::table`] lists them. What is
+//! not in it is exact, or so fast that nothing would be gained: colour transfer, the keyer, labels
+//! (masks and boxes), and the camera, which is solved to convergence in a fifth of a millisecond.
 
 use crate::dataset::{DatasetConfig, Pictures};
 use crate::error::{Error, Result};
@@ -20,7 +20,8 @@ impl Quality {
         self.into()
     }
 
-    /// Settle options with the solver's steps changed; what a fall is, and when it ends, stay.
+    /// Settle options with the solver's steps changed; what a fall is, and when it ends, stay the
+    /// same.
     pub fn settle(self, options: SettleOptions) -> SettleOptions {
         let default = SettleOptions::default();
         let step = self.of([1.0 / 240.0, default.step, 1.0 / 1920.0]);
@@ -64,8 +65,8 @@ impl Quality {
         config
     }
 
-    /// The values of a recipe that a quality replaces, if there is one, then those that are replaced
-    /// by name, which go before it.
+    /// The recipe values that a quality replaces, if one is given, followed by those that are replaced by name, which
+    /// take precedence.
     pub fn overrides_at(
         quality: Option<Self>,
         named: impl IntoIterator<Item = Override>,
@@ -94,7 +95,7 @@ impl Quality {
             .collect()
     }
 
-    /// The setting of each stage: a row a setting, a column a quality.
+    /// The settings of all stages: one row per setting, one column per quality.
     pub fn table() -> Table {
         let mut table = Table::new([
             "stage",

@@ -1,4 +1,4 @@
-//! A recipe's text with some of its keys set or taken back, all else as its author wrote it.
+//! Edits some keys of a recipe's text and leaves the rest as its author wrote it.
 
 use crate::dataset::settings::told_value;
 use crate::error::{Error, Result};
@@ -6,17 +6,17 @@ use crate::io;
 use std::ops::Range;
 use toml_edit::{ArrayOfTables, Document, DocumentMut, InlineTable, Item, Table, Value};
 
-/// A key of a recipe, and what becomes of it.
+/// A key of a recipe, and its new value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KeyEdit {
     /// Its path: `scene.lights[0].height`.
     pub path: String,
-    /// Its value as TOML; none takes the key back to its default.
+    /// Its value as TOML; none resets the key to its default.
     pub value: Option<String>,
 }
 
 impl KeyEdit {
-    /// Gives a key a value.
+    /// Sets a key to a value.
     pub fn set(path: impl Into<String>, value: impl Into<String>) -> Self {
         Self {
             path: path.into(),
@@ -25,17 +25,18 @@ impl KeyEdit {
     }
 }
 
-/// The text with these edits, in their order.
+/// The text with these edits, applied in order.
 ///
-/// A value is replaced where it stands. A new key takes the place of the line that shows its
-/// default, as [the template](crate::dataset::DatasetConfig::template) has them, or the end of its
-/// table; one that is taken back becomes such a line again. `scene.lights[0]` set to `{}` is a new
+/// A value is replaced where it is. A new key takes the place of the line that shows its default,
+/// as in [the template](crate::dataset::DatasetConfig::template), or the end of its table; a key
+/// that is reset becomes such a line again. `scene.lights[0]` set to `{}` is a new light with the
+/// default values.
 /// light with the default values.
 ///
 /// # Errors
-/// A text or value that is not TOML; a key that cannot be there.
+/// A text or value that is not TOML; a key that cannot exist.
 pub fn with_edits(text: &str, edits: &[KeyEdit]) -> Result<String> {
-    // Its message says the line of a mistake.
+    // Its message includes the line of a mistake.
     io::parse_toml::<toml::Table>(text)?;
     edits.iter().try_fold(text.to_owned(), |text, edit| {
         with_edit(&text, edit).map_err(|what| Error::value(&edit.path, what))
@@ -104,11 +105,11 @@ fn steps_of(path: &str) -> impl Iterator<Item = Step<'_>> {
     })
 }
 
-/// What stands at a path.
+/// What is at a path.
 enum Found {
-    /// A value, and where it stands.
+    /// A value, and its position in the text.
     Value(Range<usize>),
-    /// A table with a header of its own, by its place in a list.
+    /// A table with a header of its own, by its index in a list.
     Table(usize),
     /// Tables of one name.
     List,
@@ -150,7 +151,7 @@ fn line_start(text: &str, at: usize) -> usize {
     text[..at].rfind('\n').map_or(0, |end| end + 1)
 }
 
-/// A value that is no longer set: its line shows the default, or else what it was.
+/// Unsets a value: its line shows the default, or else what it was.
 fn taken_back(text: &str, span: Range<usize>, default: Option<&str>) -> String {
     let start = line_start(text, span.start);
     let shown = default.unwrap_or(&text[span.clone()]).replace('\n', " ");
@@ -158,7 +159,7 @@ fn taken_back(text: &str, span: Range<usize>, default: Option<&str>) -> String {
     replaced(text, start..span.end, &format!("#{key}{shown}"))
 }
 
-/// The text with the lines of a list's entry as comments.
+/// The text with the lines of a list's entry commented out.
 fn commented_out(text: &str, path: &str, index: usize) -> String {
     let mut lines = lines_of(text);
     let name = format!("[{}]", path.trim_end_matches(&format!("[{index}]")));
@@ -168,7 +169,7 @@ fn commented_out(text: &str, path: &str, index: usize) -> String {
     joined(&lines)
 }
 
-/// The text with the lines of all entries of a list as comments.
+/// The text with the lines of all entries of a list commented out.
 fn without_entries(text: &str, path: &str) -> String {
     let (mut lines, name) = (lines_of(text), format!("[{path}]"));
     while let Some((from, to)) = section(&lines, &name, 0) {
@@ -183,8 +184,8 @@ fn comment_out(lines: &mut [String]) {
         .for_each(|line| line.insert(0, '#'));
 }
 
-/// The text with the header of a list that the template shows as a comment, where a path leads into
-/// the list's first entry.
+/// The text with the list header that the template shows as a comment uncommented, if a path leads
+/// into the list's first entry.
 fn with_list_begun(text: &str, steps: &[Step]) -> Edited {
     let Some(index) = steps.iter().position(|step| *step == Step::Index(0)) else {
         return Ok(text.to_owned());
@@ -211,7 +212,7 @@ fn table_of(steps: &[Step]) -> String {
     keys.collect::<Vec<_>>().join(".")
 }
 
-/// Adds a key that is not there.
+/// Adds a missing key.
 fn added(text: &str, path: &str, steps: &[Step], value: Value) -> Edited {
     let mut lines = lines_of(text);
     if let Some(at) = default_line(&lines, path) {
@@ -247,7 +248,7 @@ fn down_mut<'d>(item: &'d mut Item, step: &Step) -> Option<&'d mut Item> {
     }
 }
 
-/// Puts a value at a path, with the tables that lead there.
+/// Sets the value at a path, and creates the tables on the way.
 fn insert(item: &mut Item, steps: &[Step], value: Value) -> std::result::Result<(), String> {
     match steps {
         [] => *item = Item::Value(value),
@@ -273,7 +274,7 @@ fn insert_key(item: &mut Item, key: &str, value: Value) -> std::result::Result<(
     Ok(())
 }
 
-/// What is below a key, made where it is not there.
+/// What is below a key, created if missing.
 fn entry<'i>(
     item: &'i mut Item,
     key: &str,
@@ -288,7 +289,7 @@ fn entry<'i>(
     table.get_mut(key).ok_or("no such key")
 }
 
-/// What a key holds before what is below it is there.
+/// The initial value of a key before anything below it exists.
 fn empty_for(rest: &[Step]) -> Item {
     match rest {
         [Step::Index(_), ..] => Item::ArrayOfTables(ArrayOfTables::new()),
@@ -336,8 +337,8 @@ fn default_line(lines: &[String], path: &str) -> Option<usize> {
     Some(from + lines[from..to].iter().position(shows)?)
 }
 
-/// The lines of a table behind its header, of several with that name by its place among them; those
-/// before any header for the document's own.
+/// The range of lines of a table below its header, of the `index`-th if several have the name; for
+/// the document's own keys, the lines before the first header.
 fn section(lines: &[String], table: &str, index: usize) -> Option<(usize, usize)> {
     let from = match table {
         "" => 0,
@@ -353,12 +354,12 @@ fn nth_header(lines: &[String], table: &str, index: usize) -> Option<usize> {
     headers.nth(index).map(|(at, _)| at)
 }
 
-/// A table begins, be it as a comment of the template.
+/// Whether a line begins a table, be it commented out in the template.
 fn is_header(line: &str) -> bool {
     header_of(line.strip_prefix('#').unwrap_or(line)).is_some()
 }
 
-/// The table that a line begins; a list's entry keeps its second bracket.
+/// The table whose header a line is; a list's entry keeps its second bracket.
 fn header_of(line: &str) -> Option<&str> {
     let (table, rest) = line.trim().strip_prefix('[')?.rsplit_once(']')?;
     let rest = rest.trim_start();

@@ -1,5 +1,5 @@
-//! One run over a dataset's folder: many samples at a time, each entered in the journal when its
-//! files are there.
+//! One run over a dataset's folder: many samples at a time, each entered in the journal once its
+//! files are present.
 
 use crate::dataset::folder;
 use crate::dataset::journal::Journal;
@@ -14,19 +14,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// How far a run is.
+/// Progress of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Progress {
-    /// Samples in the folder, those of an earlier run included.
+    /// Samples in the folder, including those of earlier runs.
     pub done: u64,
-    /// Samples asked for.
+    /// Samples requested.
     pub count: u64,
     /// Samples made by this run.
     pub made: u64,
 }
 
 impl Progress {
-    /// That of a run that is about to begin.
+    /// The progress of a run that is about to begin.
     fn so_far(journal: &Journal, plan: &Plan, count: u64) -> Self {
         Self {
             done: journal.count(count, |k| plan.range.contains(k)),
@@ -44,7 +44,7 @@ impl Progress {
         format!("{done} of {asked} samples are in {folder}; rerun the same command to resume")
     }
 
-    /// That of a run of which another one is a part.
+    /// The progress of a run of which another one is a part.
     pub(super) fn with(self, part: Self) -> Self {
         Self {
             done: self.done + part.done,
@@ -60,14 +60,14 @@ impl Progress {
     }
 }
 
-/// Who is told how far a run is.
+/// Receives the progress of a run.
 pub(super) type Report<'a> = &'a (dyn Fn(Progress) + Sync);
 
-/// Most samples that a dataset may have: a number above is a slip of the finger, and no sum of
-/// counts can overflow.
+/// Maximum number of samples of a dataset: a larger number is a typing error, and no sum of counts
+/// can overflow.
 const MAX_SAMPLES: u64 = 1_000_000_000;
 
-/// Fails for a number of samples that nobody can mean.
+/// Fails for an implausible number of samples.
 pub(super) fn check_count(count: u64) -> Result<()> {
     match count <= MAX_SAMPLES {
         true => Ok(()),
@@ -78,8 +78,8 @@ pub(super) fn check_count(count: u64) -> Result<()> {
     }
 }
 
-/// Writes the samples of a plan that are not in its folder yet and returns what the folder then
-/// holds; `write` puts the files of a sample in their places, and on the disk as it is told.
+/// Writes the missing samples of a plan and returns what the folder then holds; `write` writes the
+/// files of a sample, synced as it is told.
 pub(super) fn run(
     plan: &Plan,
     write: impl Fn(u64, Syncing) -> Result<(JournalLine, Times)> + Sync,
@@ -111,7 +111,7 @@ pub(super) fn run(
     run.finish()
 }
 
-/// One sample is made again whatever the number of the others.
+/// A single sample can be generated again whatever the number of the others.
 fn expected_count(plan: &Plan, journal: &Journal) -> u64 {
     match plan.range {
         SampleRange::One(_) => plan.count.max(journal.end()),
@@ -119,7 +119,7 @@ fn expected_count(plan: &Plan, journal: &Journal) -> u64 {
     }
 }
 
-/// A pool for each sample that is made at a time.
+/// One thread pool for each sample in progress.
 fn worker_pools(missing: u64) -> Result<Vec<rayon::ThreadPool>> {
     let threads = rayon::current_num_threads();
     let workers = threads.min(usize::try_from(missing).unwrap_or(threads));
@@ -128,7 +128,7 @@ fn worker_pools(missing: u64) -> Result<Vec<rayon::ThreadPool>> {
     pools.map_err(|e| Error::value("threads", e))
 }
 
-/// Fails where the folder holds more than is asked for: trainers read all that is there.
+/// Fails if the folder holds more than was requested: trainers read everything in it.
 fn check_nothing_beyond(journal: &Journal, count: u64, plan: &Plan) -> Result<()> {
     let end = journal.end();
     if end <= count {
@@ -141,7 +141,7 @@ fn check_nothing_beyond(journal: &Journal, count: u64, plan: &Plan) -> Result<()
     Err(Error::file(&plan.folder, what))
 }
 
-/// What the threads of one run share.
+/// State shared by the threads of one run.
 struct DatasetRun<'a, F> {
     plan: &'a Plan,
     /// Samples of the whole dataset.
@@ -153,7 +153,7 @@ struct DatasetRun<'a, F> {
     began: Instant,
 }
 
-/// What is done, and what went wrong first (in order of number).
+/// What is done, and the failure with the lowest number.
 struct RunState {
     journal: Journal,
     progress: Progress,
@@ -162,7 +162,8 @@ struct RunState {
 }
 
 impl<F: Fn(u64, Syncing) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, F> {
-    /// Makes samples until `next` has none, of the `missing` ones, or there is a reason to stop.
+    /// Generates samples until `next` has none, of the `missing` ones, or there is a reason to
+    /// stop.
     fn work(&self, missing: u64, next: impl Fn() -> Option<u64> + Sync) -> Result<()> {
         let pools = worker_pools(missing)?;
         std::thread::scope(|scope| {
@@ -179,7 +180,7 @@ impl<F: Fn(u64, Syncing) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, 
         Ok(())
     }
 
-    /// Samples that are to be made at most.
+    /// Maximum number of samples to generate.
     fn missing(&self, again: bool) -> u64 {
         let Progress { done, count, .. } = self.state().progress;
         if again {
@@ -189,7 +190,7 @@ impl<F: Fn(u64, Syncing) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, 
         }
     }
 
-    /// Makes every sample that is not there, and a single one that is asked for in any case.
+    /// Generates every missing sample, or a single requested one in any case.
     fn make_all(&self) -> Result<()> {
         let again = matches!(self.plan.range, SampleRange::One(_));
         let next = Mutex::new(self.plan.range.below(self.count));
@@ -210,7 +211,7 @@ impl<F: Fn(u64, Syncing) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, 
         let mut state = self.state();
         match written.and_then(|(line, times)| state.enter(line, times)) {
             Ok(()) => self.report(&state),
-            // Not this sample's fault: it is made by the run that goes on.
+            // Not this sample's fault: a resumed run will generate it.
             Err(Error::Interrupted { .. }) if self.stop.load(Ordering::Relaxed) => {}
             Err(error) => state.fail(k, error),
         }
@@ -221,11 +222,11 @@ impl<F: Fn(u64, Syncing) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, 
     }
 
     fn state(&self) -> MutexGuard<'_, RunState> {
-        // A thread that panicked left the state as it was: every entry is one step.
+        // A panic in a thread leaves the state consistent: every entry is one step.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Closes the state, whatever happened, then says what did.
+    /// Closes the state in any case, then returns the result.
     fn finish(self) -> Result<DatasetCounts> {
         let (plan, count, wall) = (self.plan, self.count, self.began.elapsed());
         let state = self.state.into_inner();
@@ -240,7 +241,7 @@ impl<F: Fn(u64, Syncing) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, 
     }
 }
 
-/// Takes away the files that hold many samples: they would not hold those that are added.
+/// Deletes the files that hold many samples: they would not include those that are added.
 fn part_samples(plan: &Plan) -> Result<()> {
     let mut writers = plan.writers.iter();
     writers.try_for_each(|writer| writer.reopen(&plan.folder))
@@ -272,10 +273,10 @@ impl RunState {
         }
     }
 
-    /// Puts the journal in order and returns its lines.
+    /// Sorts the journal and returns its lines.
     ///
     /// # Errors
-    /// The sample that failed; fewer samples than were asked for.
+    /// The error of the sample that failed; fewer samples than requested.
     fn close(self, plan: &Plan, count: u64) -> Result<Vec<JournalLine>> {
         let now = Progress::so_far(&self.journal, plan, count);
         let closed = self.journal.close(count);

@@ -1,4 +1,4 @@
-//! The config that a scene file brings by itself, and what it takes to bring one.
+//! The config that a scene file contains, and what is needed to include one.
 
 use crate::dataset::DatasetConfig;
 use crate::dataset::paths::folder_of;
@@ -17,16 +17,16 @@ const SCENE_KEYS: [&str; 5] = [
     "force_cameras",
 ];
 
-/// Values of a recipe's `scene` that count for a scene that is there already, if the recipe is
-/// beside it.
+/// Values of a recipe's `scene` that have an effect on an existing scene if the recipe is given
+/// with it.
 const KEYS_BESIDE_A_SCENE: [&str; 2] = ["scene.settle", "scene.environment.files"];
 
 impl DatasetConfig {
-    /// Reads a recipe file, some of its values replaced, for a scene that is there already: its
-    /// pictures have the scene's size, whatever the recipe says.
+    /// Reads a recipe file, some of its values replaced, for an existing scene: its pictures have
+    /// the scene's size, whatever the recipe says.
     ///
     /// # Errors
-    /// As [`read`](Self::read); a value replaced that only decides how scenes are drawn.
+    /// As [`read`](Self::read); a replaced value that only decides how scenes are drawn.
     pub fn read_for_scene(
         recipe: impl AsRef<Path>,
         scene: &Scene,
@@ -38,11 +38,12 @@ impl DatasetConfig {
         Ok(config)
     }
 
-    /// The config that a scene read from `path` brings by itself, some of its values replaced: its
-    /// [`files`](Scene::files) and [`settings`](Scene::settings), and nothing else but defaults.
+    /// The config contained in a scene read from `path`, some of its values replaced: its
+    /// [`files`](Scene::files) and [`settings`](Scene::settings); the rest are defaults.
     ///
     /// # Errors
-    /// A scene that does not name the folders that it needs; settings that no recipe can have.
+    /// A scene that does not name the folders that it needs; settings that are not valid in a
+    /// recipe.
     pub fn for_scene(
         scene: &Scene,
         path: impl AsRef<Path>,
@@ -59,7 +60,7 @@ impl DatasetConfig {
     /// The defaults with the settings of a scene.
     ///
     /// # Errors
-    /// Settings that no recipe can have, or that only decide how scenes are drawn.
+    /// Settings that are not valid in a recipe, or that only decide how scenes are drawn.
     pub fn from_settings(settings: &SceneSettings, overrides: &[io::Override]) -> Result<Self> {
         overrides.iter().try_for_each(check_override)?;
         overrides.iter().try_for_each(check_counts)?;
@@ -71,7 +72,7 @@ impl DatasetConfig {
         let table: Table = io::from_table_with(table, overrides)?;
         check_scene_table(&table)?;
         let idle = table.keys().find(|key| !counts_for_scene(key)).cloned();
-        // This names what no recipe knows either, with what was probably meant.
+        // This also reports keys unknown to recipes, with the closest known one.
         let config: Self = io::from_table(table)?;
         if let Some(key) = idle {
             return Err(of_no_scene(&key));
@@ -97,7 +98,7 @@ impl DatasetConfig {
         Ok(self)
     }
 
-    /// A scene of this config with all that it takes to render it from a file at `path` alone.
+    /// A scene of this config with everything needed to render it from a file at `path` alone.
     ///
     /// # Errors
     /// Without a working folder.
@@ -109,7 +110,7 @@ impl DatasetConfig {
         })
     }
 
-    /// The folders of what a scene names, as they are seen from its file.
+    /// The folders of what a scene names, relative to its file.
     fn files_for(&self, scene: &Scene, path: &Path) -> Result<SceneFiles> {
         let mut files = SceneFiles {
             assets: Some(relative_to_file(&self.assets, path)?),
@@ -138,7 +139,7 @@ impl DatasetConfig {
     }
 }
 
-/// Files that labels are written to make no part of one picture, and some need a recipe's belt.
+/// Label formats have no meaning for a single picture, and some need a recipe's belt.
 fn leave_out_formats(settings: &mut Table) {
     if let Some(Value::Table(labels)) = settings.get_mut("labels") {
         labels.remove("formats");
@@ -158,7 +159,7 @@ fn check_override(given: &io::Override) -> Result<()> {
     Ok(())
 }
 
-/// The same in settings of a scene, whose own values say where its environment map is.
+/// The same for the settings of a scene, whose own values name its environment map.
 fn check_scene_table(settings: &Table) -> Result<()> {
     let scene = settings.get("scene").and_then(Value::as_table);
     let mut keys = scene.into_iter().flat_map(Table::keys);
@@ -177,7 +178,7 @@ fn check_counts(given: &io::Override) -> Result<()> {
     }
 }
 
-/// A recipe's key that decides something of a scene that is there already.
+/// Whether a recipe's key has an effect on an existing scene.
 fn counts_for_scene(key: &str) -> bool {
     let mut known = SCENE_KEYS.into_iter().chain(["pictures"]);
     known.any(|path| path.split('.').next() == Some(key))
@@ -195,7 +196,7 @@ fn only_drawn(key: &str) -> Error {
     Error::value(key, what)
 }
 
-/// A path that a file in a folder names; older scenes name the folder itself by nothing.
+/// A path named in a file of a folder; in older scenes an empty path is the folder itself.
 fn below(folder: &Path, path: &Path) -> PathBuf {
     let joined = folder.join(path);
     if joined.as_os_str().is_empty() {
@@ -224,7 +225,7 @@ fn find<'a>(table: &'a Table, path: &str) -> Option<&'a Value> {
     }
 }
 
-/// Puts a value at a path of keys.
+/// Sets the value at a path of keys.
 fn insert(table: &mut Table, path: &str, value: Value) {
     match path.split_once('.') {
         None => {
@@ -241,7 +242,7 @@ fn insert(table: &mut Table, path: &str, value: Value) {
     }
 }
 
-/// What of a value differs from its default; of a table only the keys that do.
+/// How a value differs from its default; for a table, only the keys that do.
 fn difference(value: Option<&Value>, default: Option<&Value>) -> Option<Value> {
     match (value?, default) {
         (Value::Table(own), Some(Value::Table(defaults))) => {
@@ -257,7 +258,7 @@ fn difference(value: Option<&Value>, default: Option<&Value>) -> Option<Value> {
     }
 }
 
-/// The folder with a scene's plate; a scene without one needs none.
+/// The folder with a scene's plate; empty for a scene without one.
 fn backgrounds_folder(files: &SceneFiles, plate: &str, folder: &Path) -> Result<PathBuf> {
     if plate.is_empty() {
         return Ok(PathBuf::new());

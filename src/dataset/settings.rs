@@ -1,4 +1,4 @@
-//! The settings of a recipe, as the template tells them: so that nothing is said twice.
+//! The settings of a recipe, read from the template so that nothing is documented twice.
 
 use crate::dataset::folder::field_path;
 use crate::dataset::{DatasetConfig, Preset};
@@ -20,21 +20,21 @@ pub struct SettingGroup {
 /// A key of the template.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Setting {
-    /// Its path: `scene.start.x`; that of a list's entry is of the first.
+    /// Its path: `scene.start.x`; for the entries of a list, that of the first.
     pub path: String,
-    /// What it does, in which unit.
+    /// What it does, with its unit.
     pub docs: String,
-    /// The default; an example where there is none.
+    /// The default; an example if there is none.
     pub value: Value,
     /// Whether it has no default, and `value` is an example.
     pub is_example: bool,
-    /// The ends of what is taken at all.
+    /// Limits of the accepted values.
     pub ends: Option<[f64; 2]>,
-    /// What kinds of values it takes.
+    /// The kinds of values it accepts.
     pub takes: Kinds,
 }
 
-/// What kinds of values a setting takes: as many of them as a recipe is read with.
+/// The kinds of values that a setting accepts, found by reading recipes with them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Kinds {
     /// True and false.
@@ -43,7 +43,7 @@ pub struct Kinds {
     pub number: bool,
     /// Two numbers, every value between them equally likely.
     pub range: bool,
-    /// Numbers are whole.
+    /// Numbers must be whole.
     pub whole: bool,
     /// One of these words.
     pub words: Vec<String>,
@@ -103,7 +103,7 @@ pub(crate) fn told_value(path: &str) -> Option<&'static str> {
     })
 }
 
-/// The path with every index 0, as the template has it.
+/// The path with every index 0, as in the template.
 fn of_first_entry(path: &str) -> String {
     let is_digit = |c: char| c.is_ascii_digit();
     let mut parts = path.split('[');
@@ -113,7 +113,7 @@ fn of_first_entry(path: &str) -> String {
     })
 }
 
-/// Every key of the template, but for the kinds of values that it takes.
+/// Every key of the template, without the kinds of values that it accepts.
 #[cfg(test)]
 pub(super) fn told_keys() -> impl Iterator<Item = Setting> {
     let groups = told_groups().into_iter();
@@ -142,7 +142,7 @@ fn told_groups() -> Vec<SettingGroup> {
     groups
 }
 
-/// A comment and its next line; an empty line ends it.
+/// A comment joined with its next line; an empty line ends it.
 fn continued(comment: &str, line: &str) -> String {
     let line = line.trim_start_matches(['#', ' ']);
     match (comment, line) {
@@ -152,7 +152,7 @@ fn continued(comment: &str, line: &str) -> String {
     }
 }
 
-/// The table that a line begins, be it as a comment; of a list its first entry.
+/// The table whose header a line is, be it commented out; for a list its first entry.
 fn table_of(line: &str) -> Option<String> {
     let header = line.trim_start_matches('#').strip_prefix('[')?;
     let table = header.trim_matches(['[', ']']);
@@ -160,7 +160,7 @@ fn table_of(line: &str) -> Option<String> {
     Some(format!("{table}{index}"))
 }
 
-/// The key that a line sets, be it as a comment.
+/// The key that a line sets, be it commented out.
 fn key_and_value(line: &'static str) -> Option<(&'static str, &'static str)> {
     let (key, value) = line.strip_prefix('#').unwrap_or(line).split_once(" = ")?;
     let is_key = key
@@ -175,7 +175,7 @@ fn value_of(text: &str) -> Value {
     value.expect("the template is TOML")
 }
 
-/// The ends of the last "A to B" in a comment.
+/// The limits in the last "A to B" of a comment.
 fn ends(comment: &str) -> Option<[f64; 2]> {
     let words: Vec<&str> = comment
         .split_whitespace()
@@ -199,7 +199,7 @@ fn quoted_words(comment: &str) -> Vec<String> {
 }
 
 impl Kinds {
-    /// Found by trying: what a recipe is read with is taken.
+    /// Found by trial: a value is accepted if a recipe can be read with it.
     fn of(setting: &Setting) -> Self {
         let takes = |value: String| is_taken(&setting.path, &value);
         let [low, middle, high] = setting.some_numbers();
@@ -209,7 +209,7 @@ impl Kinds {
         Self {
             switch: takes("true".into()),
             number,
-            // Two numbers in either order are a width and a height.
+            // A pair that is accepted in either order is a width and a height.
             range: takes(format!("[{low}, {high}]")) && !takes(format!("[{high}, {low}]")),
             whole: number && !takes(format!("{middle}")),
             lists: kept(&words, |word| takes(format!("[{}]", quoted(word)))),
@@ -235,7 +235,7 @@ impl Setting {
         }
     }
 
-    /// Two numbers within its ends, whole where there is room, and one between them that is not.
+    /// Two numbers within its limits, whole if there is room, and one between them that is not.
     fn some_numbers(&self) -> [f64; 3] {
         let [low, high] = self.ends.unwrap_or([1.0, 2.0]);
         if high - low < 2.0 {

@@ -1,4 +1,4 @@
-//! Which samples of a dataset a run makes: all, one machine's share, or one.
+//! Which samples of a dataset a run generates: all, one machine's share, or one.
 
 use crate::dataset::WebDataset;
 use crate::error::{Error, Result};
@@ -7,22 +7,22 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Which samples of a dataset a run makes.
+/// Which samples of a dataset a run generates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SampleRange {
-    /// All that are missing.
+    /// All missing samples.
     #[default]
     All,
-    /// Those of a shard that are missing.
+    /// The missing samples of a shard.
     Shard(Shard),
-    /// This one, whether it is there or not.
+    /// This one, whether it exists or not.
     One(u64),
-    /// Those from the first number to before the second that are missing.
+    /// The missing samples from the first number up to, but not including, the second.
     Span(u64, u64),
 }
 
 impl SampleRange {
-    /// Sample `k` is one of them.
+    /// Whether sample `k` is one of them.
     pub fn contains(self, k: u64) -> bool {
         match self {
             Self::All => true,
@@ -32,7 +32,7 @@ impl SampleRange {
         }
     }
 
-    /// Fails where the one that is asked for is none of `count`.
+    /// Fails if a single requested sample is not below `count`.
     pub(crate) fn check(self, count: u64) -> Result<()> {
         match self {
             Self::One(k) if k >= count => {
@@ -43,8 +43,8 @@ impl SampleRange {
         }
     }
 
-    /// Where they are written, given the folder of the dataset: a shard has one of its own, unless it
-    /// makes archives.
+    /// Where they are written, given the folder of the dataset: a shard has one of its own, unless it generates
+    /// archives.
     #[doc(hidden)]
     pub fn folder(self, dataset: &Path, archives: Option<WebDataset>) -> PathBuf {
         match (self, archives) {
@@ -65,7 +65,7 @@ impl SampleRange {
         end.saturating_sub(first).div_ceil(step)
     }
 
-    /// The first of them, the distance to the next, and where they end.
+    /// The first of them, the step to the next, and the end.
     fn steps(self, count: u64) -> (u64, u64, u64) {
         match self {
             Self::All => (0, 1, count),
@@ -76,14 +76,14 @@ impl SampleRange {
     }
 }
 
-/// A share of the samples, every `of`-th: each machine makes its own and none has to know of
+/// A share of the samples, every `of`-th: each machine generates its own and none has to know of
 /// another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shard {
-    /// Which one, from 1.
+    /// Which shard, from 1.
     pub index: u64,
-    /// Of how many.
+    /// Number of shards.
     pub of: u64,
 }
 
@@ -94,7 +94,7 @@ impl fmt::Display for Shard {
 }
 
 impl Shard {
-    /// The shard, if there can be such a one.
+    /// The shard, if it is possible.
     ///
     /// # Errors
     /// An index that is not in `1..=of`.
@@ -109,7 +109,7 @@ impl Shard {
         }
     }
 
-    /// What is expected instead of a shard that cannot be.
+    /// What is expected instead of an impossible shard; none if it is possible.
     fn expectation(self) -> Option<String> {
         let Self { index, of } = self;
         match index {
@@ -120,27 +120,27 @@ impl Shard {
         }
     }
 
-    /// Sample `k` belongs to it.
+    /// Whether sample `k` belongs to it.
     pub fn contains(self, k: u64) -> bool {
         k.checked_rem(self.of)
             .is_some_and(|rest| rest + 1 == self.index)
     }
 
-    /// Name of its folder: names in order are shards in order.
+    /// Name of its folder: in order of name, shards are in order of number.
     pub fn folder(self) -> String {
         let digits = self.of.to_string().len();
         format!("shard-{:0digits$}-of-{}", self.index, self.of)
     }
 }
 
-/// What `--shard` says.
+/// The argument of `--shard`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShardChoice {
     /// `3/8`.
     Given(Shard),
-    /// `auto` or `auto/8`: what the cluster's environment says, see [`ShardChoice::within`].
+    /// `auto` or `auto/8`: taken from the cluster's environment, see [`ShardChoice::within`].
     Auto {
-        /// Number of shards, where the environment does not tell.
+        /// Number of shards, if the environment does not give it.
         of: Option<u64>,
     },
 }
@@ -157,19 +157,19 @@ impl FromStr for ShardChoice {
 }
 
 impl ShardChoice {
-    /// The shard that is meant, `variable` telling the environment's variables.
+    /// The selected shard; `variable` returns environment variables.
     ///
-    /// `auto` understands the tasks of a Slurm array (`SLURM_ARRAY_TASK_ID` with `_MIN`, `_MAX`,
-    /// `_STEP` and `_COUNT`), the children of an AWS Batch array job (`AWS_BATCH_JOB_ARRAY_INDEX`, from
-    /// 0, and `AWS_BATCH_JOB_ARRAY_SIZE`) and the pods of an indexed Kubernetes job (`JOB_COMPLETION_INDEX`,
-    /// from 0; `auto/N` says of how many, since Kubernetes does not).
+    /// `auto` supports the tasks of a Slurm array (`SLURM_ARRAY_TASK_ID` with `_MIN`, `_MAX`, `_STEP` and `_COUNT`),
+    /// the children of an AWS Batch array job (`AWS_BATCH_JOB_ARRAY_INDEX`, from 0, and `AWS_BATCH_JOB_ARRAY_SIZE`) and
+    /// the pods of an indexed Kubernetes job (`JOB_COMPLETION_INDEX`, from 0; `auto/N` gives the number of shards,
+    /// since Kubernetes does not).
     ///
-    /// Slurm tells tasks that are repeated nothing of the array that they were in: `auto` takes an
-    /// array of all tasks, and `auto/N` any tasks of an array from 1 to N.
+    /// Slurm does not tell resubmitted tasks which array they were in: `auto` requires an array of all tasks, `auto/N`
+    /// accepts any tasks of an array from 1 to N.
     ///
     /// # Errors
-    /// An environment of neither; an array with gaps, or without its first tasks; for `auto/N` one
-    /// from 0; numbers that cannot be right.
+    /// An environment with none of these; an array with gaps, or without its first tasks; for
+    /// `auto/N` an array from 0; invalid numbers.
     pub fn within(self, variable: impl Fn(&str) -> Option<String>) -> Result<Shard> {
         let of = match self {
             Self::Given(shard) => return Ok(shard),
@@ -197,7 +197,7 @@ fn parse_choice(text: &str) -> Option<Result<ShardChoice>> {
     Some(Shard::new(index.parse().ok()?, of).map(ShardChoice::Given))
 }
 
-/// What a scheduler tells a job by environment variables.
+/// What a scheduler tells a job through environment variables.
 struct JobEnvironment<V> {
     variable: V,
 }
@@ -230,7 +230,7 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
         Shard::new(index.saturating_add(1), of)
     }
 
-    /// The share of a task of a Slurm array.
+    /// The shard of a task of a Slurm array.
     fn slurm_shard(&self, id: u64, of: Option<u64>) -> Result<Shard> {
         let first = self.number("SLURM_ARRAY_TASK_MIN")?;
         match of {
@@ -239,7 +239,7 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
         }
     }
 
-    /// The same in an array that has a task for every shard.
+    /// The same for an array that has a task for every shard.
     fn slurm_shard_of_all(&self, id: u64, first: u64) -> Result<Shard> {
         check_first_task(first)?;
         let step = self.number("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1).max(1);
@@ -251,7 +251,7 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
         Shard::new((past / step).saturating_add(1), of)
     }
 
-    /// Fails for an array with holes.
+    /// Number of tasks; fails for an array with gaps.
     fn slurm_task_count(&self, first: u64, step: u64) -> Result<Option<u64>> {
         let count = self.number("SLURM_ARRAY_TASK_COUNT")?;
         let last = self.number("SLURM_ARRAY_TASK_MAX")?;
@@ -276,7 +276,7 @@ fn shard_of_task(id: u64, first: Option<u64>, of: u64) -> Result<Shard> {
     Err(Error::value("SLURM_ARRAY_TASK_MIN", what))
 }
 
-/// An array that begins later repeats some tasks of another one.
+/// An array that begins later resubmits some tasks of another one.
 fn check_first_task(first: u64) -> Result<()> {
     if first <= 1 {
         return Ok(());
@@ -294,7 +294,7 @@ fn tasks_before(id: u64, first: u64) -> Result<u64> {
     })
 }
 
-/// An array with holes makes no whole dataset.
+/// An array with gaps would not generate a whole dataset.
 fn check_all_tasks(count: u64, first: u64, last: u64, step: u64) -> Result<()> {
     if count > 0 && last.checked_sub(first) == (count - 1).checked_mul(step) {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Everything known of a sample, one JSON file beside each image.
+//! Everything known about a sample: one JSON file next to each image.
 
 use crate::dataset::paths::create_part_folders;
 use crate::dataset::{Entry, Labelling, Part, Provenance, Writer};
@@ -11,12 +11,12 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Writes `scenes/{train,val}/NNNNNN.json`, a [`SampleRecord`] each: label formats forget most of
-/// what is known of a picture, this one nothing.
+/// Writes `scenes/{train,val}/NNNNNN.json`, a [`SampleRecord`] each: label formats drop most of
+/// what is known about a picture, this one nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sidecar;
 
-/// What a sidecar file says.
+/// Content of a sidecar file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SampleRecord {
     /// Version of the program that made the sample.
@@ -41,9 +41,9 @@ pub struct SampleRecord {
     pub rejected: Vec<String>,
     /// Every drawn value by the name of its draw.
     pub draws: BTreeMap<String, f64>,
-    /// What is where in the picture.
+    /// Its labels.
     pub labels: Labels,
-    /// What the draws gave: objects not settled yet, exposure still open.
+    /// What was drawn: objects not settled yet, exposure still open.
     pub drawn: Scene,
     /// What the picture was made from: camera, resting poses, lights, exposure.
     pub scene: Scene,
@@ -69,7 +69,7 @@ impl Writer for Sidecar {
 }
 
 impl SampleRecord {
-    /// Everything known of an entry.
+    /// Everything known about an entry.
     fn new(entry: &Entry<'_>, provenance: &Provenance) -> Self {
         let labels = &entry.sample.labels;
         Self {
@@ -90,9 +90,9 @@ impl SampleRecord {
         }
     }
 
-    /// With the classes and boxes that objects are labelled with: the `amodal_box` of one with a
-    /// label is its label's, whatever that is around. Those that are to be ignored, or have no such
-    /// box, are among the objects without a label.
+    /// The record with the classes and boxes that objects are labelled with: the `amodal_box` of a
+    /// labelled object is its label's, whatever that is around. Objects to be ignored, or without
+    /// such a box, count as objects without a label.
     pub(crate) fn into_labelled(mut self, labelling: Labelling) -> Self {
         for object in &mut self.labels.objects {
             if !self.labelled.contains(&object.id) {

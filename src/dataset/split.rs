@@ -30,22 +30,22 @@ impl Part {
     }
 }
 
-/// How samples are shared out: by number alone, so the split is the same on every machine.
+/// How samples are split: by number alone, so the split is the same on every machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Split {
     /// Samples for validation, percent. Default: 20.
     #[serde(deserialize_with = "percent")]
     pub val_percent: u8,
-    /// Which ones those are. Default: `interleaved`.
+    /// Which samples those are. Default: `interleaved`.
     pub order: SplitOrder,
-    /// Samples of a sequence, which stay together: on a belt as many as its recipe says. Default:
-    /// 1, and 0 is the same.
+    /// Length of a sequence, whose samples stay together: on a belt, that of its recipe. Default:
+    /// 1; 0 is the same.
     #[serde(skip)]
     pub sequence: u64,
 }
 
-/// What is no share is told the bounds of one, not those of its type.
+/// An invalid percentage is reported with the limits of a percentage, not those of its type.
 fn percent<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<u8, D::Error> {
     let value = i64::deserialize(deserializer)?;
     let share = u8::try_from(value).ok();
@@ -133,7 +133,7 @@ mod tests {
         val.collect()
     }
 
-    /// So many percent for validation, of so many samples.
+    /// A percentage for validation, of a number of samples.
     fn count(val_percent: u8, order: SplitOrder, n: u64) -> usize {
         let split = Split {
             val_percent,

@@ -1,4 +1,4 @@
-//! Everything a dataset on disk tells of itself, gathered for a report.
+//! Everything that can be read from a dataset on disk, gathered for a report.
 
 use crate::asset::Role;
 use crate::dataset::folder;
@@ -16,7 +16,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What a dataset's files tell.
+/// Summary of a dataset's files.
 #[derive(Clone, Debug)]
 pub struct Summary {
     /// What it was made from: `dataset.json`.
@@ -26,12 +26,12 @@ pub struct Summary {
     /// Images of both parts.
     pub images: [usize; 2],
     /// Drawn numbers by the key of their distribution in the recipe: `scale`, `start.x`,
-    /// `lights[0].height`; on a belt of each sequence once.
+    /// `lights[0].height`; on a belt, once for each sequence.
     pub drawn: BTreeMap<String, Vec<f64>>,
     /// How often each was chosen, on a belt for a sequence: photos of the place, assets, photos of
     /// an asset.
     pub chosen: BTreeMap<&'static str, BTreeMap<String, u64>>,
-    /// Seen share of each object, 0 to 1.
+    /// Visible share of each object, 0 to 1.
     pub visible: Vec<f64>,
     /// Width and height of the box of each labelled object, pixels.
     pub boxes: Vec<[f64; 2]>,
@@ -43,13 +43,13 @@ pub struct Summary {
     pub(crate) runs: Vec<RunTimes>,
     /// How many objects have no label, by the reason.
     pub unlabelled: BTreeMap<UnlabelledReason, u64>,
-    /// Seen share of each object without a label, 0 to 1.
+    /// Visible share of each object without a label, 0 to 1.
     pub unlabelled_visible: Vec<f64>,
     /// All samples, in order of number.
     pub glances: Vec<SampleSummary>,
 }
 
-/// What a sample is like in a few numbers.
+/// A sample in a few numbers.
 #[derive(Clone, Debug)]
 pub struct SampleSummary {
     /// Its number.
@@ -60,11 +60,11 @@ pub struct SampleSummary {
     pub files: [String; 2],
     /// Width and height of the picture, pixels.
     pub image: [u32; 2],
-    /// How many objects are in it.
+    /// How many objects it contains.
     pub objects: usize,
     /// Class and box of each object with a label, pixels.
     pub labels: Vec<(u32, BBox)>,
-    /// Seen share of the object with a label that is seen least; 1 where there is none.
+    /// Visible share of the labelled object that is least visible; 1 if there is none.
     pub least_visible: f64,
     /// How many scenes were rejected before this one.
     pub rejected: usize,
@@ -73,15 +73,15 @@ pub struct SampleSummary {
 /// Why an object has no label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum UnlabelledReason {
-    /// Another lies over it: it is obstructed.
+    /// It is obstructed: another object covers it.
     Covered,
-    /// Nothing of it lies in the picture.
+    /// Nothing of it is in the picture.
     Outside,
-    /// Too much of it lies outside of the picture.
+    /// Too much of it is outside the picture.
     Truncated,
     /// No pixel shows enough of it to be in its mask.
     NoMask,
-    /// The recipe or the format leaves it out.
+    /// The recipe or the format excludes it.
     LeftOut,
 }
 
@@ -133,7 +133,7 @@ impl Summary {
     /// Reads a dataset's folder.
     ///
     /// # Errors
-    /// A folder that is no dataset or one of archives alone, or was written without its sidecars.
+    /// A folder that is no dataset or one of archives only, or was written without its sidecars.
     pub fn read(folder: &Path) -> Result<Self> {
         let mut summary = Self::empty(folder)?;
         let lines = lines_of(folder)?;
@@ -153,7 +153,7 @@ impl Summary {
         Ok(summary)
     }
 
-    /// A dataset of which no sample was read yet.
+    /// A dataset from which no sample was read yet.
     fn empty(folder: &Path) -> Result<Self> {
         let identity = folder::identity_of_files(folder)?;
         let classes = folder::known_classes(&identity);
@@ -174,7 +174,7 @@ impl Summary {
         })
     }
 
-    /// A sample to look at, by its place among the glances.
+    /// A sample to look at, by its index among the glances.
     ///
     /// # Errors
     /// A record that cannot be read.
@@ -204,10 +204,9 @@ impl Summary {
         })
     }
 
-    /// The share in the recipe of what happens by chance, 0 to 1; none for a key that is drawn
-    /// otherwise.
+    /// The probability of an event in the recipe, 0 to 1; none for a key that is drawn otherwise.
     ///
-    /// What is drawn of it is uniform from 0 to 1, and it happens where that lies below the share.
+    /// The drawn number is uniform from 0 to 1; the event happens if it is below the probability.
     pub fn chance(&self, key: &str) -> Option<f64> {
         let [_, share] = CHANCES.iter().find(|[drawn, _]| *drawn == key)?;
         let recipe = self.narrowed_recipe()?;
@@ -235,7 +234,7 @@ impl Summary {
         self.rejected.extend(rejected);
     }
 
-    /// Whether a sample shares its draws with none before it, as pictures of a sequence do.
+    /// Whether a sample does not share its draws with an earlier one, as pictures of a sequence do.
     fn is_drawn_anew(&self, sample: &ReadSample) -> bool {
         let belt = sample.record.drawn.belt;
         let frames = belt.map_or(1, |belt| belt.frames.max(1));
@@ -320,14 +319,14 @@ impl SampleSummary {
     }
 }
 
-/// The keys of draws that decide whether something happens, each with that of its share in the
-/// recipe.
+/// The keys of draws that decide whether something happens, each with the key of its probability in
+/// the recipe.
 const CHANCES: [[&str; 2]; 2] = [
     ["start.face_down", "start.face_down"],
     ["negative", "negatives"],
 ];
 
-/// Records that are read at a time.
+/// Number of records that are read at a time.
 const RECORDS_PER_BATCH: usize = 256;
 
 impl ReadSample {
@@ -345,8 +344,8 @@ impl ReadSample {
     }
 }
 
-/// The key in the recipe of a draw's distribution; none for a choice from a list and for a rotation
-/// that was resampled.
+/// The key in the recipe of a draw's distribution; none for a choice from a list or a rotation that
+/// was resampled.
 fn key(path: &str) -> Option<String> {
     if is_choice(path) || path.contains('#') {
         return None;

@@ -7,11 +7,11 @@ use std::io::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Name of the file that tells how long each run took: of the machine and the day, and no part of
-/// the dataset.
+/// Name of the file that records how long each run took: specific to the machine and the day, and
+/// no part of the dataset.
 pub(crate) const RUNS: &str = ".runs.jsonl";
 
-/// Time that samples took, by stage: the sum over samples, not over the clock.
+/// Time that samples took, by stage: summed over samples, not wall time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Times {
     /// Drawing, falling and coming to rest, exposure.
@@ -27,11 +27,11 @@ pub struct Times {
 /// A line of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RunTimes {
-    /// Samples made.
+    /// Number of samples made.
     pub(crate) made: u64,
-    /// Threads that made them.
+    /// Number of threads that made them.
     pub(crate) threads: usize,
-    /// Seconds by the clock.
+    /// Wall time, seconds.
     pub(crate) wall_s: f64,
     /// Seconds of all threads, by stage.
     pub(crate) settle_s: f64,
@@ -50,8 +50,7 @@ impl std::ops::AddAssign for Times {
 }
 
 impl Times {
-    /// Adds a line to the folder's list of runs. It is a note, so a disk without room for it is no
-    /// error.
+    /// Adds a line to the folder's list of runs. It is only a note, so a full disk is no error.
     pub(crate) fn append(&self, folder: &Path, made: u64, wall: Duration) {
         if made > 0
             && let Err(e) = RunTimes::new(self, made, wall).append(&folder.join(RUNS))
@@ -90,7 +89,7 @@ pub(crate) fn runs_of(folder: &Path) -> Vec<RunTimes> {
     lines.filter_map(|line| line.ok()).collect()
 }
 
-/// What a closure gives, and how long it took.
+/// The result of a closure, and how long it took.
 pub(crate) fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     let began = Instant::now();
     let done = work();

@@ -1,4 +1,4 @@
-//! Labels as Pascal VOC writes them: one XML file for each image, and lists of images.
+//! Labels in Pascal VOC format: one XML file for each image, and lists of images.
 
 use crate::dataset::paths::{create_part_folders, remove_files};
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
@@ -12,16 +12,16 @@ use std::path::{Path, PathBuf};
 
 /// Writes `voc/{train,val}/NNNNNN.xml` and the lists `voc/{train,val}.txt`.
 ///
-/// Pixels are counted from 1 and the last is inside, as in the Pascal VOC challenges. `truncated`
-/// is an object that touches the picture's edge, with `labels.max_truncation` one whose outline
-/// reaches beyond it; `occluded` is one that something lies over, `difficult` one that is to be
-/// ignored. Boxes end at the picture's edges.
+/// Pixels are counted from 1 and the last is inclusive, as in the Pascal VOC challenges.
+/// `truncated` is an object that touches the picture's edge, or with `labels.max_truncation` one
+/// whose outline extends beyond it; `occluded` is one that something covers, `difficult` one that
+/// is to be ignored. Boxes end at the picture's edges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Voc {
-    /// Whether boxes are those of the whole object or of what is seen. Default: `amodal`.
+    /// Whether boxes are those of the whole object or of its visible part. Default: `amodal`.
     pub boxes: Extent,
-    /// Format of the pictures that it names; in a recipe, that of `pictures`.
+    /// Format of the pictures that it refers to; in a recipe, that of `pictures`.
     #[serde(skip)]
     pub pictures: PictureFormat,
 }
@@ -81,7 +81,7 @@ impl Voc {
         )
     }
 
-    /// Nothing for an object without a box.
+    /// Empty for an object without a box.
     fn object(&self, entry: &Entry<'_>, label: &LabelledObject<'_>) -> String {
         let (b, _) = self.boxes.of(label.object);
         if b.is_empty() {
@@ -120,7 +120,7 @@ fn side_element((side, at): (&str, u64)) -> String {
     format!("      <{side}>{at}</{side}>\n")
 }
 
-/// By its outline, where that was measured.
+/// By its outline, if that was measured.
 fn is_truncated(object: &ObjectLabel, b: &BBox, entry: &Entry<'_>) -> bool {
     match object.truncation {
         Some(truncation) => truncation.fraction > 0.0,
@@ -128,13 +128,13 @@ fn is_truncated(object: &ObjectLabel, b: &BBox, entry: &Entry<'_>) -> bool {
     }
 }
 
-/// The object reaches a border of the image.
+/// Whether the object touches a border of the image.
 fn is_cut(b: &BBox, image: [u32; 2]) -> bool {
     let [w, h] = image.map(f64::from);
     b.x0 <= 0.0 || b.y0 <= 0.0 || b.x1 >= w || b.y1 >= h
 }
 
-/// Text that XML does not take for its own; what XML cannot hold at all becomes a space.
+/// Text with XML's special characters escaped; characters that XML cannot hold become spaces.
 fn escaped(text: &str) -> String {
     let mut xml = String::new();
     for letter in text.chars() {
@@ -149,7 +149,7 @@ fn escaped(text: &str) -> String {
     xml
 }
 
-/// The samples of a part, a line each.
+/// The samples of a part, one per line.
 fn numbers_of(part: Part, samples: &[Written]) -> String {
     let samples = samples.iter().filter(|sample| sample.part == part);
     samples.map(|sample| format!("{:06}\n", sample.k)).collect()

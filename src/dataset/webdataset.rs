@@ -1,4 +1,4 @@
-//! Samples in tar archives that are read from front to back: WebDataset.
+//! Samples in tar archives that are read sequentially: WebDataset.
 
 use crate::dataset::{Entry, Part, Writer, Written};
 use crate::error::{Error, Result};
@@ -9,17 +9,16 @@ use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes `webdataset/{train,val}-NNNNNN.tar`, each with the files of a span of numbers: at the
-/// default of 500 number 2 holds the samples 1000 to 1499, those for training and those for validation
-/// apart.
+/// Writes `webdataset/{train,val}-NNNNNN.tar`, each with the files of a span of numbers: at the default of 500, number
+/// 2 holds the samples 1000 to 1499; those for training and those for validation are separate.
 ///
-/// Files of a sample are called by its number: `000000012.png`, `000000012.json`; where two writers
-/// have one of the same kind, the later one's is called `000000012.FOLDER.json` after its folder.
+/// Files of a sample are named by its number: `000000012.png`, `000000012.json`; if two writers
+/// have one of the same kind, the later one's is named `000000012.FOLDER.json` after its folder.
 /// There is no empty archive. Times and owners are zero, so the same samples give the same bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WebDataset {
-    /// Numbers that an archive has room for, at least 1. Default: 500.
+    /// Numbers per archive, at least 1. Default: 500.
     pub samples: u64,
 }
 
@@ -32,7 +31,7 @@ impl Default for WebDataset {
 /// Its folder.
 const KIND: &str = "webdataset";
 
-/// Everyone may read, the owner may write.
+/// Everyone may read; the owner may write.
 const FILE_MODE: u32 = 0o644;
 
 impl Writer for WebDataset {
@@ -77,7 +76,7 @@ impl WebDataset {
         }
     }
 
-    /// The first number of an archive, and the first of the next one, of a dataset of `count`.
+    /// The first number of an archive, and that of the next one, in a dataset of `count`.
     pub(super) fn span(&self, archive: u64, count: u64) -> (u64, u64) {
         let first = archive.saturating_mul(self.samples);
         (first, first.saturating_add(self.samples).min(count))
@@ -100,17 +99,17 @@ impl WebDataset {
     }
 }
 
-/// Writes an archive of samples whose files lie in a folder.
+/// Writes an archive of samples whose files are in a folder.
 pub(super) fn write_archive(path: &Path, folder: &Path, samples: &[&Written]) -> Result<()> {
     io::write_through(path, |out| pack(out, folder, samples))
 }
 
-/// Whether an archive has so many samples and ends behind the last of their files.
+/// Whether an archive has this many samples and ends after the last of their files.
 pub(super) fn is_whole(path: &Path, samples: u64) -> bool {
     path.is_file() && samples_in(path).is_ok_and(|found| found == Some(samples))
 }
 
-/// Samples in an archive, none of one that does not end as it was written to.
+/// Number of samples in an archive; none if its end is missing.
 fn samples_in(path: &Path) -> std::io::Result<Option<u64>> {
     let file = File::open(path)?;
     let bytes = file.metadata()?.len();
@@ -125,7 +124,7 @@ fn samples_in(path: &Path) -> std::io::Result<Option<u64>> {
     Ok(is_complete.then_some(keys.len() as u64))
 }
 
-/// Archives are made of such blocks.
+/// Block size of tar archives.
 const BLOCK_BYTES: u64 = 512;
 
 fn end_of(entry: &tar::Entry<'_, impl Read>) -> u64 {
@@ -134,12 +133,12 @@ fn end_of(entry: &tar::Entry<'_, impl Read>) -> u64 {
     entry.raw_file_position().saturating_add(bytes)
 }
 
-/// What the names of a sample's files begin with.
+/// The common start of the names of a sample's files.
 fn key_of(name: &[u8]) -> &[u8] {
     name.split(|&byte| byte == b'.').next().unwrap_or(name)
 }
 
-/// Where an archive of a dataset is.
+/// Path of an archive of a dataset.
 pub(super) fn archive(folder: &Path, part: Part, i: u64) -> PathBuf {
     folder
         .join(KIND)
@@ -188,7 +187,7 @@ fn is_archive(name: &str, part: Part) -> bool {
     name.starts_with(&format!("{}-", part.name())) && name.ends_with(".tar")
 }
 
-/// Digits of a sample's number, so that names are in order up to the largest dataset.
+/// Digits of a sample's number: enough to keep names in order up to the largest dataset.
 const KEY_DIGITS: usize = 9;
 
 /// The files of a sample and their names in an archive.

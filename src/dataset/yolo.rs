@@ -13,35 +13,35 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// What trainers are given.
+/// The file to give to trainers.
 const DATA_YAML: &str = "data.yaml";
 
-/// Least side of an image, pixels: trainers refuse smaller ones.
+/// Minimum side of an image, pixels: trainers reject smaller ones.
 pub(crate) const MIN_SIDE_PX: u32 = 10;
 
 /// Writes `labels/{train,val}/NNNNNN.txt` and `data.yaml`.
 ///
 /// Rows of `detect` are `class cx cy w h`, of `segment` `class x1 y1 x2 y2 ...`; positions are
 /// shares of the image's width and height, 0 to 1, six decimals. An image without objects has an
-/// empty file; equal rows are written once; objects that are to be ignored have none.
+/// empty file; equal rows are written once; objects to be ignored have none.
 ///
 /// `data.yaml` names its folders relative to itself, so the dataset may be moved: Ultralytics looks
-/// for them beside the file; YOLOv5 looks in the folder of its clone, until `path:` is added with
-/// the whole path of the dataset.
+/// for them next to the file; YOLOv5 looks in the folder of its clone unless `path:` is added with
+/// the absolute path of the dataset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Yolo {
     /// What is learned. Default: `detect`.
     pub task: YoloTask,
-    /// Whether rows tell of the whole object or of what is seen. Default: `amodal`.
+    /// Whether rows describe the whole object or its visible part. Default: `amodal`.
     pub boxes: Extent,
-    /// How far a border may be from that of the mask, pixels; in a recipe, that of `labels`.
+    /// Maximum distance of a border from that of the mask, pixels; in a recipe, that of `labels`.
     /// Default: 0, along pixels.
     #[serde(skip_deserializing, skip_serializing_if = "is_exact")]
     pub simplify: f64,
 }
 
-/// What a row tells.
+/// What a row describes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum YoloTask {

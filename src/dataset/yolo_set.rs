@@ -1,5 +1,5 @@
-//! A YOLO dataset on disk, of petcomp's or of the user's own: which images, which classes; and a
-//! choice of its images, as lists that trainers read, without copies.
+//! A YOLO dataset on disk, petcomp's or the user's own: which images, which classes; and selections
+//! of its images, as lists that trainers read, without copies.
 
 use crate::dataset::Part;
 use crate::dataset::listing::{images_in, is_list, place_of, whole_path};
@@ -15,22 +15,23 @@ use std::path::{Path, PathBuf};
 pub struct YoloSet {
     /// Names of the classes, in order.
     pub classes: Vec<String>,
-    /// Images to learn from, in natural order of path or as listed.
+    /// Images for training, in natural order of path or as listed.
     pub train: Vec<PathBuf>,
-    /// Images to choose the best model by.
+    /// Images for validation, to choose the best model by.
     pub val: Vec<PathBuf>,
-    /// Folders and lists of images to test with, as they are named; often none.
+    /// Folders and lists of test images, as they are named; often none.
     pub test: Vec<PathBuf>,
 }
 
 impl YoloSet {
-    /// Reads what `FOLDER/data.yaml` names: folders of images, or text files that list them, a line
-    /// each, relative to the list; all relative to its `path:`, which is relative to the folder.
+    /// Reads what `FOLDER/data.yaml` names: folders of images, or text files that list them, one
+    /// per line, relative to the list; all relative to its `path:`, which is relative to the
+    /// folder.
     ///
-    /// A part may be empty, and both parts the same, of a set that is still to be split.
+    /// In a set that is still to be split, a part may be empty, and both parts may be the same.
     ///
     /// # Errors
-    /// [`Error::File`] for a `data.yaml` that is missing or that trainers would not take, a folder
+    /// [`Error::File`] for a `data.yaml` that is missing or that trainers would reject, or a folder
     /// or list that cannot be read.
     pub fn read(folder: &Path) -> Result<Self> {
         let folder = whole_path(folder)?;
@@ -46,10 +47,10 @@ impl YoloSet {
         })
     }
 
-    /// The files that choose the images of a set: `data.yaml` and the lists that it names.
+    /// The files that select the images of a set: `data.yaml` and the lists that it names.
     ///
     /// # Errors
-    /// [`Error::File`] for a `data.yaml` that is missing or that trainers would not take.
+    /// [`Error::File`] for a `data.yaml` that is missing or that trainers would reject.
     pub fn choosing_files(folder: &Path) -> Result<Vec<PathBuf>> {
         let folder = whole_path(folder)?;
         let yaml = read_yaml(&folder)?;
@@ -61,7 +62,7 @@ impl YoloSet {
         Ok(lists.chain([folder.join("data.yaml")]).collect())
     }
 
-    /// The set of [`YoloSet::read`] to train on, whose parts both have images.
+    /// As [`YoloSet::read`], for training: both parts must have images.
     ///
     /// # Errors
     /// Those of [`YoloSet::read`], and [`Error::File`] for a part without images.
@@ -75,7 +76,7 @@ impl YoloSet {
     }
 
     /// Names of the classes of the set that a folder of labels (`labels/val`, `labels`) belongs to,
-    /// as the `data.yaml` above it has them, whatever images there are; none without a `data.yaml`.
+    /// from the `data.yaml` above it, whatever images exist; none without a `data.yaml`.
     ///
     /// # Errors
     /// [`Error::File`] for a `data.yaml` that cannot be read or does not name the classes.
@@ -87,8 +88,8 @@ impl YoloSet {
         names.map_err(|(line, what)| yaml_problem(&path, line, &what))
     }
 
-    /// How many numbers of keypoints stand behind the box in the labels of a folder (`labels/val`,
-    /// `labels`), as far as a `data.yaml` above it tells; 0 without its `kpt_shape`.
+    /// How many numbers of keypoints follow the box in the labels of a folder (`labels/val`,
+    /// `labels`), according to a `data.yaml` above it; 0 without its `kpt_shape`.
     ///
     /// # Errors
     /// [`Error::File`] for an invalid `kpt_shape`.
@@ -113,7 +114,7 @@ impl YoloSet {
         label_of(image)
     }
 
-    /// The same set with other images to learn from and to choose the best model by.
+    /// The same set with other images for training and validation.
     pub(super) fn with_parts(&self, [train, val]: [Vec<PathBuf>; 2]) -> Self {
         Self {
             classes: self.classes.clone(),
@@ -123,8 +124,8 @@ impl YoloSet {
         }
     }
 
-    /// All images in natural order of name (`frame2` before `frame10`), each once: the series as it
-    /// was taken.
+    /// All images in natural order of name (`frame2` before `frame10`), each once: the series in
+    /// the order it was taken.
     pub fn series(&self) -> Vec<PathBuf> {
         let mut all = [&self.train[..], &self.val[..]].concat();
         all.sort_by(|a, b| compare_names(a, b));
@@ -145,13 +146,14 @@ impl YoloSet {
         Ok(self.with_parts([&self.train, &self.val].map(|images| first_share(images, share))))
     }
 
-    /// Those files of a set, or of a folder of images with labels, that `output` may be: the ones
-    /// that choose the images, and images and labels of its name; none of a file that is not there.
+    /// The files of a set, or of a folder of images with labels, that `output` may coincide with:
+    /// those that select the images, and images and labels of the same name; none if `output` does
+    /// not exist.
     ///
     /// # Errors
     /// Those of [`YoloSet::read`]; [`Error::File`] for a folder that cannot be listed.
     pub fn files_like(folder: &Path, output: &Path) -> Result<Vec<PathBuf>> {
-        // A file that is not there yet is none of theirs, which may have very many.
+        // A file that does not exist yet is none of theirs, of which there may be very many.
         let Ok(real) = output.canonicalize() else {
             return Ok(Vec::new());
         };
@@ -164,10 +166,10 @@ impl YoloSet {
         Ok(files)
     }
 
-    /// Writes `train.txt`, `val.txt` and `data.yaml`; what lies below the folder is relative to it.
+    /// Writes `train.txt`, `val.txt` and `data.yaml`; paths below the folder are relative to it.
     ///
     /// # Errors
-    /// When a file cannot be written; before any is, for an image whose name is not UTF-8.
+    /// If a file cannot be written; before any is written, for an image whose name is not UTF-8.
     pub fn write(&self, folder: &Path) -> Result<()> {
         let whole = whole_path(folder)?;
         let [train, val] = Part::ALL.map(|part| list_of(self.part(part), &whole));
@@ -181,7 +183,7 @@ impl YoloSet {
         io::write_text(whole.join("data.yaml"), &yaml)
     }
 
-    /// What to test with as a `data.yaml` in the folder names it.
+    /// The test images as a `data.yaml` in the folder names them.
     fn test_places(&self, folder: &Path) -> Result<Vec<String>> {
         let places = self.test.iter();
         places
@@ -191,7 +193,7 @@ impl YoloSet {
     }
 }
 
-/// An image and where its label may be: in the folder of labels, or beside it.
+/// An image and where its label may be: in the folder of labels, or next to it.
 fn with_labels(image: PathBuf) -> [PathBuf; 3] {
     [label_of(&image), image.with_extension("txt"), image]
 }
@@ -204,7 +206,7 @@ fn yaml_above(labels: &Path) -> Result<Option<PathBuf>> {
     Ok(paths.find(|path| path.is_file()))
 }
 
-/// The `data.yaml` of a folder, as trainers would take it.
+/// The `data.yaml` of a folder, as trainers would read it.
 fn read_yaml(folder: &Path) -> Result<DataYaml> {
     let path = folder.join("data.yaml");
     let (yaml, problems) = DataYaml::read(&io::read_text(&path)?);
@@ -239,7 +241,8 @@ fn first_share(images: &[PathBuf], share: f64) -> Vec<PathBuf> {
     images[..whole_share(images.len(), share)].to_vec()
 }
 
-/// So much of a count, rounded down; what is whole but for the ratio's rounding stays whole.
+/// This share of a count, rounded down; a product that is whole except for rounding errors of the
+/// ratio stays whole.
 pub(super) fn whole_share(count: usize, ratio: f64) -> usize {
     (count as f64 * ratio + 1e-9) as usize
 }
@@ -250,8 +253,8 @@ fn list_of(images: &[PathBuf], folder: &Path) -> Result<String> {
     lines.collect()
 }
 
-/// Trainers take `./` for the list's folder, older ones each `./` of a line, that of `../` too: what
-/// lies elsewhere has its whole path.
+/// Trainers replace `./` by the list's folder, older ones every `./` in a line, even that of `../`: so images elsewhere
+/// have an absolute path.
 fn list_line(image: &Path, folder: &Path) -> Result<String> {
     Ok(match image.strip_prefix(folder) {
         Ok(below) => format!("./{}\n", io::path_text(below)?),

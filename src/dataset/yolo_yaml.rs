@@ -1,40 +1,39 @@
 //! `data.yaml`: the description of a YOLO dataset, written and read.
 //!
-//! It is read event by event with `saphyr-parser`: values that nobody asks for are skipped without
-//! being built, aliases are followed for texts and lists of texts alone, and findings name their
-//! line.
+//! It is read event by event with `saphyr-parser`: unneeded values are skipped without being built,
+//! aliases are followed only for texts and lists of texts, and findings name their line.
 
 use crate::dataset::Part;
 use saphyr_parser::{Event, Parser, ScalarStyle, ScanError, Span, StrInput};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What a `data.yaml` says.
+/// Content of a `data.yaml`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct DataYaml {
     path: Option<String>,
     train: Vec<String>,
     val: Vec<String>,
-    /// The folders (or lists) of images to test with, below the dataset's; often none.
+    /// The folders (or lists) of test images, below the dataset's; often none.
     pub(crate) test: Vec<String>,
     nc: Option<usize>,
     /// Names of the classes, in order.
     pub(crate) names: Vec<String>,
-    /// The line of `kpt_shape`, and how many numbers the keypoints in a label have by it or what is
-    /// wrong with it; none of labels without keypoints.
+    /// The line of `kpt_shape`, and how many numbers the keypoints in a label have according to it,
+    /// or what is wrong with it; none for labels without keypoints.
     keypoints: Option<(usize, Result<usize, String>)>,
 }
 
-/// Most classes that are numbered where `nc` alone tells of them.
+/// Maximum number of classes that are numbered if there is only `nc`.
 const MAX_NUMBERED_CLASSES: usize = 10_000;
 
 /// Maximum number of keypoints of an object.
 const MAX_KEYPOINTS: usize = 10_000;
 
-/// What is wrong with a set whose labels have keypoints.
+/// The problem of a set whose labels have keypoints.
 const KEYPOINTS: &str = "kpt_shape: labels with keypoints, expected boxes (class cx cy w h) or outlines and no kpt_shape";
 
-/// A line, where it is known, and what is wrong there.
+/// A line, if known, and what is wrong there.
 type Problem = (Option<usize>, String);
 
 impl DataYaml {
@@ -46,14 +45,14 @@ impl DataYaml {
         }
     }
 
-    /// Where the folders of the parts are, for a file in `folder`.
+    /// The folder that those of the parts are relative to, for a file in `folder`.
     pub(crate) fn root(&self, folder: &Path) -> PathBuf {
         self.path
             .as_deref()
             .map_or_else(|| folder.to_path_buf(), |path| folder.join(path))
     }
 
-    /// Number of classes that have a name, if only a numbered one, whatever `nc` claims; none
+    /// Number of classes that have a name, even if it is only a number, whatever `nc` is; none
     /// without names.
     pub(crate) fn class_count(&self) -> Option<usize> {
         Some(self.names.len()).filter(|&n| n > 0)
@@ -64,7 +63,7 @@ impl DataYaml {
         Self::write_with(classes, &[], |part| format!("images/{part}"))
     }
 
-    /// The text of a `data.yaml` whose parts lie where `place` says, with these places to test with.
+    /// The text of a `data.yaml` whose parts are at the paths that `place` returns, with these test paths.
     pub(crate) fn write_with(
         classes: &[String],
         test: &[String],
@@ -77,14 +76,14 @@ impl DataYaml {
             yaml += &format!("{}: {}\n", part.name(), place(part.name()));
         }
         if !test.is_empty() {
-            // A JSON list of strings is a YAML one, whatever is in it.
+            // A JSON list of strings is a YAML one, whatever the strings contain.
             yaml += &format!("test: {}\n", serde_json::Value::from(test));
         }
         yaml += &format!("nc: {}\nnames:\n", classes.len());
         yaml + &yaml_names(classes)
     }
 
-    /// Reads the keys that trainers need; all others are skipped. What could be read stays,
+    /// Reads the keys that trainers need; all others are skipped. What could be read is kept,
     /// whatever else is wrong.
     pub(crate) fn read(text: &str) -> (Self, Vec<Problem>) {
         let (yaml, mut problems) = Self::read_given(text);
@@ -93,7 +92,7 @@ impl DataYaml {
         (yaml, problems)
     }
 
-    /// The names of the classes alone, whatever else is missing, of labels with keypoints too.
+    /// Only the names of the classes, whatever else is missing; also for labels with keypoints.
     pub(crate) fn read_names(text: &str) -> Result<Vec<String>, Problem> {
         let (yaml, problems) = Self::read_given(text);
         let unnamed = yaml.names_problem().map(|what| (None, what));
@@ -103,8 +102,8 @@ impl DataYaml {
         }
     }
 
-    /// How many numbers the keypoints in a label have by `kpt_shape`, whatever else is wrong; 0
-    /// without it.
+    /// How many numbers the keypoints in a label have according to `kpt_shape`, whatever else is
+    /// wrong; 0 without it.
     pub(crate) fn read_keypoint_numbers(text: &str) -> Result<usize, Problem> {
         match Self::read_given(text).0.keypoints {
             None => Ok(0),
@@ -112,7 +111,7 @@ impl DataYaml {
         }
     }
 
-    /// What is there, and what is wrong with it; keypoints are wrong for some readers alone.
+    /// The content, and what is wrong with it; keypoints are wrong only for some readers.
     fn read_given(text: &str) -> (Self, Vec<Problem>) {
         let (mut yaml, mut problems) = (Self::default(), Vec::new());
         let read = Reader::new(text).read_keys(|key, line, value| {
@@ -125,7 +124,7 @@ impl DataYaml {
         (yaml, problems)
     }
 
-    /// Names as Ultralytics gives them where `nc` alone tells of the classes.
+    /// Names the classes as Ultralytics does if there is only `nc`.
     fn number_classes(&mut self) {
         let count = self.nc.filter(|&nc| nc <= MAX_NUMBERED_CLASSES);
         if self.names.is_empty() {
@@ -153,7 +152,7 @@ impl DataYaml {
         Ok(())
     }
 
-    /// Names as `[a, b]` or as `0: a`, in any order, whose numbers leave none out.
+    /// Names as `[a, b]` or as `0: a`, in any order, with no number left out.
     fn set_names(&mut self, value: Value) -> Result<(), Problem> {
         let Value::Map(mut entries) = value else {
             self.names = value.texts("names")?;
@@ -164,7 +163,7 @@ impl DataYaml {
         };
         entries.sort_by_key(|(_, key, _)| key.parse().unwrap_or(usize::MAX));
         let mut wrong = Ok(());
-        // Of a key that stands twice trainers take the last value.
+        // If a key is repeated, trainers use the last value.
         self.names.clear();
         for (expected, (line, key, name)) in entries.into_iter().enumerate() {
             if wrong.is_ok() && key != expected.to_string() {
@@ -209,7 +208,7 @@ enum Value {
     List(Vec<String>),
     /// Line, key and value of each entry.
     Map(Vec<(usize, String, String)>),
-    /// Lists of lists and the like.
+    /// Nested lists and the like.
     Other,
 }
 
@@ -258,13 +257,13 @@ impl Value {
     }
 }
 
-/// Plain texts that stand for nothing.
+/// Plain texts that mean null.
 const NULLS: [&str; 5] = ["", "~", "null", "Null", "NULL"];
 
-/// Deeper documents are refused: a parser's work grows with the square of the depth.
+/// Deeper documents are rejected: a parser's work grows with the square of the depth.
 const MAX_DEPTH: usize = 64;
 
-/// Aliases may add so many times the document's length: "billion laughs" ends there.
+/// Aliases may add this many times the document's length, which stops "billion laughs".
 const MAX_ALIAS_GROWTH: usize = 4;
 
 /// The events of a document.
@@ -284,7 +283,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Hands over each key of the first document with its line and value.
+    /// Passes each key of the first document with its line and value to `set`.
     fn read_keys(&mut self, mut set: impl FnMut(&str, usize, Value)) -> Result<(), Problem> {
         if !self.enter_document()? {
             return Ok(());
@@ -303,7 +302,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Goes to the first key; false where there is none.
+    /// Goes to the first key; false if there is none.
     fn enter_document(&mut self) -> Result<bool, Problem> {
         loop {
             match self.next()?.0 {
@@ -325,7 +324,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The value that an event begins.
+    /// The value that begins with an event.
     fn value(&mut self, event: Event<'a>) -> Result<Value, Problem> {
         let (anchor, value) = match event {
             Event::Alias(anchor) => return self.alias(anchor),
@@ -347,7 +346,7 @@ impl<'a> Reader<'a> {
         Ok(value)
     }
 
-    /// The rest of a list; one of other things than texts is [`Value::Other`].
+    /// The rest of a list; [`Value::Other`] if anything in it is not text.
     fn list(&mut self) -> Result<Value, Problem> {
         let (mut texts, mut is_plain) = (Vec::new(), true);
         loop {
@@ -367,7 +366,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// The rest of a mapping; one of other things than texts is [`Value::Other`].
+    /// The rest of a mapping; [`Value::Other`] if anything in it is not text.
     fn map(&mut self) -> Result<Value, Problem> {
         let (mut entries, mut is_plain) = (Vec::new(), true);
         loop {
@@ -427,7 +426,7 @@ impl<'a> Reader<'a> {
 pub(crate) fn yaml_names(classes: &[String]) -> String {
     let names = classes.iter().enumerate();
     names
-        // A JSON string is a YAML string, whatever is in it.
+        // A JSON string is a YAML string, whatever it contains.
         .map(|(i, name)| format!("  {i}: {}\n", serde_json::Value::from(name.as_str())))
         .collect()
 }
@@ -548,7 +547,7 @@ mod tests {
         let numbers = DataYaml::read_keypoint_numbers;
         assert_eq!(numbers(text), Ok(8));
         assert_eq!(numbers("names: 3\nkpt_shape:\n"), Ok(0));
-        // Of a key that stands twice trainers take the last value.
+        // If a key is repeated, trainers use the last value.
         assert_eq!(numbers("kpt_shape: [4, 3]\nkpt_shape:\n"), Ok(0));
         let expected = "kpt_shape: expected [number of points, 2 or 3]";
         for bad in ["17", "[17]", "[17, 4]", "[0, 3]"] {
