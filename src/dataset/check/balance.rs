@@ -59,8 +59,8 @@ impl Checked {
         sides
     }
 
-    /// What is not wrong but good to know: classes with no labels or few, boxes that are very
-    /// small.
+    /// Notes on what is not wrong but worth knowing: classes with few or no labels, very small
+    /// boxes.
     pub fn notes(&self) -> Vec<Diagnostic> {
         let classes = (0..self.classes.len()).flat_map(|class| self.class_notes(class));
         classes.chain(self.tiny_boxes()).collect()
@@ -99,7 +99,7 @@ impl Checked {
     }
 }
 
-/// Of numbers in order.
+/// Of sorted numbers.
 fn min_median_max(sorted: &[f64]) -> Option<[f64; 3]> {
     Some([*sorted.first()?, sorted[sorted.len() / 2], *sorted.last()?])
 }

@@ -11,18 +11,18 @@ use crate::io;
 use crate::pixel::PremulRgba;
 use std::path::{Path, PathBuf};
 
-/// What an image and its labels are like.
+/// An image and its labels.
 pub(super) struct CheckedImage {
     pub(super) path: PathBuf,
     pub(super) part: Part,
     pub(super) findings: Vec<Finding>,
     /// The good rows of its label file.
     pub(super) rows: Vec<LabelRow>,
-    /// It has a label file without rows.
+    /// Whether it has a label file without rows.
     pub(super) is_empty: bool,
-    /// None where it cannot be read.
+    /// None if the image cannot be read.
     thumbnail: Option<Thumbnail>,
-    /// Of its label file, for comparing; none where there is none or a row is bad.
+    /// From its label file, for comparison; none if there is no file or a row is bad.
     boxes: Option<Vec<GroundTruth>>,
     /// Size and checksum of its file.
     pub(super) checksum: Option<(u64, u32)>,
@@ -52,7 +52,7 @@ impl CheckedImage {
         image
     }
 
-    /// What it is compared by; none where it cannot be read.
+    /// The features it is compared by; none if it cannot be read.
     pub(super) fn look(&self) -> Option<Look> {
         Some(Look {
             thumbnail: self.thumbnail.clone()?,

@@ -5,13 +5,13 @@ use crate::diagnostic::Code;
 use crate::eval::KnownRows;
 use std::path::Path;
 
-/// Class of a row, and the sides of its box; none of an outline.
+/// Class of a row, and the sides of its box; none for an outline.
 pub(super) type LabelRow = (usize, Option<[f64; 2]>);
 
-/// A row with more columns makes its file one of outlines, as trainers have it.
+/// As in trainers, a row with more columns means that the rows of its file are outlines.
 const MAX_BOX_COLUMNS: usize = 6;
 
-/// The good rows of a label file, and what is wrong with the others. Without a number of classes
+/// The good rows of a label file, and the findings about the others. Without a number of classes
 /// there are no good rows.
 pub(super) fn read_rows(
     path: &Path,
@@ -33,7 +33,7 @@ pub(super) fn read_rows(
     (good, findings)
 }
 
-/// The columns of each row that is not empty, with its line.
+/// The columns of each row that is not empty, with its line number.
 fn split_rows(text: &str) -> Vec<(usize, Vec<&str>)> {
     let rows = text.lines();
     let rows = rows.map(|row| row.split_whitespace().collect::<Vec<_>>());
@@ -43,9 +43,9 @@ fn split_rows(text: &str) -> Vec<(usize, Vec<&str>)> {
         .collect()
 }
 
-/// What the rows of a file must look like.
+/// The required format of the rows of a file.
 struct RowFormat {
-    /// Rows are outlines, not boxes.
+    /// Whether rows are outlines, not boxes.
     outlines: bool,
     class_count: Option<usize>,
 }
@@ -73,7 +73,7 @@ impl RowFormat {
         Ok(values)
     }
 
-    /// The numbers of a row that is none of those before.
+    /// The numbers of a row that does not repeat an earlier one.
     fn parse_new(&self, row: &[&str], known: &mut KnownRows) -> Result<Vec<f64>, (Code, String)> {
         let values = self.parse(row).map_err(|what| (Code::BadLabelRow, what))?;
         match known.insert(values.iter().copied()) {

@@ -1,4 +1,4 @@
-//! Would trainers take this dataset? Everything they would not, with its file and line.
+//! Would trainers accept this dataset? Everything they would not, with its file and line.
 
 mod balance;
 mod image;
@@ -31,15 +31,15 @@ pub struct Checked {
     pub findings: Vec<Finding>,
     /// Number of images that were checked.
     pub images: usize,
-    /// Rows of label files for each class that has a name, in order.
+    /// Number of rows of label files for each class that has a name, in order.
     pub rows: Vec<usize>,
     /// The labels of all good rows.
     pub boxes: Vec<CheckedBox>,
     /// Names of the classes, in order.
     pub classes: Vec<String>,
-    /// Whether there are to be labels for YOLO; where petcomp wrote none, no image was looked at.
+    /// Whether the dataset should have YOLO labels; if petcomp wrote none, no image was checked.
     pub has_yolo: bool,
-    /// The part that has no images because the dataset was made to have none there.
+    /// The part that has no images because the dataset was generated with none there.
     pub empty_part: Option<Part>,
 }
 
@@ -50,30 +50,30 @@ pub struct CheckedBox {
     pub part: Part,
     /// Its class.
     pub class: usize,
-    /// Width and height as shares of the image's; none of an outline.
+    /// Width and height as shares of the image's; none for an outline.
     pub sides: Option<[f64; 2]>,
 }
 
-/// Checks a YOLO dataset as YOLOv5 and Ultralytics do on loading it, and more strictly where they
-/// only warn.
+/// Checks a YOLO dataset as YOLOv5 and Ultralytics do when they load it, and more strictly where
+/// they only warn.
 ///
 /// * `data.yaml` has `train`, `val` and names, as many as `nc` says, and its folders and lists exist
-///   and have images, unless the dataset was made with all of them in the other part;
+///   and have images, unless the dataset was generated with all of them in the other part;
 /// * every image decodes to its end and has sides of at least 10 pixels; no two have the same bytes,
 ///   unless both show nothing;
-/// * no image for validation looks like one for training ([`NEAR_DUPLICATE_RMS`]) that shows the
-///   same by its label file, or is one that was saved again, unless both show nothing;
+/// * no validation image looks like a training image ([`NEAR_DUPLICATE_RMS`]) whose label file shows
+///   the same, or is a training image that was saved again, unless both show nothing;
 /// * every image has a label file and every label file an image;
 /// * rows have 5 columns (or, in files of outlines, 7 or more, an odd number), an integer class
 ///   below `nc`, shares in 0..1, sides above 0, and no duplicate in the same file;
-/// * where sidecar files have the objects' poses, something holds each of them up
+/// * if sidecar files have the objects' poses, something supports each object
 ///   ([`hanging`](crate::settle::hanging));
-/// * where there is a journal, the files it names have the sizes and checksums that it says, and it
-///   names every image. Of a dataset that petcomp made without labels for YOLO, only these and the
-///   sidecar files are looked at.
+/// * if there is a journal, the files in it have the recorded sizes and checksums, and it
+///   lists every image. In a dataset that petcomp made without YOLO labels, only these and the
+///   sidecar files are checked.
 ///
 /// # Errors
-/// When `folder` is not a folder that can be listed, or a dataset of archives alone, which has no
+/// If `folder` is not a folder that can be listed, or is a dataset of archives only, which has no
 /// journal. Everything else is a [`Finding`].
 pub fn check(folder: &Path) -> Result<Checked> {
     if !folder.is_dir() {
@@ -106,7 +106,7 @@ pub fn check(folder: &Path) -> Result<Checked> {
     })
 }
 
-/// The part that a dataset of petcomp's was made to have no images in.
+/// The part that a dataset made by petcomp is meant to have no images in.
 fn part_without_share(folder: &Path) -> Option<Part> {
     let identity = folder::identity(folder).ok().flatten()?;
     match identity["split"]["val_percent"].as_u64()? {
@@ -116,7 +116,7 @@ fn part_without_share(folder: &Path) -> Option<Part> {
     }
 }
 
-/// Whether petcomp made the dataset, and no YOLO labels in it.
+/// Whether petcomp made the dataset without YOLO labels.
 fn is_for_others(folder: &Path) -> Result<bool> {
     if folder.join("data.yaml").exists() || !lacks_yolo(folder) {
         return Ok(false);
@@ -143,7 +143,7 @@ fn has_journal(folder: &Path) -> bool {
 impl Checked {
     fn new(findings: Vec<Finding>, images: &[CheckedImage], yaml: &DataYaml) -> Self {
         let boxes: Vec<CheckedBox> = images.iter().flat_map(boxes_of).collect();
-        // Only for classes that have a name: `nc` may claim any number of others.
+        // Only for classes that have a name: `nc` may be any larger number.
         let mut rows = vec![0; yaml.names.len()];
         for class in boxes.iter().map(|b| b.class) {
             if let Some(count) = rows.get_mut(class) {
@@ -165,7 +165,7 @@ impl Checked {
 struct Checker<'a> {
     folder: &'a Path,
     findings: Vec<Finding>,
-    /// A part that needs no images.
+    /// The part that may be empty.
     may_be_empty: Option<Part>,
 }
 
@@ -177,7 +177,7 @@ fn boxes_of(image: &CheckedImage) -> impl Iterator<Item = CheckedBox> {
     })
 }
 
-/// The label files of a folder of images below the dataset's; none where they cannot be listed.
+/// The label files of a folder of images below the dataset's; empty if they cannot be listed.
 fn list_labels(dataset: &Path, images: &Path) -> Vec<PathBuf> {
     let label = dataset.join(YoloSet::label_of(&images.join("x")));
     let is_label = |path: &Path| is_list(path) && !is_class_list(path);
@@ -246,7 +246,7 @@ impl Checker<'_> {
         named.map(|named| place_of(&root, named)).collect()
     }
 
-    /// As paths from the dataset's folder; an image that a list names may lie elsewhere.
+    /// As paths relative to the dataset's folder; an image in a list may be elsewhere.
     fn list_images_in(&mut self, place: &Path, part: Part) -> Vec<PathBuf> {
         let found = images_in(place).unwrap_or_default();
         if found.is_empty() && self.may_be_empty != Some(part) {
@@ -257,8 +257,8 @@ impl Checker<'_> {
         found.map(|path| io::relative(path, self.folder)).collect()
     }
 
-    /// Images with the bytes of an earlier one, which is one to train on where any of them is; images
-    /// of an empty scene may well be the same.
+    /// Images with the same bytes as an earlier one, which is a training image if any of them is; images of an empty
+    /// scene may be identical.
     fn find_duplicates(&mut self, images: &[CheckedImage]) {
         let mut known: BTreeMap<(u64, u32), &CheckedImage> = BTreeMap::new();
         for image in images {
@@ -274,13 +274,13 @@ impl Checker<'_> {
         }
     }
 
-    /// Images for validation that look like one that is trained on.
+    /// Validation images that look like a training image.
     fn find_leaks(&mut self, images: &[CheckedImage]) {
         let (train, train_looks) = looks(images, Part::Train);
         let (val, val_looks) = looks(images, Part::Val);
         for (i, j, rms) in nearest(&train_looks, &val_looks, NEAR_DUPLICATE_RMS) {
             let (image, twin) = (val[i], train[j]);
-            // The same bytes are reported already.
+            // The same bytes have been reported already.
             if image.checksum != twin.checksum {
                 let twin = twin.path.display();
                 let message = format!("leak: differs from {twin} by only {rms:.2} of 255");
@@ -289,7 +289,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Label files of the folders of images that belong to no image; a list is a choice.
+    /// Label files in the folders of images that belong to no image; a list may leave images out.
     fn find_orphan_labels(&mut self, images: &[CheckedImage], yaml: &DataYaml) {
         let wanted = images.iter().map(|image| YoloSet::label_of(&image.path));
         let wanted: BTreeSet<PathBuf> = wanted.collect();
@@ -306,7 +306,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Compares the journal, where there is one, with the files in the folder.
+    /// Compares the journal, if there is one, with the files in the folder.
     fn compare_journal(&mut self, images: &[CheckedImage]) {
         if !has_journal(self.folder) {
             return;
@@ -328,7 +328,7 @@ impl Checker<'_> {
         }
     }
 
-    /// The lines that are as they were written; the others are findings.
+    /// The intact lines; the others become findings.
     fn good_lines(&mut self, lines: NumberedLines) -> Vec<(usize, JournalLine)> {
         let mut good = Vec::new();
         for (i, line) in lines {
@@ -358,7 +358,7 @@ impl Checker<'_> {
     }
 }
 
-/// What is wrong with an image that has the bytes of another, or is listed again.
+/// The finding about an image that has the same bytes as another, or is listed again.
 fn twin_message(image: &CheckedImage, twin: &CheckedImage) -> (Code, String) {
     let message = format!("the same bytes as {}", twin.path.display());
     match (image.part == twin.part, image.path == twin.path) {
@@ -371,7 +371,7 @@ fn twin_message(image: &CheckedImage, twin: &CheckedImage) -> (Code, String) {
     }
 }
 
-/// The images of a part that can be read, and what they are compared by.
+/// The images of a part that can be read, and the features they are compared by.
 fn looks(images: &[CheckedImage], part: Part) -> (Vec<&CheckedImage>, Vec<Look>) {
     images
         .iter()

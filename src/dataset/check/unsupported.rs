@@ -1,4 +1,5 @@
-//! Objects of a finished dataset that nothing holds up, by the scenes in its sidecar files.
+//! Objects of a finished dataset that nothing supports, according to the scenes in its sidecar
+//! files.
 
 use crate::dataset::finding::Finding;
 use crate::dataset::folder;
@@ -18,8 +19,7 @@ struct SettledScene {
     scene: Scene,
 }
 
-/// A finding for each sidecar file with objects that hang in the air, and for each that cannot be
-/// read.
+/// A finding for each sidecar file with objects that float, and for each that cannot be read.
 pub(super) fn find(dataset: &Path) -> Vec<Finding> {
     let options = settle_options(dataset);
     scene_files(dataset)
@@ -35,7 +35,7 @@ fn scene_files(dataset: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Files of a folder below the dataset's, in order of name; none where it cannot be listed.
+/// Files of a folder below the dataset's, in order of name; empty if it cannot be listed.
 fn list_files(folder: &Path, below: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder.join(below)) else {
         return Vec::new();
@@ -61,7 +61,7 @@ fn find_in(dataset: &Path, path: PathBuf, options: &SettleOptions) -> Option<Fin
     }
 }
 
-/// How the dataset's objects fell; the defaults where that is not known.
+/// The options with which the dataset's objects fell; the defaults if they are not known.
 fn settle_options(dataset: &Path) -> SettleOptions {
     let identity = folder::identity(dataset).ok().flatten();
     let settle = identity.and_then(|identity| identity.pointer("/recipe/scene/settle").cloned());
@@ -70,7 +70,7 @@ fn settle_options(dataset: &Path) -> SettleOptions {
         .unwrap_or_default()
 }
 
-/// The objects of a sidecar file that nothing holds up.
+/// The objects of a sidecar file that nothing supports.
 fn unsupported_in(path: &Path, options: &SettleOptions) -> Result<Vec<String>> {
     let SettledScene { drawn, scene } = io::read_json(path)?;
     let ids = settle::hanging(&drawn, &scene, options)?.into_iter();

@@ -1,4 +1,4 @@
-//! Ranges that are fitted by how a measure of the real pictures differs: camera, light, size.
+//! Ranges fitted by how a measure of the real pictures differs: camera, light, size.
 
 use super::knobs::{self, Difference, KNOBS, Knob};
 use super::measured::MeasuredSet;
@@ -8,7 +8,7 @@ use crate::scene::{Range, Recipe};
 use std::path::Path;
 
 impl Fitting<'_> {
-    /// Sets a range by how a measure differs, and says so.
+    /// Sets a range by the difference of a measure, and returns the reason.
     pub(super) fn fit_knob(&mut self, knob: &Knob, difference: Option<&Difference>) -> FittedKey {
         let scene = &self.config.scene;
         let before = (knob.get)(scene);
@@ -29,7 +29,8 @@ impl Fitting<'_> {
         key
     }
 
-    /// The scene with another range; an error where that cannot be, as where objects have no room.
+    /// The scene with another range; an error if that is not valid, for example if objects have no
+    /// room.
     pub(super) fn with_range(&self, knob: &Knob, range: Range) -> Result<Recipe> {
         let mut scene = self.config.scene.clone();
         (knob.set)(&mut scene, range);
@@ -38,7 +39,7 @@ impl Fitting<'_> {
         Ok(scene)
     }
 
-    /// Fits the ranges of the whole picture, then once more by pictures made with them.
+    /// Fits the ranges of the whole picture, then refines them with pictures made with them.
     pub(super) fn fit_camera(&mut self, real: &MeasuredSet, before: &MeasuredSet) -> Result<()> {
         let mut fitted: Vec<(&Knob, FittedKey)> = Vec::new();
         let first = self.config.scene.clone();
@@ -63,8 +64,8 @@ impl Fitting<'_> {
         unfitted(knob.key, before, why.into())
     }
 
-    /// A second step, as long as the first one has shown it must be: of noise that a brighter
-    /// picture clips, only a part is measured.
+    /// A second step, scaled by the response to the first one: for example, only a part of the
+    /// noise is measured in a brighter picture that clips it.
     fn refine_camera(
         &mut self,
         real: &MeasuredSet,
@@ -92,7 +93,7 @@ impl Fitting<'_> {
         Difference::new(&real, &own, self.options.seed)
     }
 
-    /// The photo behind a picture of the recipe, by the number that is its name.
+    /// The photo behind a picture of the recipe, whose name is its number.
     fn plate_of(&self, picture: &str) -> String {
         let number = Path::new(picture)
             .file_stem()

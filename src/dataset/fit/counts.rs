@@ -1,4 +1,4 @@
-//! How many objects are in pictures of which only labels are known.
+//! How many objects are in pictures of which only the labels are known.
 
 use super::falls::Fall;
 use super::statistics::{Moments, Weighted};
@@ -7,31 +7,31 @@ use crate::scene::{Count, Recipe};
 use libm::erf;
 use std::collections::BTreeMap;
 
-/// Steps of expectation and maximisation; later ones change nothing that could be seen.
+/// Steps of expectation-maximisation; further ones change nothing visible.
 const EM_STEPS: usize = 300;
-/// What a number of labels has at least: falls are few, and no number is impossible.
+/// Minimum likelihood of a number of labels: falls are few, and no number is impossible.
 const LEAST_ODDS: f64 = 1e-6;
-/// Least standard deviation of a number of labels.
+/// Minimum standard deviation of a number of labels.
 const LEAST_SIGMA: f64 = 0.3;
-/// Weights below this are none.
+/// Weights below this count as 0.
 const LEAST_WEIGHT: f64 = 0.005;
 
-/// How likely a number of labels is for each number of objects, from falls of some numbers of
-/// objects: mean and variance between them are read off lines.
+/// Likelihood of a number of labels for each number of objects, from falls of some numbers of
+/// objects: between those, mean and variance are interpolated linearly.
 pub(super) struct LabelOdds {
-    /// Ascending, the first without objects.
+    /// Ascending; the first is 0 objects.
     nodes: Vec<(usize, Moments)>,
     /// `rows[objects][labels]`.
     rows: Vec<Vec<f64>>,
 }
 
 impl LabelOdds {
-    /// Of numbers of labels up to `most`.
+    /// For up to `most` labels.
     pub(super) fn new(falls: &[Fall], most: usize) -> Self {
         Self::weighted(falls, &vec![1.0; falls.len()], most)
     }
 
-    /// The same with [other falls](redrawn_falls).
+    /// The same with [redrawn falls](redrawn_falls).
     pub(super) fn redrawn(falls: &[Fall], most: usize, round: (u64, u64)) -> Self {
         let times = redrawn_falls(falls, round);
         let weights: Vec<f64> = times.into_iter().map(f64::from).collect();
@@ -47,18 +47,18 @@ impl LabelOdds {
         Self { nodes, rows }
     }
 
-    /// The most objects that it knows of.
+    /// The largest number of objects that it covers.
     pub(super) fn most_objects(&self) -> usize {
         self.rows.len() - 1
     }
 
-    /// The chance of a number of labels where numbers of objects have weights.
+    /// The probability of a number of labels, given weights of the numbers of objects.
     fn chance(&self, weights: &[f64], labels: usize) -> f64 {
         let rows = weights.iter().zip(&self.rows);
         rows.map(|(weight, row)| weight * row[labels]).sum()
     }
 
-    /// Labels of a picture on average, where numbers of objects have weights.
+    /// Mean number of labels of a picture, given weights of the numbers of objects.
     pub(super) fn mean_labels(&self, weights: &[f64]) -> f64 {
         let pairs = weights.iter().enumerate();
         pairs
@@ -66,8 +66,8 @@ impl LabelOdds {
             .sum()
     }
 
-    /// The weight of each fall, where numbers of objects have these: a fall stands for all numbers
-    /// that are nearest to its own.
+    /// The weight of each fall, given weights of the numbers of objects: a fall stands for all
+    /// numbers that are nearest to its own.
     pub(super) fn fall_weights(&self, falls: &[Fall], weights: &[f64]) -> Vec<f64> {
         let mut of_node: BTreeMap<usize, f64> = BTreeMap::new();
         for (objects, weight) in weights.iter().enumerate().skip(1) {
@@ -90,8 +90,8 @@ impl LabelOdds {
     }
 }
 
-/// How often each fall is drawn in a round of a bootstrap, given by its seed and number: as many as
-/// there are of each number of objects.
+/// How often each fall is drawn in a round of a bootstrap, given by its seed and number: for each
+/// number of objects, as many as there are.
 pub(super) fn redrawn_falls(falls: &[Fall], (seed, round): (u64, u64)) -> Vec<u32> {
     let mut of_node: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (place, fall) in falls.iter().enumerate() {
@@ -123,7 +123,7 @@ fn nodes_of(falls: &[Fall], weights: &[f64]) -> Vec<(usize, Moments)> {
         .collect()
 }
 
-/// A normal distribution's share of each number of labels, of those that can be.
+/// Normal distribution over the possible numbers of labels.
 fn row(nodes: &[(usize, Moments)], objects: usize, most: usize) -> Vec<f64> {
     let moments = between(nodes, objects);
     let sigma = moments.variance.sqrt().max(LEAST_SIGMA);
@@ -138,7 +138,7 @@ fn row(nodes: &[(usize, Moments)], objects: usize, most: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Mean and variance at a number of objects, on the line between its neighbours.
+/// Mean and variance at a number of objects, interpolated between its neighbours.
 fn between(nodes: &[(usize, Moments)], objects: usize) -> Moments {
     let above = nodes.partition_point(|(node, _)| *node < objects);
     let (high, high_moments) = nodes[above.min(nodes.len() - 1)];
@@ -159,7 +159,7 @@ pub(super) fn label_histogram(counts: &[usize]) -> Vec<f64> {
     redrawn_histogram(counts, &vec![1; counts.len()])
 }
 
-/// The same when pictures are drawn so often.
+/// The same when each picture is drawn `times` times.
 pub(super) fn redrawn_histogram(counts: &[usize], times: &[u32]) -> Vec<f64> {
     let most = counts.iter().copied().max().unwrap_or(0);
     let mut histogram = vec![0.0; most + 1];
@@ -169,16 +169,17 @@ pub(super) fn redrawn_histogram(counts: &[usize], times: &[u32]) -> Vec<f64> {
     histogram
 }
 
-/// The weights of numbers of objects that explain how many pictures have each number of labels.
+/// The weights of numbers of objects that best explain how many pictures have each number of
+/// labels.
 ///
 /// # Method
 /// Expectation-maximisation from equal weights, smoothed by (1, 2, 1) / 4 in every step ([Silverman
-/// et al. 1990]): without, a few pictures leave a few peaks. Pictures without objects are a kind of
-/// their own, and are not.
+/// et al. 1990]): otherwise a few pictures would leave a few peaks. Pictures without objects are a
+/// separate kind and are not smoothed.
 ///
 /// [Silverman et al. 1990]: https://doi.org/10.1111/j.2517-6161.1990.tb01788.x
 pub(super) fn object_weights(odds: &LabelOdds, times: &[f64]) -> Vec<f64> {
-    // A picture without labels may be one without objects; no other is.
+    // Only a picture without labels may be one without objects.
     let empty = if times[0] > 0.0 { 1.0 } else { 0.0 };
     let mut weights = vec![1.0; odds.rows.len()];
     weights[0] = empty;
@@ -189,7 +190,7 @@ pub(super) fn object_weights(odds: &LabelOdds, times: &[f64]) -> Vec<f64> {
     weights
 }
 
-/// Shares of the pictures that each number of objects explains.
+/// The share of the pictures that each number of objects explains.
 fn maximised(odds: &LabelOdds, times: &[f64], weights: &[f64]) -> Vec<f64> {
     let mut explained = vec![0.0; weights.len()];
     for (labels, times) in times.iter().enumerate().filter(|(_, times)| **times > 0.0) {
@@ -201,8 +202,7 @@ fn maximised(odds: &LabelOdds, times: &[f64], weights: &[f64]) -> Vec<f64> {
     explained
 }
 
-/// Weights averaged with their neighbours, but for that of no objects; what would go beyond the ends
-/// stays.
+/// Weights averaged with their neighbours, except that of no objects; what would go beyond the ends stays.
 fn smoothed(weights: &[f64]) -> Vec<f64> {
     let last = weights.len() - 1;
     let at = |i: usize| weights[i.clamp(1, last)];
@@ -217,9 +217,8 @@ fn normalise(weights: &mut [f64]) {
     }
 }
 
-/// How much likelier each picture is with fitted weights than with others, on average: those that
-/// are fitted to all pictures but this one, natural logarithm. Both have the others' share without
-/// objects.
+/// Mean gain in log-likelihood (natural logarithm) of each picture by weights fitted to all
+/// pictures but this one, over other weights. Both have the others' share without objects.
 pub(super) fn gain_on_pictures_left_out(odds: &LabelOdds, times: &[f64], others: &[f64]) -> f64 {
     let seen = times.iter().enumerate().filter(|(_, times)| **times > 0.0);
     let gains = seen.map(|(labels, n)| {
@@ -232,14 +231,15 @@ pub(super) fn gain_on_pictures_left_out(odds: &LabelOdds, times: &[f64], others:
     gains.sum::<f64>() / times.iter().sum::<f64>()
 }
 
-/// The weights that a recipe gives to numbers of objects up to `most`: negatives have none.
+/// The weights that a recipe gives to numbers of objects up to `most`; negatives count as 0
+/// objects.
 pub(super) fn recipe_weights(recipe: &Recipe, most: usize) -> Vec<f64> {
     let weights = weights_of(&recipe.objects, most);
     let filled = (1.0 - recipe.negatives) * (1.0 - weights[0]);
     with_empty(&weights, 1.0 - filled)
 }
 
-/// The same weights, but for the share without objects.
+/// The same weights with another share without objects.
 pub(super) fn with_empty(weights: &[f64], share: f64) -> Vec<f64> {
     let mut weights = weights.to_vec();
     weights[0] = 0.0;
@@ -273,8 +273,8 @@ pub(super) fn weights_of(count: &Count, most: usize) -> Vec<f64> {
     weights
 }
 
-/// Weights as a recipe has them, in tenths of a percent, without those that are next to nothing and
-/// that of no objects.
+/// Weights in the form of a recipe, in tenths of a percent, without negligible ones and that of no
+/// objects.
 pub(super) fn count_of(weights: &[f64]) -> Count {
     let weights = with_empty(weights, 0.0);
     let pairs = weights.iter().enumerate();
@@ -285,7 +285,7 @@ pub(super) fn count_of(weights: &[f64]) -> Count {
     }
 }
 
-/// Numbers of objects that a tenth, half and nine tenths of the pictures have at most.
+/// The deciles 1, 5 and 9 of the number of objects.
 pub(super) fn deciles(weights: &[f64]) -> [usize; 3] {
     [0.1, 0.5, 0.9].map(|share| {
         let mut sum = 0.0;
@@ -307,7 +307,7 @@ mod tests {
     use super::*;
     use crate::scene::{Draws, Range};
 
-    /// Falls of which each object has a label with this chance.
+    /// Falls in which each object has a label with this probability.
     fn falls(chance: f64) -> Vec<Fall> {
         let objects = [1, 2, 4, 6, 9, 13, 18, 24];
         let all = objects

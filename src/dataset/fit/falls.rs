@@ -8,13 +8,14 @@ use crate::scene::{Count, Recipe};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Falls of a number of objects have numbers of their own, so that every recipe draws the same.
+/// Offset between the sample numbers of falls with different numbers of objects, so that every
+/// recipe draws the same.
 const NUMBERS_APART: u64 = 1_000_000;
 
-/// What one fall leaves to be seen.
+/// The visible result of one fall.
 #[derive(Clone, Debug)]
 pub(super) struct Fall {
-    /// Objects that fell.
+    /// Number of objects that fell.
     pub(super) objects: usize,
     /// The photo of the place.
     pub(super) plate: String,
@@ -22,7 +23,7 @@ pub(super) struct Fall {
     pub(super) boxes: Vec<[f64; 4]>,
 }
 
-/// How falls are made.
+/// How falls are generated.
 pub(super) struct FallPlan<'a> {
     pub(super) pipeline: &'a Pipeline,
     pub(super) seed: u64,
@@ -33,7 +34,7 @@ pub(super) struct FallPlan<'a> {
 }
 
 impl FallPlan<'_> {
-    /// Falls of `objects` objects of a recipe; those that do not come to rest are left out.
+    /// Falls of `objects` objects of a recipe; those that do not come to rest are skipped.
     pub(super) fn falls(&self, recipe: &Recipe, objects: usize) -> Result<Vec<Fall>> {
         let recipe = Recipe {
             objects: Count::fixed(objects as u32),

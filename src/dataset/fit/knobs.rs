@@ -1,13 +1,13 @@
-//! Keys of the recipe that are ranges, each with what it changes of a picture: a range is fitted by
-//! the mean and the variance of that.
+//! Keys of the recipe that are ranges, each with its effect on a picture: a range is fitted by the
+//! mean and the variance of that effect.
 
 use super::measured::PixelMeasures;
 use super::statistics::{Bootstrapped, Grouped, Moments, Weighted, rounds, rounds_within};
 use crate::eval::Interval;
 use crate::scene::{Range, Recipe, white_balance};
 
-/// A range of the recipe and a measure of pictures that moves with it, in units in which the one
-/// adds to the other.
+/// A range of the recipe and a measure of pictures that moves with it, in units in which the two
+/// add up.
 pub(super) struct Knob {
     /// Its path in a recipe.
     pub(super) key: &'static str,
@@ -17,12 +17,12 @@ pub(super) struct Knob {
     pub(super) of_picture: fn(&PixelMeasures) -> f64,
     pub(super) get: fn(&Recipe) -> Range,
     pub(super) set: fn(&mut Recipe, Range),
-    /// From a value of the key to the measure's unit, and back.
+    /// Converts a value of the key to the measure's unit, and back.
     pub(super) to_measure: fn(f64) -> f64,
     pub(super) to_value: fn(f64) -> f64,
-    /// The least that the key can add to the measure.
+    /// Minimum that the key can add to the measure.
     pub(super) least: f64,
-    /// The measure is of neighbouring pixels: of pictures of another size it is another.
+    /// Whether the measure is of neighbouring pixels: it is different for pictures of another size.
     pub(super) is_of_pixels: bool,
 }
 
@@ -85,19 +85,19 @@ pub(super) const KNOBS: [Knob; 5] = [
     },
 ];
 
-/// A measure that moves less or more than this with its key has been moved by something else.
+/// A slope outside these limits means that something else has moved the measure.
 const SLOPES: [f64; 2] = [0.4, 2.5];
 
-/// Temperatures that a camera's white has, kelvin.
+/// Range of the temperatures of a camera's white, kelvin.
 const WHITES_K: [f64; 2] = [2000.0, 25_000.0];
 
-/// What a white balance does to red over blue, natural logarithm.
+/// Effect of a white balance on red over blue, natural logarithm.
 fn log_red_over_blue(white_k: f64) -> f64 {
     let gains = white_balance(white_k);
     f64::from(gains.r / gains.b).ln()
 }
 
-/// The white that does this, by bisection: higher ones make pictures redder.
+/// The white with this effect, by bisection: higher ones make pictures redder.
 fn white_for(wanted: f64) -> f64 {
     let [mut low, mut high] = WHITES_K;
     while high - low > 1.0 {
@@ -110,7 +110,7 @@ fn white_for(wanted: f64) -> f64 {
     (low + high) / 2.0
 }
 
-/// Size of objects, whose measure is of boxes and not of pictures.
+/// Size of objects, whose measure is taken from boxes, not from pixels.
 pub(super) const SCALE: Knob = Knob {
     key: "scene.scale",
     unit: "in the logarithm of the root of a box's area",
@@ -123,19 +123,20 @@ pub(super) const SCALE: Knob = Knob {
     is_of_pixels: false,
 };
 
-/// Fewer real pictures do not tell how much they vary.
+/// Fewer real pictures do not show how much they vary.
 const MIN_VARYING: usize = 20;
 
-/// How a measure of real pictures differs from that of the recipe's.
+/// Difference of a measure between the real pictures and the recipe's.
 pub(super) struct Difference {
     mean: Bootstrapped,
-    /// None of a few pictures.
+    /// None with few pictures.
     variance: Option<Bootstrapped>,
 }
 
 impl Difference {
-    /// Of values of pictures, which are drawn again: the real ones, and those of the recipe by the
-    /// photos of the place, which are drawn before their pictures; none where either has none.
+    /// From values of pictures, which are resampled: the real ones, and those of the recipe by
+    /// photo of the place, of which first the photos and then their pictures are drawn; none if
+    /// either has none.
     pub(super) fn new(
         real: &[Vec<Weighted>],
         own: &[Vec<Vec<Weighted>>],
@@ -144,7 +145,7 @@ impl Difference {
         let tells_variance = real.len() >= MIN_VARYING;
         let variance = |moments: &Moments| moments.variance;
         let counts: Vec<usize> = own.iter().map(Vec::len).collect();
-        // Not the numbers of the real pictures, of which there may be as many.
+        // A different seed from that of the real pictures, of which there may be as many.
         let pairs = rounds(real.len(), seed).zip(rounds_within(&counts, !seed));
         let [real, own] = [Grouped::new(real), Grouped::new(&own.concat())];
         let whole = [Moments::new(&real.all())?, Moments::new(&own.all())?];
@@ -161,7 +162,7 @@ impl Difference {
         })
     }
 
-    /// Moments with what is decided added; none where nothing is.
+    /// Moments with the significant differences added; none if there are none.
     fn corrected(&self, before: Moments) -> Option<Moments> {
         let [mean, variance] = [Some(&self.mean), self.variance.as_ref()].map(|difference| {
             let decided = difference.filter(|difference| difference.is_decided());
@@ -173,13 +174,13 @@ impl Difference {
         })
     }
 
-    /// That of the means.
+    /// Interval of the difference of the means.
     pub(super) fn mean_interval(&self) -> Interval {
         self.mean.interval()
     }
 }
 
-/// How one moment of the first of two samples differs from that of the second.
+/// Difference between one moment of the first of two samples and that of the second.
 fn bootstrapped(
     whole: &[Moments; 2],
     resampled: &[[Moments; 2]],
@@ -200,15 +201,15 @@ impl Knob {
         }
     }
 
-    /// The range whose pictures would be like the real ones; none where those do not decide that it
-    /// should be another.
+    /// The range whose pictures would be like the real ones; none if those give no significant
+    /// reason for a change.
     pub(super) fn fitted(&self, recipe: &Recipe, difference: &Difference) -> Option<Range> {
         let wanted = difference.corrected(self.moments(recipe))?;
         self.range_of(wanted, recipe)
     }
 
-    /// How far the measure has moved for each unit that two recipes' ranges are apart; 1 where
-    /// that is not known.
+    /// How far the measure has moved per unit of difference between two recipes' ranges; 1 if that
+    /// is not known.
     pub(super) fn slope(&self, recipes: [&Recipe; 2], response: Option<&Difference>) -> f64 {
         let [before, after] = recipes.map(|recipe| self.moments(recipe).mean);
         let decided = response.filter(|response| response.mean.is_decided());
@@ -217,8 +218,8 @@ impl Knob {
         })
     }
 
-    /// The range moved by the whole difference of the means, decided or not: the second step
-    /// towards what was decided before.
+    /// The range moved by the whole difference of the means, significant or not: the second step
+    /// after a significant first one.
     pub(super) fn moved(
         &self,
         recipe: &Recipe,
@@ -233,7 +234,7 @@ impl Knob {
         self.range_of(wanted, recipe)
     }
 
-    /// The range of these moments; none where it is the recipe's.
+    /// The range with these moments; none if it equals the recipe's.
     fn range_of(&self, wanted: Moments, recipe: &Recipe) -> Option<Range> {
         let half = (3.0 * wanted.variance).sqrt();
         let ends = [wanted.mean - half, wanted.mean + half].map(|end| end.max(self.least));
@@ -243,7 +244,7 @@ impl Knob {
     }
 }
 
-/// A number without the digits that no measurement has.
+/// A number rounded to three significant digits, which is as much as is measured.
 pub(super) fn three_digits(value: f64) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return 0.0;

@@ -1,4 +1,4 @@
-//! Labelled pictures and what their pixels are like around the labels.
+//! Labelled pictures and measurements of their pixels around the labels.
 
 use super::statistics::Weighted;
 use crate::dataset::contact_sheet::shrunk;
@@ -16,31 +16,31 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// So many pictures are read for their pixels.
+/// Maximum number of pictures whose pixels are read.
 const MAX_MEASURED: usize = 64;
-/// Less of a picture than this around its labels tells nothing of the place.
+/// Pictures of which less than this share is around the labels say nothing about the place.
 const LEAST_SHARE: f64 = 0.1;
 
-/// Pictures, and what can be measured of them.
+/// Pictures, and their measurements.
 pub(super) struct MeasuredSet {
     pub(super) set: LabelledSet,
-    /// Of those whose pixels were read, with their file's name.
+    /// Of the pictures whose pixels were read, with their file names.
     pub(super) pixels: Vec<(String, PixelMeasures)>,
 }
 
-/// What the pixels of a picture are like.
+/// Measurements of a picture's pixels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PixelMeasures {
     /// Width of the picture, pixels.
     pub(super) width: usize,
-    /// Mean and standard deviation of its codes of 8 bits.
+    /// Mean and standard deviation of its 8-bit codes.
     pub(super) brightness: f64,
     pub(super) contrast: f64,
-    /// What follows is of the surroundings of the labels. Binary logarithm of the median luminance.
+    /// From here on measured around the labels. Binary logarithm of the median luminance.
     pub(super) exposure_ev: f64,
     /// Natural logarithm of red over blue.
     pub(super) red_over_blue: f64,
-    /// Variance of noise for each unit of light, and in the dark.
+    /// Variance of noise per unit of light, and in the dark.
     pub(super) shot: f64,
     pub(super) dark: f64,
     /// Variance of the blur, px^2.
@@ -48,7 +48,7 @@ pub(super) struct PixelMeasures {
 }
 
 impl MeasuredSet {
-    /// Reads pictures; pixels are measured at the width of the recipe's pictures, if theirs is not
+    /// Reads pictures; pixels are measured at the width of the recipe's pictures, unless theirs is
     /// smaller.
     ///
     /// # Errors
@@ -57,7 +57,7 @@ impl MeasuredSet {
         Ok(Self::new(LabelledSet::read(folder)?, width))
     }
 
-    /// The same of pictures whose labels are read.
+    /// The same for pictures whose labels are already read.
     pub(super) fn new(set: LabelledSet, width: u32) -> Self {
         let pictures = set.spread(MAX_MEASURED).into_par_iter();
         let pixels = pictures.filter_map(|picture| {
@@ -85,7 +85,7 @@ impl MeasuredSet {
         pictures.any(|(_, pixels)| pixels.width < width as usize)
     }
 
-    /// One number of each measured picture.
+    /// One value for each measured picture.
     pub(super) fn values(&self, value: fn(&PixelMeasures) -> f64) -> Vec<f64> {
         self.pixels
             .iter()
@@ -93,7 +93,7 @@ impl MeasuredSet {
             .collect()
     }
 
-    /// The same of each picture, in groups by what its name stands for.
+    /// The same for each picture, grouped by a function of its name.
     pub(super) fn grouped(
         &self,
         value: fn(&PixelMeasures) -> f64,
@@ -111,7 +111,7 @@ impl MeasuredSet {
 }
 
 impl PixelMeasures {
-    /// None for a picture that cannot be read, which is warned of, or of which too little is seen
+    /// None for a picture that cannot be read, with a warning, or of which too little is visible
     /// around its labels.
     fn read(picture: &LabelledPicture, width: usize) -> Option<Self> {
         let read = io::read::<LinearRgb>(&picture.path);
@@ -120,7 +120,7 @@ impl PixelMeasures {
         Self::around(&shrunk(Cow::Owned(read), width), boxes)
     }
 
-    /// Of a picture and its surroundings of boxes.
+    /// Measures a picture and its surroundings of boxes.
     pub(super) fn around(picture: &Image<LinearRgb>, boxes: &[ShareBox]) -> Option<Self> {
         let around = surroundings(picture, boxes);
         let seen: Vec<LinearRgb> = around
@@ -146,7 +146,7 @@ impl PixelMeasures {
         })
     }
 
-    /// Standard deviation of the noise in mid grey, codes of 8 bits.
+    /// Standard deviation of the noise in mid grey, 8-bit codes.
     pub(super) fn grey_noise(&self) -> f64 {
         let sigma = (self.shot * MID_GREY + self.dark).max(0.0).sqrt();
         sigma * CODES_PER_LIGHT
@@ -157,11 +157,11 @@ impl PixelMeasures {
     }
 }
 
-/// Luminance of mid grey, and the slope of sRGB's curve there, codes of 8 bits for a unit of light.
+/// Luminance of mid grey, and the slope of the sRGB curve there, 8-bit codes per unit of light.
 const MID_GREY: f64 = 0.18;
 const CODES_PER_LIGHT: f64 = 255.0 * 1.055 / 2.4 * 2.719;
 
-/// The picture without its labels: what is in a box is no number.
+/// The picture without its labels: pixels in a box are NaN.
 fn surroundings(picture: &Image<LinearRgb>, boxes: &[ShareBox]) -> Image<LinearRgb> {
     let (w, h) = picture.size();
     let mut around = picture.clone();

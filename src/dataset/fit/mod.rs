@@ -1,13 +1,12 @@
-//! A recipe fitted to the real place: by a few labelled pictures of it, or by its plates alone.
+//! Fits a recipe to the real place: by a few labelled pictures of it, or by its plates alone.
 //!
-//! Labels tell of what is labelled, and what is obstructed has none: how many objects there were is
-//! not their number. So objects of the recipe fall and are labelled, without pixels, for numbers of
-//! objects and for ways to start; the weights of those numbers are what explains the real labels
-//! best (`counts`), and the spread is that whose labels lie as the real ones do (`starts`).
-//! Ranges of camera and light are fitted by the mean and the variance of what they add to
-//! (`knobs`), measured around the labels on pictures of the recipe as on the real ones. What the
-//! pictures do not decide, by a bootstrap over them and over the recipe's own, stays as it is. Of a
-//! sequence on a belt one picture is taken, and the recipe's own are made without one (`sequences`).
+//! Obstructed objects have no label, so the number of labels is not the number of objects. Therefore objects of the
+//! recipe fall and are labelled, without pixels, for several numbers of objects and several ways to start; the weights
+//! of those numbers are those that explain the real labels best (`counts`), and the spread is that whose labels lie as
+//! the real ones do (`starts`). Ranges of camera and light are fitted by the mean and the variance of what they add to
+//! measures (`knobs`), taken around the labels in the same way for pictures of the recipe and real ones. What the
+//! pictures do not decide, by a bootstrap over them and over the recipe's own, is left unchanged. Of a sequence on a
+//! belt one picture is used, and the recipe's own are made without a belt (`sequences`).
 
 mod camera;
 mod counts;
@@ -39,12 +38,12 @@ use starts::LEVERS;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// How finely a recipe is fitted.
+/// How precisely a recipe is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FitOptions {
-    /// Seed of all that is drawn. Default: 0.
+    /// Seed of all random draws. Default: 0.
     pub seed: u64,
-    /// Pictures made of the recipe before and after. Default: 48.
+    /// Number of pictures rendered from the recipe before and after. Default: 48.
     pub pictures: u64,
     /// Falls of each number of objects, for each way to start. Default: 12.
     pub falls: usize,
@@ -65,25 +64,25 @@ impl Default for FitOptions {
 pub struct FitPlan {
     /// The recipe's file.
     pub recipe: PathBuf,
-    /// Labelled pictures of the place: a YOLO dataset, or a folder of images with labels. None
-    /// takes what the plates tell.
+    /// Labelled pictures of the place: a YOLO dataset, or a folder of images with labels. None fits
+    /// to the plates alone.
     pub real: Option<PathBuf>,
-    /// The file that the fitted recipe is to be written to.
+    /// The file that the fitted recipe will be written to.
     pub output: PathBuf,
-    /// How finely.
+    /// How precisely.
     pub options: FitOptions,
 }
 
-/// A key that was looked at.
+/// A key that was considered.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FittedKey {
     /// Its path in the recipe.
     pub key: String,
     /// Its value before, as TOML.
     pub before: String,
-    /// Its value now; none where it is as it was.
+    /// Its value now; none if unchanged.
     pub fitted: Option<String>,
-    /// What decided.
+    /// The reason.
     pub why: String,
 }
 
@@ -92,9 +91,9 @@ pub struct FittedKey {
 pub struct Fit {
     /// Its text.
     pub text: String,
-    /// The keys that were looked at.
+    /// The keys that were considered.
     pub keys: Vec<FittedKey>,
-    /// Every distribution before and after, beside the real one.
+    /// Every distribution before and after, next to the real one.
     pub page: Page,
 }
 
@@ -128,17 +127,17 @@ pub fn fit(
     }
 }
 
-/// A recipe on its way.
+/// A recipe being fitted.
 struct Fitting<'a> {
-    /// Of the recipe as it was, without its belt.
+    /// Of the original recipe, without its belt.
     pipeline: Pipeline,
-    /// What the recipe's belt is.
+    /// The recipe's belt.
     belt: Option<BeltRanges>,
-    /// The recipe as far as it is fitted, of [plain pictures](plain_pictures).
+    /// The recipe as fitted so far, for [plain pictures](plain_pictures).
     config: DatasetConfig,
     options: FitOptions,
     keys: Vec<FittedKey>,
-    /// What names files, for the fitted recipe's folder.
+    /// Changes to file names for the fitted recipe's folder.
     moved_paths: Vec<KeyEdit>,
     steps: Steps<'a>,
     stop: &'static AtomicBool,
@@ -167,7 +166,7 @@ impl Fitting<'_> {
         let weights = self.fit_places(&real)?;
         let matched = plates::match_objects(&mut self.config, plates);
         self.keys.extend(matched);
-        // Negatives come from all photos of the place, and so have another light.
+        // Negatives show all photos of the place, so another share of them changes the light.
         let refilled = match self.config.scene.negatives == negatives {
             true => None,
             false => Some(self.rendered()?),
@@ -182,17 +181,17 @@ impl Fitting<'_> {
         self.finish(plan, page)
     }
 
-    /// Those of a folder, as far as they are labelled: on a belt one of each sequence.
+    /// The labelled pictures of a folder: on a belt one of each sequence.
     fn real_pictures(&self, folder: &Path) -> Result<MeasuredSet> {
         let set = real::real_pictures(folder, self.belt.as_ref())?;
         Ok(MeasuredSet::new(set, self.config.scene.image[0]))
     }
 
-    /// About so many falls and pictures.
+    /// Approximate number of falls and pictures.
     fn expected_steps(&self) -> u64 {
         let row = (OBJECT_COUNTS.len() / 2 + 2) * self.options.falls;
         let tried: usize = LEVERS.iter().map(|lever| lever.values.len()).sum();
-        // Falls of the recipe, and of what two levers may be fitted to.
+        // Falls of the recipe, and of the values that two levers may be fitted to.
         let fitted = 1 + 2;
         (row * (fitted + MORE_FALLS as usize + tried)) as u64 + 3 * self.options.pictures
     }
@@ -210,11 +209,11 @@ impl Fitting<'_> {
         })
     }
 
-    /// Pictures of the recipe as far as it is fitted, written and read as a trainer would.
+    /// Pictures of the recipe as fitted so far, written and read as a trainer would.
     fn rendered(&self) -> Result<MeasuredSet> {
         let folder = tempfile::tempdir().map_err(|e| Error::file(std::env::temp_dir(), e))?;
         match self.render_into(folder.path()) {
-            // That of the temporary folder says how to go on with it.
+            // The original error explains how to resume in the temporary folder.
             Err(Error::Interrupted { .. }) => Err(stopped()),
             Err(error) => Err(error),
             Ok(()) => MeasuredSet::read(folder.path(), self.config.scene.image[0]),
@@ -230,7 +229,7 @@ impl Fitting<'_> {
     }
 }
 
-/// The recipe's pictures with boxes and nothing beside them, each of a fall of its own.
+/// The recipe's pictures with boxes only, each from a fall of its own.
 fn plain_pictures(config: &DatasetConfig) -> DatasetConfig {
     DatasetConfig {
         scene: Recipe {
@@ -278,7 +277,7 @@ fn unfitted(key: &str, before: String, why: String) -> FittedKey {
     }
 }
 
-/// How far the work is.
+/// Progress of the work.
 struct Steps<'a> {
     done: AtomicU64,
     expected: AtomicU64,

@@ -1,4 +1,4 @@
-//! What names files in a recipe, once it lies in another folder.
+//! File names in a recipe that moves to another folder.
 
 use crate::dataset::DatasetConfig;
 use crate::dataset::paths::{folder_of, seen_from};
@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::io;
 use std::path::Path;
 
-/// The keys that name files as they must be in a recipe file `output`; none where that is in the
+/// The keys that name files as they must be in a recipe file `output`; none if that is in the
 /// folder of the recipe that was read.
 pub(super) fn moved_paths(
     config: &DatasetConfig,
@@ -40,7 +40,7 @@ fn environment_files(config: &DatasetConfig, to: &Path) -> Result<Option<KeyEdit
     Ok((!files.is_empty()).then(|| KeyEdit::set("scene.environment.files", text)))
 }
 
-/// A path as it is seen from a folder, as TOML.
+/// A path relative to a folder, as TOML.
 fn moved(path: &Path, to: &Path) -> Result<String> {
     Ok(toml::Value::String(seen_from(to, path)?).to_string())
 }

@@ -1,5 +1,4 @@
-//! Where objects of a recipe come to lie, how many there are and how large they look: fitted to labels
-//! by falls.
+//! Where objects of a recipe come to rest, how many there are and how large they look: fitted to labels by falls.
 
 use super::counts::{self, LabelOdds, label_histogram, redrawn_histogram};
 use super::falls::{Fall, FallPlan, log_size};
@@ -13,25 +12,24 @@ use crate::eval::interval;
 use crate::scene::{Count, Range, Recipe};
 use std::collections::BTreeSet;
 
-/// Numbers of objects that fall, each about a third more than the one before; as far as the real
-/// numbers of labels need.
+/// Numbers of objects that fall, each about a third larger than the previous one; used as far as
+/// the real numbers of labels need.
 pub(super) const OBJECT_COUNTS: [usize; 17] = [
     1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64, 85, 113, 151, 200,
 ];
-/// From so many objects on, labels that hardly become more end the row: a heap shows no more. Not
-/// the first time, which may be chance.
+/// From this number of objects on, labels that hardly increase end the series: a heap shows no
+/// more. Not the first time, which may be chance.
 const MIN_SATURATED: usize = 8;
 const SATURATED_RATIO: f64 = 1.05;
 const MAX_FLAT: usize = 2;
-/// Chance takes a share of pictures farther from its own, in standard deviations, in 2.5 % of cases.
+/// By chance a share of pictures is farther from its expectation, in standard deviations, in 2.5 % of cases.
 const CHANCE_SIGMAS: f64 = 2.24;
-/// So many times the falls, once it is known how objects fall.
+/// How many times as many falls are made once it is known how objects fall.
 pub(super) const MORE_FALLS: u64 = 4;
 
 impl Fitting<'_> {
-    /// Fits scale, spread, friction, scale again (what lies in a heap looks another size) and number
-    /// of objects, which of none is the share of negatives, in this order, and returns the weights of
-    /// the numbers.
+    /// Fits scale, spread, friction, scale again (objects in a heap look another size) and number of objects (whose
+    /// share of 0 is that of negatives), in this order, and returns the weights of the numbers.
     pub(super) fn fit_places(&mut self, real: &MeasuredSet) -> Result<Vec<f64>> {
         let boxes = real.boxes();
         let counts: Vec<usize> = boxes.iter().map(Vec::len).collect();
@@ -62,8 +60,8 @@ impl Fitting<'_> {
         Ok(Candidate::new(value.map(|(_, value)| value), falls, times))
     }
 
-    /// Falls of more and more objects, until even few labels are more than the most that are
-    /// looked for, or labels do not become more.
+    /// Falls of more and more objects, until even few labels exceed the maximum that is needed, or
+    /// the number of labels no longer increases.
     fn falls(&self, recipe: &Recipe, most_labels: usize) -> Result<Vec<Fall>> {
         let step = || self.steps.step();
         let plan = self.fall_plan(0..self.options.falls as u64, &step);
@@ -102,8 +100,8 @@ impl Fitting<'_> {
         }
     }
 
-    /// A candidate that its number of objects is told from: chance in few falls is taken for more
-    /// or fewer objects.
+    /// A candidate for estimating its number of objects: with few falls, chance would be mistaken
+    /// for more or fewer objects.
     fn with_more_falls(&self, own: Candidate, times: &[f64]) -> Result<Candidate> {
         let step = || self.steps.step();
         let first = self.options.falls as u64;
@@ -116,7 +114,7 @@ impl Fitting<'_> {
         Ok(Candidate::new(None, falls, times))
     }
 
-    /// The numbers of objects that there are assets and room for.
+    /// The numbers of objects for which there are enough assets and room.
     fn counts_with_room(&self, recipe: &Recipe) -> impl Iterator<Item = usize> {
         let counts = OBJECT_COUNTS.into_iter();
         counts.take_while(|objects| self.has_room(recipe, *objects))
@@ -136,7 +134,7 @@ impl Fitting<'_> {
         self.fit_knob(&SCALE, difference.as_ref())
     }
 
-    /// Fits it once more; whether it is another now.
+    /// Fits it once more; returns whether it has changed.
     fn refine_scale(
         &mut self,
         key: &mut FittedKey,
@@ -164,7 +162,7 @@ impl Fitting<'_> {
         Difference::new(&real, &own.log_sizes(), self.options.seed)
     }
 
-    /// Fits where objects come to lie by a lever, and returns the recipe's own candidate.
+    /// Fits where objects come to rest by a lever, and returns the recipe's own candidate.
     fn fit_lever(
         &mut self,
         lever: &Lever,
@@ -187,7 +185,7 @@ impl Fitting<'_> {
         self.take_lever(lever, candidates, &fitted, times)
     }
 
-    /// Sets what was fitted, and returns the recipe's own candidate from then on.
+    /// Sets the fitted values, and returns the recipe's own candidate from then on.
     fn take_lever(
         &mut self,
         lever: &Lever,
@@ -204,7 +202,7 @@ impl Fitting<'_> {
                 value: None,
                 ..candidates.swap_remove(fitted.best)
             }),
-            // The falls of its best value are not those of the range.
+            // The falls of the best single value are not those of the range.
             false => self.candidate(None, times),
         }
     }
@@ -241,7 +239,7 @@ impl Fitting<'_> {
             empty.is_decided_against(before[0]),
             gain.value > 0.0 && gain.is_decided(),
         ];
-        // What names 0 objects has negatives in it: the one is not right without the other.
+        // A count that includes 0 objects contains negatives: neither is right without the other.
         if counts::weights_of(&scene.objects, 1)[0] > 0.0 {
             decided = [decided.contains(&true); 2];
         }
@@ -258,8 +256,8 @@ impl Fitting<'_> {
     }
 }
 
-/// One round: how likely labels are, how many pictures have each number of them, and the weights of
-/// numbers of objects that explain those.
+/// One round: the likelihoods of labels, how many pictures have each number of them, and the
+/// weights of numbers of objects that explain those.
 struct RedrawnCounts {
     odds: LabelOdds,
     times: Vec<f64>,
@@ -282,7 +280,7 @@ fn redrawn_counts(counts: &[usize], own: &Candidate, seed: u64) -> Vec<RedrawnCo
     redrawn.collect()
 }
 
-/// Whether pictures with so many labels on average could be the real ones.
+/// Whether pictures with this mean number of labels could be the real ones.
 fn is_mean_of(counts: &[usize], labels: f64, seed: u64) -> bool {
     let mean = |times: &[u32]| {
         let sum: f64 = counts
@@ -300,7 +298,7 @@ fn is_mean_of(counts: &[usize], labels: f64, seed: u64) -> bool {
 /// Share of the real pictures that have no objects.
 struct EmptyShare {
     value: f64,
-    /// What it is in the rounds of a bootstrap.
+    /// Its values in the rounds of a bootstrap.
     rounds: Vec<f64>,
     pictures: usize,
 }
@@ -314,8 +312,8 @@ impl EmptyShare {
         }
     }
 
-    /// Whether a recipe's share is another: by a bootstrap, and by what chance leaves of that share,
-    /// since all rounds agree where no picture is empty.
+    /// Whether a recipe's share differs significantly: by a bootstrap, and by the random variation of that share, since
+    /// all rounds agree if no picture is empty.
     fn is_decided_against(&self, before: f64) -> bool {
         let rounds = self.rounds.iter().map(|share| share - before);
         let sigma = (before * (1.0 - before) / self.pictures as f64).sqrt();
@@ -335,8 +333,8 @@ impl EmptyShare {
     }
 }
 
-/// How much likelier a picture that is left out is by fitted weights than by those of before, with
-/// as many pictures without objects.
+/// Gain in likelihood of a left-out picture by the fitted weights over the previous ones, with as
+/// many pictures without objects.
 fn gain_over(
     before: &[f64],
     counts: &[usize],
@@ -490,7 +488,7 @@ mod tests {
             agreement: 1.0,
         };
         let own = fitting.take_lever(spread, vec![heap], &fitted, &times);
-        // "hull" is what the recipe has.
+        // "hull" is the recipe's value.
         let tried = fitting.candidates(collider, own.unwrap(), &times).unwrap();
         let places = places_of(real.iter().map(Vec::as_slice));
         let distances = starts::choose(&tried, &places, 0).distances;

@@ -1,4 +1,4 @@
-//! What the photos of the place tell without any picture of objects in it.
+//! What the photos of the place show without any picture of objects.
 
 use super::knobs::{KNOBS, Knob, three_digits};
 use super::measured::PixelMeasures;
@@ -10,7 +10,7 @@ use crate::plot::Table;
 use crate::quantile;
 use crate::scene::{Blur, Noise, Range};
 
-/// Fewer photos have no spread.
+/// Fewer photos do not give a spread.
 const MIN_PLATES: usize = 3;
 /// Noise (codes of 8 bits) and blur (pixels) below which objects need none.
 const LEAST_NOISE: f64 = 0.3;
@@ -19,7 +19,7 @@ const MATCH_PLATE: &str = "\"match_plate\"";
 /// The keys whose ranges come from how the photos differ: exposure and white balance.
 const LIGHT_KNOBS: &[Knob] = KNOBS.split_at(2).0;
 
-/// A photo of the place and what it is like, at the size of the recipe's pictures.
+/// A photo of the place and its measurements, at the size of the recipe's pictures.
 pub(super) struct MeasuredPlate {
     name: String,
     pixels: PixelMeasures,
@@ -29,7 +29,7 @@ pub(super) struct MeasuredPlate {
 /// Measures the photos that a recipe names.
 ///
 /// # Errors
-/// One that cannot be read.
+/// A photo that cannot be read.
 pub(super) fn measured_plates(pipeline: &Pipeline) -> error::Result<Vec<MeasuredPlate>> {
     let mut measured = Vec::new();
     for place in pipeline.places() {
@@ -67,7 +67,7 @@ pub(super) fn table(plates: &[MeasuredPlate]) -> Table {
     table
 }
 
-/// Gives objects the noise and blur that the photos have, where the recipe does not say which.
+/// Gives objects the noise and blur of the photos, if the recipe does not set them.
 pub(super) fn match_objects(
     config: &mut DatasetConfig,
     plates: &[MeasuredPlate],
@@ -111,7 +111,7 @@ fn median(plates: &[MeasuredPlate], value: fn(&PixelMeasures) -> f64) -> f64 {
     quantile::median(values, f64::total_cmp).unwrap_or(0.0)
 }
 
-/// Varies exposure and white balance as much as they do between the photos.
+/// Varies exposure and white balance as much as they vary between the photos.
 pub(super) fn vary_light(config: &mut DatasetConfig, plates: &[MeasuredPlate]) -> Vec<FittedKey> {
     let knobs = LIGHT_KNOBS.iter();
     knobs.map(|knob| vary(knob, config, plates)).collect()
@@ -131,7 +131,7 @@ fn vary(knob: &Knob, config: &mut DatasetConfig, plates: &[MeasuredPlate]) -> Fi
     key
 }
 
-/// A fixed value with the photos' standard deviation about it, or why there is none.
+/// A fixed value plus and minus the photos' standard deviation, or why there is none.
 fn varied(knob: &Knob, before: Range, plates: &[MeasuredPlate]) -> Result<Range, String> {
     if before.min != before.max {
         return Err("the recipe already gives a range".into());

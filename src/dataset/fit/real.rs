@@ -1,4 +1,4 @@
-//! The real pictures that labels tell of.
+//! The real pictures with known labels.
 
 use super::sequences::one_of_each;
 use crate::dataset::page::labelled_pictures::LabelledSet;
@@ -6,10 +6,10 @@ use crate::error::Result;
 use crate::scene::BeltRanges;
 use std::path::Path;
 
-/// Those of a folder, each with its boxes; on a belt one of each sequence.
+/// The pictures of a folder, each with its boxes; on a belt one of each sequence.
 ///
-/// In a dataset a picture without a label file shows no object, as trainers have it. In a bare
-/// folder nobody may have labelled it yet: it is left out.
+/// In a dataset a picture without a label file shows no object, as in trainers. In a bare folder it
+/// may not have been labelled yet, so it is skipped.
 ///
 /// # Errors
 /// A folder without images; a label that cannot be read.

@@ -1,4 +1,4 @@
-//! The page of a fitted recipe: every distribution before and after, beside the real one.
+//! The page of a fitted recipe: every distribution before and after, next to the real one.
 
 use super::FittedKey;
 use super::measured::{MeasuredSet, PixelMeasures};
@@ -7,14 +7,14 @@ use super::starts::overlaps;
 use crate::dataset::page::beside::{ComparedMeasure, Measure, measure_boxes, quantiles};
 use crate::plot::{Histogram, Page, Table, heat::heat_map};
 
-/// Of 100 pairs of samples of one distribution, 5 are farther apart than this over the root of the
-/// harmonic sum of their sizes (Kolmogorov and Smirnov).
+/// In 5 of 100 cases, samples of sizes n and m from one distribution are farther apart than this
+/// times `sqrt((n + m) / (n m))` (Kolmogorov and Smirnov).
 const KOLMOGOROV_95: f64 = 1.358;
-/// What stands beside charts that belong together.
+/// Puts charts that belong together side by side.
 const STYLE: &str = "<style>.pairs{display:grid;grid-template-columns:repeat(auto-fill,minmax(560px,1fr))}\
     .pairs div{white-space:nowrap}</style>\n";
 
-/// What no picture with labels tells.
+/// What labelled pictures do not show.
 const UNKNOWN: &str = "Labels and pixels do not show the walls' height and slope, the objects' thickness, the \
     lights, or how colours vary between objects: those keys are unchanged.";
 
@@ -97,7 +97,7 @@ fn add_comparison(page: &mut Page, sets: &Compared) {
     add_maps(page, sets);
 }
 
-/// What all sets have values of.
+/// The measures for which all sets have values.
 fn compared_measures(sets: &Compared) -> Vec<MeasurePair> {
     let [real, before, after] = sets.each().map(measures);
     let rows = real.into_iter().zip(before.into_iter().zip(after));
@@ -108,7 +108,7 @@ fn compared_measures(sets: &Compared) -> Vec<MeasurePair> {
 }
 
 impl Compared {
-    /// The real one, then before and after.
+    /// The real set, then before and after.
     fn each(&self) -> [&MeasuredSet; 3] {
         [&self.real, &self.before, &self.after]
     }
@@ -133,7 +133,7 @@ fn add_maps(page: &mut Page, sets: &Compared) {
     page.html(&format!("<div class=\"histograms\">\n{maps}</div>\n"));
 }
 
-/// The title of a measure and how the pixels of a picture give it.
+/// The title of a measure and how it is computed from a picture's pixels.
 type PixelMeasure = (&'static str, fn(&PixelMeasures) -> f64);
 
 const PIXEL_MEASURES: [PixelMeasure; 6] = [
@@ -161,7 +161,7 @@ fn measures(set: &MeasuredSet) -> Vec<Measure> {
 struct MeasurePair {
     title: &'static str,
     quantiles: [String; 3],
-    /// Largest distance that chance leaves as a rule.
+    /// The distance that chance exceeds in 5 of 100 cases.
     chance: f64,
     compared: [ComparedMeasure; 2],
 }

@@ -1,12 +1,12 @@
-//! Pictures of a belt: those of one sequence show the same objects, and tell as much as one.
+//! Pictures of a belt: those of one sequence show the same objects, and are worth only one.
 
 use crate::dataset::listing::record_of;
 use crate::dataset::page::labelled_pictures::{LabelledPicture, LabelledSet};
 use crate::scene::BeltRanges;
 use rayon::prelude::*;
 
-/// The picture in the middle of each sequence, where objects lie as they came to rest; of those with
-/// a label file where there are any.
+/// The picture in the middle of each sequence, where objects are as they came to rest; if any have a label file, the
+/// middle one of those.
 pub(super) fn one_of_each(set: &LabelledSet, belt: &BeltRanges) -> LabelledSet {
     let pictures = set.pictures.par_iter().enumerate();
     let placed = pictures.map(|(k, picture)| (sequence_of(picture, k as u64, belt), picture));
@@ -28,14 +28,14 @@ fn middle_of<'a>(sequence: &[(Sequence, &'a LabelledPicture)]) -> &'a LabelledPi
 /// What pictures of one sequence have in common.
 #[derive(PartialEq)]
 enum Sequence {
-    /// By their sidecars.
+    /// From their sidecars.
     Known(u64),
-    /// By their order alone.
+    /// From their order alone.
     Run(u64),
 }
 
-/// That of picture `k`: a real camera's pictures have no sidecar, and come in runs as long as the
-/// recipe's.
+/// The sequence of picture `k`: a real camera's pictures have no sidecar, and are assumed to come
+/// in runs as long as the recipe's.
 fn sequence_of(picture: &LabelledPicture, k: u64, belt: &BeltRanges) -> Sequence {
     let record = record_of(&picture.path).ok();
     match record.and_then(|record| record.scene.belt) {

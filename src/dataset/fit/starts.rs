@@ -10,7 +10,7 @@ use crate::eval::iou;
 use crate::scene::{Collider, Range, Recipe};
 use std::collections::BTreeMap;
 
-/// A key of the recipe that decides where objects come to lie, and the values that are tried.
+/// A key of the recipe that decides where objects come to rest, and the values that are tried.
 pub(super) struct Lever {
     pub(super) key: &'static str,
     pub(super) values: &'static [f64],
@@ -23,7 +23,7 @@ pub(super) struct Lever {
 /// In the order in which they are fitted.
 pub(super) const LEVERS: [Lever; 3] = [SPREAD, FRICTION, COLLIDER];
 
-/// From a heap to all over the surface.
+/// From a heap to the whole surface.
 const SPREAD: Lever = Lever {
     key: "scene.start.spread",
     values: &[0.0, 0.25, 0.5, 0.75, 1.0],
@@ -35,7 +35,7 @@ const SPREAD: Lever = Lever {
     text: range_text,
 };
 
-/// From what slides and rolls apart to what heaps up.
+/// From objects that slide and roll apart to objects that heap up.
 const FRICTION: Lever = Lever {
     key: "scene.friction",
     values: &[0.01, 0.03, 0.1, 0.3],
@@ -44,7 +44,7 @@ const FRICTION: Lever = Lever {
     text: range_text,
 };
 
-/// A box around a photo needs more room than what it shows. There is one other value.
+/// A box around a photo needs more room than its outline. There is one other value.
 const COLLIDER: Lever = Lever {
     key: "scene.collider",
     values: &[1.0],
@@ -57,7 +57,7 @@ const COLLIDER: Lever = Lever {
 };
 
 impl Lever {
-    /// Whether the recipe leaves it open: a histogram of positions takes the place of a spread.
+    /// Whether the recipe leaves it open: a histogram of positions replaces a spread.
     pub(super) fn applies_to(&self, recipe: &Recipe) -> bool {
         self.key != SPREAD.key || recipe.start.positions.is_empty()
     }
@@ -67,14 +67,14 @@ impl Lever {
 const AGREEMENT: f64 = 0.9;
 /// Values within these shares of the rounds of a bootstrap are the fitted range.
 const KEPT: [f64; 2] = [0.1, 0.9];
-/// What is compared of places: see [`places_of`].
+/// Number of measures of places: see [`places_of`].
 const MEASURES: usize = 5;
 
 /// Values of each picture.
 pub(super) type ByPicture = Vec<Vec<f64>>;
 
-/// How many labels pictures have and where: centres from the left and from the top, distance of
-/// each from the nearest other, and how much of it the next one overlaps.
+/// The number and places of a picture's labels: centres from the left and from the top, distance of
+/// each from its nearest neighbour, and its largest overlap with another.
 pub(super) fn places_of<'a>(
     pictures: impl Iterator<Item = &'a [[f64; 4]]>,
 ) -> [ByPicture; MEASURES] {
@@ -98,7 +98,7 @@ pub(super) fn overlaps(boxes: &[[f64; 4]]) -> Vec<f64> {
     of_each(boxes, share_iou, f64::max)
 }
 
-/// What holds of each box and some other one; nothing of a box that is alone.
+/// The best value over pairs of each box and another; nothing for a single box.
 fn of_each(
     boxes: &[[f64; 4]],
     of_pair: fn(&[f64; 4], &[f64; 4]) -> f64,
@@ -116,7 +116,7 @@ fn share_iou(a: &[f64; 4], b: &[f64; 4]) -> f64 {
 
 /// A value of a lever, its falls, and the numbers of objects that explain the real labels with it.
 pub(super) struct Candidate {
-    /// None where it is as the recipe has it.
+    /// None for the recipe's own value.
     pub(super) value: Option<f64>,
     pub(super) falls: Vec<Fall>,
     pub(super) odds: LabelOdds,
@@ -158,7 +158,7 @@ impl Candidate {
         apart_on_average(&self.places.each_ref().map(Grouped::all), real)
     }
 
-    /// That of its falls drawn again; those of other candidates are drawn alike.
+    /// The distance of its falls when redrawn; those of other candidates are drawn alike.
     fn redrawn_distance(&self, real: &Places, round: (u64, u64)) -> f64 {
         let times = redrawn_falls(&self.falls, round);
         let own = self.places.each_ref().map(|values| values.redrawn(&times));
@@ -166,7 +166,7 @@ impl Candidate {
     }
 }
 
-/// Values with the weights of their pictures; those without weight are none.
+/// Values with the weights of their pictures; those of weight 0 are omitted.
 fn weighted(by_picture: &[Vec<f64>], weights: &[f64]) -> Grouped {
     let pairs = by_picture.iter().zip(weights);
     let pictures = pairs.map(|(values, weight)| {
@@ -179,14 +179,15 @@ fn weighted(by_picture: &[Vec<f64>], weights: &[f64]) -> Grouped {
 /// Values of all pictures, ascending.
 type Places = [Vec<Weighted>; MEASURES];
 
-/// Mean earth mover's distance of places from real ones, in standard deviations of those.
+/// Mean earth mover's distance of places from the real ones, in standard deviations of the latter.
 fn apart_on_average(own: &Places, real: &Places) -> f64 {
     let pairs = own.iter().zip(real);
     let distances: Vec<f64> = pairs.filter_map(|(own, real)| apart(own, real)).collect();
     distances.iter().sum::<f64>() / distances.len().max(1) as f64
 }
 
-/// None where all real values are the same, or there are none; infinite where only they have some.
+/// None if all real values are the same, or there are none; infinite if only the real ones have
+/// values.
 fn apart(own: &[Weighted], real: &[Weighted]) -> Option<f64> {
     let sigma = Moments::new(real)?.variance.sqrt();
     let distance = || match own.is_empty() {
@@ -198,7 +199,7 @@ fn apart(own: &[Weighted], real: &[Weighted]) -> Option<f64> {
 
 /// The value of a lever that fits best.
 pub(super) struct FittedLever {
-    /// Its place among the candidates.
+    /// Its index among the candidates.
     pub(super) best: usize,
     /// The range of values, unless the pictures do not decide against the recipe's.
     pub(super) range: Option<Range>,
@@ -315,7 +316,7 @@ mod tests {
         assert!(wide.min >= 0.75 && wide.max == 1.0, "{wide:?}");
         let heap = fitted(0.2).range.unwrap();
         assert!(heap.min == 0.0 && heap.max <= 0.25, "{heap:?}");
-        // Spread 0.5 is as good as what the recipe has.
+        // Spread 0.5 is as good as the recipe's.
         assert_eq!(fitted(0.6).range, None);
     }
 

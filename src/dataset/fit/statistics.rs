@@ -1,12 +1,12 @@
-//! Samples with weights, and how far two of them are from each other.
+//! Samples with weights, and distances between them.
 
 use crate::eval::{Interval, drawn};
 
 /// Rounds of every bootstrap.
 pub(super) const ROUNDS: u64 = 200;
-/// Share of the rounds that must agree on the sign of a statistic before it is decided: its
-/// interval of 97.5 % is on one side of zero. A key is decided by two of them, mean and variance,
-/// and stays in more than 9 of 10 cases where there is no difference.
+/// Share of the rounds that must agree on the sign of a statistic for it to be significant: its
+/// 97.5 % interval is on one side of zero. A key depends on two of them, mean and variance, and
+/// stays unchanged in more than 9 of 10 cases if there is no difference.
 const SAME_SIGN: f64 = 0.9875;
 
 /// A value and how often it occurs, in any unit.
@@ -20,7 +20,7 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// None of values without weight.
+    /// None for values without weight.
     pub(super) fn new(values: &[Weighted]) -> Option<Self> {
         let weight = weight_of(values);
         let sum: f64 = values.iter().map(|(value, weight)| weight * value).sum();
@@ -58,19 +58,19 @@ fn weight_of(values: &[Weighted]) -> f64 {
     values.iter().map(|(_, weight)| weight).sum()
 }
 
-/// The smaller of two values that are next.
+/// The smaller of the next two values.
 fn least(a: Option<&Weighted>, b: Option<&Weighted>) -> Option<f64> {
     let next = a.into_iter().chain(b).map(|(value, _)| *value);
     next.reduce(f64::min)
 }
 
-/// How many of sorted values are this one; their weight is added to what lies below.
+/// How many of the sorted values equal this one; their weight is added to `below`.
 fn take_equal(values: &[Weighted], value: f64, below: &mut f64) -> usize {
     let equal = values.iter().take_while(|(v, _)| *v == value);
     equal.inspect(|(_, weight)| *below += weight).count()
 }
 
-/// Values of pictures or falls, which are drawn again as a whole: ascending, each with the place of
+/// Values of pictures or falls, which are resampled as a whole: ascending, each with the index of
 /// its picture.
 pub(super) struct Grouped(Vec<(Weighted, usize)>);
 
@@ -84,12 +84,12 @@ impl Grouped {
         Self(values)
     }
 
-    /// Those of each picture once.
+    /// The values of each picture once.
     pub(super) fn all(&self) -> Vec<Weighted> {
         self.0.iter().map(|(value, _)| *value).collect()
     }
 
-    /// Those of a round: `times[i]` is how often picture `i` is there.
+    /// The values of a round: `times[i]` is how often picture `i` was drawn.
     pub(super) fn redrawn(&self, times: &[u32]) -> Vec<Weighted> {
         let there = self.0.iter().filter(|(_, place)| times[*place] > 0);
         there
@@ -103,7 +103,7 @@ pub(super) fn rounds(count: usize, seed: u64) -> impl Iterator<Item = Vec<u32>> 
     (0..ROUNDS).map(move |round| drawn(count, seed, round))
 }
 
-/// The same where first places are drawn and then the pictures of each: `counts[i]` of place `i`.
+/// The same, but first places are drawn and then the pictures of each: `counts[i]` of place `i`.
 pub(super) fn rounds_within(counts: &[usize], seed: u64) -> impl Iterator<Item = Vec<u32>> {
     let place = move |i: usize, round| drawn(counts[i], seed ^ (1 + i as u64), round);
     rounds(counts.len(), seed)
@@ -117,7 +117,7 @@ pub(super) fn rounds_within(counts: &[usize], seed: u64) -> impl Iterator<Item =
         })
 }
 
-/// A statistic, and what it is in the rounds of a bootstrap.
+/// A statistic, and its values in the rounds of a bootstrap.
 pub(super) struct Bootstrapped {
     pub(super) value: f64,
     rounds: Vec<f64>,
@@ -131,13 +131,13 @@ impl Bootstrapped {
         }
     }
 
-    /// Most rounds agree on which side of zero it lies.
+    /// Whether enough rounds agree on which side of zero it is.
     pub(super) fn is_decided(&self) -> bool {
         let same = self.rounds.iter().filter(|v| **v * self.value > 0.0);
         same.count() as f64 >= SAME_SIGN * self.rounds.len() as f64
     }
 
-    /// Without zero where it is decided.
+    /// Excludes zero if the statistic is significant.
     pub(super) fn interval(&self) -> Interval {
         let mut rounds = self.rounds.clone();
         rounds.sort_by(f64::total_cmp);

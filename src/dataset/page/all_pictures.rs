@@ -1,4 +1,4 @@
-//! A list of all pictures, read from the dataset's folder when somebody opens it.
+//! A list of all pictures, which load from the dataset's folder when a heading is opened.
 
 use super::color_of;
 use crate::dataset::{SampleSummary, Summary};
@@ -8,11 +8,11 @@ use crate::plot::Page;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// So many pictures stand behind one heading, and so many are listed: a page stays below a few MB.
+/// Pictures per heading, and maximum in all: a page stays below a few MB.
 const PICTURES_PER_HEADING: usize = 100;
 const MAX_LISTED_PICTURES: usize = 5_000;
 
-/// Adds every picture, a hundred behind each heading, for a page in `page_folder`.
+/// Adds every picture, a hundred under each heading, for a page in `page_folder`.
 pub(super) fn add_all(page: &mut Page, folder: &Path, summary: &Summary, page_folder: &Path) {
     let root = io::relative(&absolute_path(folder), &absolute_path(page_folder));
     page.subheading("All pictures").text(
@@ -81,14 +81,14 @@ fn colored_path(class: u32, path: &str) -> String {
     )
 }
 
-/// A relative path as an address, every byte that means something in one written out.
+/// A relative path as a URL, with every byte that is special in URLs percent-encoded.
 fn address(path: &Path) -> String {
     let text: String = path
         .to_string_lossy()
         .bytes()
         .map(percent_encoded)
         .collect();
-    // Before a colon would stand a scheme.
+    // Otherwise what precedes a colon would be read as a scheme.
     if text.starts_with('/') || text.starts_with("./") {
         text
     } else {

@@ -1,4 +1,4 @@
-//! A dataset beside the user's own photographs: distributions that should be alike.
+//! A dataset next to the user's own photographs: distributions that should be alike.
 
 use super::distributions::extremes;
 use super::labelled_pictures::{LabelledPicture, LabelledSet};
@@ -17,11 +17,12 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// So many pictures of each set are read to compare their pixels, and so wide.
+/// Maximum number of pictures of each set whose pixels are compared, and the width at which they
+/// are read.
 const MAX_MEASURED_PICTURES: usize = 64;
 const MEASURED_WIDTH_PX: usize = 256;
 
-/// Bins of a histogram, and its frame and room in SVG units.
+/// Bins of a histogram, and its frame and margins in SVG units.
 const HISTOGRAM_BINS: usize = 20;
 const FRAME: [f64; 2] = [250.0, 110.0];
 const ROOM_LEFT: f64 = 12.0;
@@ -29,12 +30,12 @@ const ROOM_RIGHT: f64 = 12.0;
 const ROOM_ABOVE: f64 = 24.0;
 const ROOM_BELOW: f64 = 24.0;
 
-/// Colours of Okabe and Ito: ours as everywhere on the page, the others beside it.
+/// Okabe and Ito's colours: ours as everywhere on the page, and the other set's.
 const OURS: &str = "#0072b2";
 const THEIRS: &str = "#d55e00";
 
-/// Puts the two side by side, what differs most first, with at most `max_figures` of the others'
-/// pictures.
+/// Shows the two side by side, the largest differences first, with at most `max_figures` of the
+/// other set's pictures.
 pub(super) fn add_comparison(
     page: &mut Page,
     ours: &LabelledSet,
@@ -88,7 +89,7 @@ fn describe_unlabelled(set: &LabelledSet) -> String {
     }
 }
 
-/// What can be compared of a set, by what it is.
+/// The measures of a set that can be compared.
 fn measure(set: &LabelledSet) -> Vec<Measure> {
     let mut measures = Vec::from(measure_boxes(set));
     measures.extend(measure_pixels(set));
@@ -121,7 +122,7 @@ fn percentages(set: &LabelledSet, i: usize) -> Vec<f64> {
     set.boxes().map(|(_, b)| 100.0 * b[i]).collect()
 }
 
-/// The title of a measure and how the statistics of a picture give it.
+/// The title of a measure and how it is computed from a picture's statistics.
 type PixelMeasure = (&'static str, fn(&PixelStatistics) -> f64);
 
 fn measure_pixels(set: &LabelledSet) -> [Measure; 4] {
@@ -142,7 +143,7 @@ fn measure_pixels(set: &LabelledSet) -> [Measure; 4] {
     measures.map(|(title, value)| (title, statistics.iter().map(value).collect()))
 }
 
-/// What the pixels of a picture are like as a whole, in codes of 8 bits.
+/// Statistics of a whole picture's pixels, in 8-bit codes.
 pub(in crate::dataset) struct PixelStatistics {
     pub(in crate::dataset) brightness: f64,
     pub(in crate::dataset) contrast: f64,
@@ -151,7 +152,7 @@ pub(in crate::dataset) struct PixelStatistics {
 }
 
 impl PixelStatistics {
-    /// None for a picture that cannot be read, which is warned of.
+    /// None for a picture that cannot be read, with a warning.
     fn read(path: &Path) -> Option<Self> {
         let picture = io::read::<LinearRgb>(path)
             .inspect_err(|error| log::warn!("{error}"))
@@ -174,7 +175,7 @@ impl PixelStatistics {
     }
 }
 
-/// Mean distance of a pixel from the one to its right.
+/// Mean absolute difference between a pixel and the one to its right.
 fn detail(luma: &Image<f32>) -> f64 {
     mean(
         luma.rows()
@@ -222,7 +223,7 @@ fn caption(picture: &LabelledPicture) -> String {
     }
 }
 
-/// Shares of the classes, those of the same name beside each other.
+/// Shares of the classes, those of the same name side by side.
 fn class_shares(ours: &LabelledSet, theirs: &LabelledSet) -> Table {
     let both = [ours, theirs].map(shares_by_class);
     let names: BTreeSet<&String> = both.iter().flat_map(BTreeMap::keys).collect();
@@ -280,7 +281,7 @@ pub(in crate::dataset) fn quantiles(values: &[f64]) -> String {
 /// A measure's name, and its values.
 pub(in crate::dataset) type Measure = (&'static str, Vec<f64>);
 
-/// One measure of both.
+/// One measure of both sets.
 pub(in crate::dataset) struct ComparedMeasure {
     title: &'static str,
     ours: Vec<f64>,
@@ -288,7 +289,7 @@ pub(in crate::dataset) struct ComparedMeasure {
     pub(in crate::dataset) distance: f64,
 }
 
-/// What both have values of, what differs most first.
+/// The measures for which both sets have values, the largest difference first.
 fn compare_measures(ours: &LabelledSet, theirs: &LabelledSet) -> Vec<ComparedMeasure> {
     let pairs = measure(ours).into_iter().zip(measure(theirs));
     let mut measures: Vec<_> = pairs
@@ -318,7 +319,7 @@ impl ComparedMeasure {
         ]
     }
 
-    /// Shares of each in bins of the same width: ours as bars, the others as steps.
+    /// Shares of both sets in bins of the same width: ours as bars, theirs as steps.
     pub(in crate::dataset) fn svg(&self) -> String {
         let [w, h] = FRAME;
         let (width, height) = (ROOM_LEFT + w + ROOM_RIGHT, ROOM_ABOVE + h + ROOM_BELOW);
@@ -340,7 +341,7 @@ impl ComparedMeasure {
         bars(&ours, most) + &steps(&theirs, most)
     }
 
-    /// The title above the frame and its ends below it.
+    /// The title above the frame and the ends of the range below it.
     fn words(&self, [low, high]: [f64; 2]) -> String {
         let [w, h] = FRAME;
         let below = ROOM_ABOVE + h + 14.0;
@@ -355,7 +356,7 @@ fn bin_x(i: usize) -> f64 {
     ROOM_LEFT + FRAME[0] / HISTOGRAM_BINS as f64 * i as f64
 }
 
-/// Height in the picture of a share of values.
+/// Height in the chart of a share of values.
 fn share_y(share: f64, most: f64) -> f64 {
     ROOM_ABOVE + FRAME[1] * (1.0 - share / most)
 }
@@ -400,7 +401,7 @@ fn bin_of(value: f64, low: f64, high: f64) -> usize {
     (place.max(0.0) as usize).min(HISTOGRAM_BINS - 1)
 }
 
-/// Greatest distance of two empirical distribution functions.
+/// Greatest distance between two empirical distribution functions.
 ///
 /// # Method
 /// Kolmogorov and Smirnov's statistic of two samples.
@@ -412,7 +413,7 @@ fn distance(mut a: Vec<f64>, mut b: Vec<f64>) -> f64 {
     gaps.map(f64::abs).fold(0.0, f64::max)
 }
 
-/// Share of sorted values that are not above `x`.
+/// Share of sorted values that are at most `x`.
 fn share_below(values: &[f64], x: f64) -> f64 {
     values.partition_point(|v| *v <= x) as f64 / values.len() as f64
 }
@@ -422,7 +423,7 @@ fn text_at([x, y]: [f64; 2], anchor: &str, text: &str) -> String {
     format!("<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{text}</text>\n")
 }
 
-/// The largest channel less the smallest.
+/// The largest channel minus the smallest.
 fn channel_spread(codes: [f32; 3]) -> f32 {
     codes.into_iter().fold(0.0, f32::max) - codes.into_iter().fold(255.0, f32::min)
 }
@@ -442,7 +443,7 @@ mod tests {
             [0.0, 100.0].map(|from| (0..50).map(|i| from + f64::from(i)).collect::<Vec<f64>>());
         assert_eq!(distance(low.clone(), low.clone()), 0.0);
         assert_eq!(distance(low.clone(), high), 1.0);
-        // Half of the values lie above all of the others.
+        // Half of the values are above all of the others.
         let up: Vec<f64> = low.iter().map(|v| v + 25.0).collect();
         assert!((distance(low, up) - 0.5).abs() < 1e-12);
     }

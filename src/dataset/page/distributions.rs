@@ -1,4 +1,4 @@
-//! What was drawn and what can be seen, as histograms.
+//! What was drawn and what is visible, as histograms.
 
 use super::labelled_pictures::LabelledSet;
 use crate::dataset::{SampleSummary, Summary};
@@ -11,11 +11,11 @@ use std::path::Path;
 
 /// Bins of a histogram of numbers.
 const HISTOGRAM_BINS: usize = 20;
-/// Most bars of a histogram of integers.
+/// Maximum number of bars of a histogram of integers.
 const MAX_BARS: f64 = 100.0;
-/// Most bins of a histogram of counts.
+/// Maximum number of bins of a histogram of counts.
 const MAX_COUNT_BINS: usize = 60;
-/// Most classes that have a map of their own.
+/// Maximum number of classes that have a map of their own.
 const MAX_CLASS_MAPS: usize = 12;
 
 /// Adds every drawn value against its distribution.
@@ -43,13 +43,13 @@ pub(super) fn add_drawn(page: &mut Page, summary: &Summary) {
     }
 }
 
-/// What was drawn, by how it is shown.
+/// The draws, by how they are shown.
 struct DrawnValues {
     /// Values that vary.
     charts: Vec<Histogram>,
     /// Values that do not.
     fixed: Table,
-    /// What happens by chance.
+    /// Events that happen by chance.
     chances: Table,
 }
 
@@ -65,7 +65,7 @@ fn drawn_values(summary: &Summary) -> DrawnValues {
             drawn.chances.push([key.clone()].into_iter().chain(shares));
             continue;
         }
-        // A recipe leaves keys out that are at their default.
+        // Recipes omit keys that have their default.
         let from = summary.distribution(key).filter(|from| !from.is_fixed());
         match from {
             None if are_equal(values) => drawn.fixed.push([key.clone(), values[0].to_string()]),
@@ -75,7 +75,7 @@ fn drawn_values(summary: &Summary) -> DrawnValues {
     drawn
 }
 
-/// How many of the values lie below a limit, in words: `0.25 (3 of 12)`.
+/// How many of the values are below a limit, in words: `0.25 (3 of 12)`.
 fn share_below(values: &[f64], limit: f64) -> String {
     let below = values.iter().filter(|value| **value < limit).count();
     let all = values.len();
@@ -108,7 +108,7 @@ fn integer_histogram(key: &str, values: &[f64], [low, high]: [f64; 2]) -> Histog
     }
 }
 
-/// A bar for each integer, as long as they can be distinguished.
+/// A bar for each integer, as long as the bars can be distinguished.
 fn integer_bars([low, high]: [f64; 2]) -> usize {
     let numbers = high - low + 1.0;
     if numbers <= MAX_BARS {
@@ -137,14 +137,14 @@ pub(super) fn extremes<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2
     let ends = values
         .into_iter()
         .fold(none, |[low, high], value| [value.min(low), value.max(high)]);
-    // A range of one value is widened, so that it has bins.
+    // A range of a single value is widened so that it has bins.
     match ends {
         [low, high] if low < high => [low, high],
         [low, _] => [low - 0.5, low + 0.5],
     }
 }
 
-/// Adds what can be seen, and how large it is.
+/// Adds what is visible, and how large it is.
 pub(super) fn add_seen(page: &mut Page, summary: &Summary) {
     page.heading("What is seen");
     add_histograms(
@@ -173,7 +173,7 @@ fn count_histogram(
     histogram
 }
 
-/// Seen shares of objects.
+/// Visible shares of objects.
 pub(super) fn visible_histogram(title: &str, shares: &[f64]) -> Histogram {
     Histogram::new(title, shares, [0.0, 1.0], HISTOGRAM_BINS)
 }
@@ -184,7 +184,8 @@ fn side_histogram(title: &str, boxes: &[[f64; 2]], side: usize) -> Histogram {
     Histogram::new(title, &sides, [0.0, largest], HISTOGRAM_BINS)
 }
 
-/// Adds where the labels are, all of them and those of each class that is not too many.
+/// Adds where the labels are: all of them, and those of each class unless there are too many
+/// classes.
 fn add_heat_maps(page: &mut Page, summary: &Summary) {
     let set = LabelledSet::from_summary(Path::new(""), summary);
     let mut maps = heat_map("centres of all labels", &set.centres());
@@ -203,7 +204,7 @@ fn class_maps(classes: &[String], set: &LabelledSet) -> String {
     maps.collect()
 }
 
-/// Adds charts beside each other.
+/// Adds charts side by side.
 pub(super) fn add_histograms(page: &mut Page, charts: &[Histogram]) {
     let all: String = charts.iter().map(Histogram::svg).collect();
     page.html(&format!("<div class=\"histograms\">\n{all}</div>\n"));

@@ -9,10 +9,10 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// More images than this are no folder of one's own pictures, but a whole disk.
+/// More images than this are not a folder of one's own pictures, but a whole disk.
 const MAX_IMAGES: usize = 200_000;
 
-/// Pictures with boxes, from wherever.
+/// Pictures with boxes from any source.
 #[derive(Default)]
 pub(in crate::dataset) struct LabelledSet {
     /// Names of the classes, in order; may be fewer than occur.
@@ -32,8 +32,8 @@ pub(in crate::dataset) struct LabelledPicture {
 }
 
 impl LabelledSet {
-    /// A YOLO dataset, or a folder with images that have YOLO labels beside them or in `labels`
-    /// instead of `images`.
+    /// Reads a YOLO dataset, or a folder with images that have YOLO labels next to them or in
+    /// `labels` instead of `images`.
     ///
     /// # Errors
     /// A folder without images; a label that cannot be read.
@@ -115,7 +115,7 @@ impl LabelledPicture {
     }
 }
 
-/// The label file of an image: that of a YOLO dataset, or one of its name in the same folder.
+/// The label file of an image: that of a YOLO dataset, or one of the same name in the same folder.
 fn label_beside(image: &Path) -> Option<PathBuf> {
     let mut candidates = [YoloSet::label_of(image), image.with_extension("txt")].into_iter();
     candidates.find(|label| label.is_file())

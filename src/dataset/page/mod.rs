@@ -1,5 +1,5 @@
 //! A dataset on one page: pictures with their labels, every drawn value against its distribution,
-//! what can be seen, and the user's own pictures beside it.
+//! what is visible, and the user's own pictures for comparison.
 
 mod all_pictures;
 pub(super) mod beside;
@@ -17,15 +17,17 @@ use crate::plot::{Page, Table, escaped};
 use labelled_pictures::LabelledSet;
 use std::path::{Path, PathBuf};
 
-/// What is asked of the page.
+/// Options of the page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DatasetReportOptions {
-    /// Most pictures on the page itself: outliers, then others evenly spread. Default: 32.
+    /// Maximum number of pictures on the page itself: outliers, then others evenly spread. Default:
+    /// 32.
     pub most: usize,
-    /// Folder that the page is written into, for links to the pictures; by default the dataset's.
+    /// Folder that the page will be written into, for links to the pictures; by default the
+    /// dataset's.
     pub page: Option<PathBuf>,
-    /// The user's own pictures, to be shown beside: a YOLO dataset, or a folder of images with
-    /// labels. Default: none.
+    /// The user's own pictures, for comparison: a YOLO dataset, or a folder of images with labels.
+    /// Default: none.
     pub beside: Option<PathBuf>,
 }
 
@@ -42,7 +44,7 @@ impl Default for DatasetReportOptions {
 /// The page of a dataset's folder.
 ///
 /// # Errors
-/// As [`Summary::read`]; a picture that cannot be read; a folder beside it without images.
+/// As [`Summary::read`]; a picture that cannot be read; a folder for comparison without images.
 pub fn page(folder: &Path, options: &DatasetReportOptions) -> Result<Page> {
     let summary = Summary::read(folder)?;
     let mut page = begin_page(folder, &summary);
@@ -78,7 +80,7 @@ fn add_statistics(page: &mut Page, summary: &Summary) {
     add_identity(page, summary);
 }
 
-/// "Dataset" and the folder's name, once where it is called so itself.
+/// "Dataset" and the folder's name, without repeating the word if the name begins with it.
 fn title(folder: &Path) -> String {
     let path = std::path::absolute(folder).unwrap_or_default();
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -135,7 +137,7 @@ fn balance(summary: &Summary) -> Table {
     table
 }
 
-/// What was odd about the photos of the place and their cameras.
+/// What was unusual about the photos of the place and their cameras.
 fn add_background_notes(page: &mut Page, summary: &Summary) {
     let notes = summary.identity["recipe"]["notes"].as_object();
     let Some(notes) = notes.filter(|notes| !notes.is_empty()) else {
@@ -204,7 +206,7 @@ fn color_of(class: u32) -> String {
     format!("#{:02x}{:02x}{:02x}", color.r, color.g, color.b)
 }
 
-/// Why objects have no label, and how much is seen of those.
+/// Why objects have no label, and how much of them is visible.
 fn add_unlabelled(page: &mut Page, summary: &Summary) {
     page.heading("Why objects have no label");
     if summary.unlabelled.values().sum::<u64>() == 0 {
@@ -218,7 +220,7 @@ fn add_unlabelled(page: &mut Page, summary: &Summary) {
     distributions::add_histograms(page, &[histogram]);
 }
 
-/// What the recipe's policy decides about.
+/// What the recipe's policy applies to.
 fn obstruction_note(identity: &serde_json::Value) -> String {
     let policy = identity["obstructed"].as_str().unwrap_or("drop");
     let obstructed = match &identity["recipe"]["label"]["min_visible"] {

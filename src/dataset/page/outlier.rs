@@ -1,41 +1,41 @@
-//! What is unlike the rest, in robust standard deviations.
+//! Values that are unlike the rest, in robust standard deviations.
 
 use crate::quantile::median;
 use std::collections::BTreeMap;
 
-/// A number of every row.
+/// A value for every row.
 pub(crate) struct Feature<'a> {
-    /// What it is: `objects`.
+    /// Its name: `objects`.
     pub(crate) name: &'a str,
-    /// One for each row; those that are not finite are not looked at.
+    /// One for each row; those that are not finite are ignored.
     pub(crate) values: Vec<f64>,
 }
 
 /// A row that is unlike the others.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outlier {
-    /// Which row.
+    /// Index of the row.
     pub row: usize,
     /// How far it is from the median, in robust standard deviations.
     pub deviations: f64,
-    /// By what: `objects 17, typically 8`.
+    /// The reason: `objects 17, typically 8`.
     pub why: String,
 }
 
-/// From so many deviations on a value is unlike the others ([Iglewicz and Hoaglin 1993]).
+/// Threshold, in deviations, above which a value is an outlier ([Iglewicz and Hoaglin 1993]).
 ///
 /// [Iglewicz and Hoaglin 1993]: https://www.itl.nist.gov/div898/handbook/eda/section3/eda35h.htm
 const MIN_DEVIATIONS: f64 = 3.5;
 
-/// A normal distribution's standard deviation over its median and its mean absolute deviation.
+/// Ratio of a normal distribution's standard deviation to its median and mean absolute deviation.
 const SIGMA_PER_MEDIAN_DEVIATION: f64 = 1.4826;
 const SIGMA_PER_MEAN_DEVIATION: f64 = 1.2533;
 
-/// The rows that are unlike the others by at least one feature, the strangest first.
+/// The rows that are outliers in at least one feature, the most extreme first.
 ///
 /// # Method
 /// The modified z-score of Iglewicz and Hoaglin: distance from the median over the median absolute
-/// deviation, or over the mean one where most values are the same.
+/// deviation, or over the mean one if most values are the same.
 pub(crate) fn outliers(features: &[Feature<'_>]) -> Vec<Outlier> {
     let mut all: Vec<Outlier> = worst_by_row(features).into_values().collect();
     all.sort_by(|a, b| b.deviations.total_cmp(&a.deviations));
@@ -54,7 +54,7 @@ fn worst_by_row(features: &[Feature<'_>]) -> BTreeMap<usize, Outlier> {
 }
 
 impl Feature<'_> {
-    /// The rows that are unlike the others by this feature.
+    /// The rows that are outliers in this feature.
     fn outliers(&self) -> Vec<Outlier> {
         let Some((median, scale)) = median_and_scale(&self.values) else {
             return Vec::new();
@@ -68,7 +68,7 @@ impl Feature<'_> {
     fn outlier(&self, row: usize, value: f64, median: f64, scale: f64) -> Option<Outlier> {
         let deviations = (value - median).abs() / scale;
         let (shown, typical) = (short(value), short(median));
-        // What reads the same is not unlike.
+        // A value that reads the same as the typical one is no outlier.
         (shown != typical && deviations > MIN_DEVIATIONS).then(|| Outlier {
             row,
             deviations,
@@ -77,7 +77,7 @@ impl Feature<'_> {
     }
 }
 
-/// Median and robust standard deviation; none where all values are the same.
+/// Median and robust standard deviation; none if all values are the same.
 fn median_and_scale(values: &[f64]) -> Option<(f64, f64)> {
     let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     let middle = median(finite.iter().copied(), f64::total_cmp)?;
@@ -92,7 +92,7 @@ fn median_and_scale(values: &[f64]) -> Option<(f64, f64)> {
     (scale > 0.0).then_some((middle, scale))
 }
 
-/// A number with two decimals at most.
+/// A number with at most two decimals.
 pub(crate) fn short(value: f64) -> String {
     let text = format!("{value:.2}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

@@ -13,9 +13,9 @@ use rayon::prelude::*;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Boxes and masks are shown and hidden without a script: a ticked box decides what its neighbours
-/// look like. Words over the objects are for enlarged pictures; the list of all pictures loads what
-/// is seen of it.
+/// Boxes and masks are shown and hidden without a script, by the state of check boxes. Words over
+/// the objects are for enlarged pictures; the list of all pictures loads those that are scrolled
+/// into view.
 pub(super) const SAMPLES_STYLE: &str = "<style>.samples text{display:none}.samples figure:target text{display:block}\
     #boxes:not(:checked)~.samples .boxes,#masks:not(:checked)~.samples .masks,#others:not(:checked)~.samples .others\
     {display:none}.histograms{display:flex;flex-wrap:wrap;gap:10px}\
@@ -24,17 +24,17 @@ pub(super) const SAMPLES_STYLE: &str = "<style>.samples text{display:none}.sampl
     .all svg{position:absolute;left:0;top:0;width:100%;height:auto}.key{white-space:nowrap;margin-right:1.3em}\
     .key i{display:inline-block;width:1em;height:1em;margin-right:.4em;vertical-align:-.15em;border:1px solid #888}</style>\n";
 
-/// The switches over the samples.
+/// The check boxes above the samples.
 const SWITCHES: [(&str, &str, bool); 3] = [
     ("boxes", "boxes of labelled objects", true),
     ("masks", "their visible parts", false),
     ("others", "outlines of objects without a label", true),
 ];
 
-/// Colour of outlines without a label: seen on light and dark.
+/// Colour of outlines without a label: visible on light and dark.
 const UNLABELLED: &str = "#c8c8c8";
 
-/// Adds the pictures and the switches over them.
+/// Adds the pictures and the check boxes above them.
 pub(super) fn add_samples(
     page: &mut Page,
     summary: &Summary,
@@ -98,13 +98,13 @@ fn legend_key(fill: &str, text: &str) -> String {
 
 /// A picture to show.
 struct SelectedSample {
-    /// Its place among all samples.
+    /// Its index among all samples.
     row: usize,
     /// What sets it apart from the others, if anything does.
     why: Option<String>,
 }
 
-/// Pictures to show: those unlike the others, at most half, then others evenly spread.
+/// Pictures to show: outliers, at most half, then others evenly spread.
 fn select_samples(samples: &[SampleSummary], count: usize) -> Vec<SelectedSample> {
     let outliers = outliers(&features(samples)).into_iter().take(count / 2);
     let selected = outliers.map(|outlier| SelectedSample {
@@ -122,10 +122,10 @@ fn select_samples(samples: &[SampleSummary], count: usize) -> Vec<SelectedSample
     selected
 }
 
-/// The title of a measure and how the summary of a sample gives it.
+/// The title of a measure and how it is computed from a sample's summary.
 type SampleMeasure = (&'static str, fn(&SampleSummary) -> f64);
 
-/// What may set a picture apart.
+/// The features by which outliers are found.
 fn features(samples: &[SampleSummary]) -> [Feature<'static>; 7] {
     SAMPLE_MEASURES.map(|(name, value)| Feature {
         name,
