@@ -1,7 +1,7 @@
-//! Arbitrary output variables: everything that deep samples hold besides the finished frame, as
-//! parts of an EXR file.
+//! Arbitrary output variables: everything in the deep samples besides the finished frame, as parts
+//! of an EXR file.
 //!
-//! Each is a fold of its own over the samples, done only on request.
+//! Each is a separate fold over the samples, done only on request.
 
 use crate::composite::cryptomatte::cryptomatte;
 use crate::composite::part::{float_part, pixels_of, plain_part};
@@ -20,25 +20,24 @@ use std::str::FromStr;
 pub enum Aov {
     /// `beauty`: the finished frame, `R G B A`, scene-linear, premultiplied.
     Beauty,
-    /// `coverage`: share of the pixel that objects hide of the plate, `Y`.
+    /// `coverage`: share of the plate that objects hide in the pixel, `Y`.
     Coverage,
     /// `shadow`: factor on the plate, `R G B`.
     Shadow,
-    /// `id`: the [`front`] object, integers, `id`; 0 where there is none.
+    /// `id`: the [`front`] object, integers, `id`; 0 if there is none.
     Id,
-    /// `depth`: its distance along the optical axis, metres, `Z`; infinite where there is none.
+    /// `depth`: its distance along the optical axis, metres, `Z`; infinite if there is none.
     Depth,
-    /// `position`: its point of the world, metres, `X Y Z`; NaN where there is none.
+    /// `position`: its point in the world, metres, `X Y Z`; NaN if there is none.
     Position,
-    /// `uv`: its texture coordinates, right and down, `U V`; NaN where there is none.
+    /// `uv`: its texture coordinates, right and down, `U V`; NaN if there is none.
     Uv,
     /// `cryptomatte`: coverage of every object, see [`cryptomatte`]; the first part of a file.
     Cryptomatte,
     /// `layers`: a part `layer.ID` for each card: its own light and what it hides, held out by what
-    /// lies in front, `R G B A`; with film in the picture also `TR TG TB`, 1 minus what it
-    /// hides per channel. Their sum is the picture of the sharp objects at rest, before Poisson
-    /// blending, blur, depth of field, a belt's exposure and finish: with those it is not the
-    /// beauty.
+    /// is in front, `R G B A`; if the picture contains film also `TR TG TB`, 1 minus what it hides
+    /// per channel. Their sum is the picture of the sharp objects at rest, before Poisson blending,
+    /// blur, depth of field, a belt's exposure and finish: with those it is not the beauty.
     Layers,
 }
 
@@ -71,19 +70,19 @@ impl FromStr for Aov {
 /// Coverage above which an object owns a pixel: that of the reference renderer.
 const FRONT_ALPHA: f32 = 0.05;
 
-/// The foremost object that covers more than `FRONT_ALPHA` of a pixel; none where that is wholly
-/// behind what of the place stands in front, as all that is farther away is too.
+/// The foremost object that covers more than `FRONT_ALPHA` of a pixel; none if it is entirely
+/// behind the holdout, since everything farther away is, too.
 pub fn front(samples: &[DeepSample]) -> Option<&DeepSample> {
     let front = samples.iter().find(|s| s.alpha > FRONT_ALPHA);
     front.filter(|s| s.visible > 0.0)
 }
 
-/// The requested parts, of one size, in that order but for the Cryptomatte, which comes first:
-/// Blender 3.4 and 4.2 look for it in the first part alone.
+/// The requested parts, all of one size, in the requested order except for the Cryptomatte, which
+/// comes first: Blender 3.4 and 4.2 look for it only in the first part.
 ///
-/// `frame` is the finished frame of the same samples, `shot` what they were rendered from: position
-/// and texture coordinates are those at the pixel's centre, as depth is; all three are those of the
-/// curved card where it is curved.
+/// `frame` is the finished frame of the same samples, `shot` what they were rendered from.
+/// Position, texture coordinates and depth are those at the pixel's centre; for a curved card they
+/// are those of the curved surface.
 pub fn parts(aovs: &[Aov], deep: &DeepImage, shot: &Shot, frame: &Image<PremulRgba>) -> Vec<Part> {
     let picture = AovSource {
         deep,
@@ -97,12 +96,12 @@ pub fn parts(aovs: &[Aov], deep: &DeepImage, shot: &Shot, frame: &Image<PremulRg
     ordered.flat_map(|aov| picture.parts_of(aov)).collect()
 }
 
-/// Everything that parts are made from.
+/// The sources of all parts.
 struct AovSource<'a> {
     deep: &'a DeepImage,
     shot: &'a Shot,
     frame: &'a Image<PremulRgba>,
-    /// The cards that are seen as curved ones: samples have the depth of their planes.
+    /// The cards that appear curved: samples have the depth of their planes.
     bent: Vec<BentCard<'a>>,
 }
 
@@ -174,7 +173,7 @@ impl AovSource<'_> {
             .map(|(at, s)| s.map_or([f32::NAN; 3], |s| self.position_at(at, s)))
     }
 
-    /// The point of the world that a sample shows at its pixel's centre.
+    /// The point in the world that a sample shows at its pixel's centre.
     fn position_at(&self, at: (usize, usize), sample: &DeepSample) -> [f32; 3] {
         let point = self
             .bent_point(at, sample)
@@ -204,7 +203,7 @@ impl AovSource<'_> {
         ])
     }
 
-    /// The point of a curved card that a sample shows at its pixel's centre; none of a flat one.
+    /// The point of a curved card that a sample shows at its pixel's centre; none for a flat one.
     fn bent_point(&self, at: (usize, usize), sample: &DeepSample) -> Option<BentPoint> {
         let mut bent = self.bent.iter();
         let bent = bent.find(|bent| bent.card.id == sample.object)?;
@@ -229,9 +228,9 @@ struct BentCard<'a> {
 
 /// A point of a curved card.
 struct BentPoint {
-    /// Where it is on the flat card.
+    /// Its position on the flat card.
     flat: Point2<f64>,
-    /// Where it is in the world.
+    /// Its position in the world.
     world: Point3<f64>,
 }
 
@@ -242,7 +241,7 @@ fn bent_cards(shot: &Shot) -> Vec<BentCard<'_>> {
 }
 
 impl<'a> BentCard<'a> {
-    /// None of a card that the camera sees as a flat one.
+    /// None for a card that appears flat to the camera.
     fn new(card: &'a Card, eye: &Point3<f64>) -> Option<Self> {
         Some(Self {
             card,
@@ -251,7 +250,8 @@ impl<'a> BentCard<'a> {
         })
     }
 
-    /// The point that is seen where a point of the flat card's plane is; none past the cylinder.
+    /// The visible point in the direction of a point of the flat card's plane; none past the
+    /// cylinder.
     fn seen_at(&self, on_plane: &Point3<f64>) -> Option<BentPoint> {
         let world_from_card = &self.card.quad.world_from_card;
         let on_plane = world_from_card.inverse_transform_point(on_plane).xy();
@@ -264,7 +264,7 @@ impl<'a> BentCard<'a> {
     }
 }
 
-/// What one object adds to the picture; with what it lets pass per channel where there is film.
+/// What one object adds to the picture; with its transmittance per channel if there is film.
 fn layer_part(deep: &DeepImage, id: ObjectId, tinted: bool) -> Part {
     let name = format!("layer.{}", id.0);
     let values = pixels_of(deep).map(|at| own_light(deep, at, id));
@@ -276,7 +276,7 @@ fn layer_part(deep: &DeepImage, id: ObjectId, tinted: bool) -> Part {
     float_part(name, names, values.map(tinted_values))
 }
 
-/// Light, coverage, and what is let pass per channel.
+/// Light, coverage, and transmittance per channel.
 fn tinted_values((p, hidden): (PremulRgba, LinearRgb)) -> [f32; 7] {
     let passes = hidden.map(|h| 1.0 - h);
     [p.r, p.g, p.b, p.a, passes.r, passes.g, passes.b]
@@ -292,7 +292,7 @@ fn own_light(deep: &DeepImage, (x, y): (usize, usize), id: ObjectId) -> (PremulR
     (sum, hidden)
 }
 
-/// Light of a sample over what it hides.
+/// Light of a sample with the coverage that is visible.
 fn seen_light(sample: &DeepSample) -> PremulRgba {
     let LinearRgb { r, g, b } = sample.light;
     PremulRgba::new(r, g, b, sample.visible)

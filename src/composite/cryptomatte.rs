@@ -7,14 +7,14 @@ use crate::pixel::ObjectId;
 use crate::render::Cryptomatte;
 use std::collections::BTreeSet;
 
-/// What the part and its channels are called.
+/// Name of the part and of its channels.
 const NAME: &str = "CryptoObject";
 
-/// Identifier and visible coverage of up to six objects of each pixel, the most visible first, with
-/// the manifest of their names: a part that programs that know Cryptomatte read as it is.
+/// Identifier and visible coverage of up to six objects in each pixel, the most visible first, with
+/// the manifest of their names: a part that programs with Cryptomatte support read as it is.
 ///
 /// An object's coverage is the share of the pixel that it hides of what is behind it, seen through
-/// what lies in front. All is as [`Cryptomatte`] says.
+/// what is in front. Everything follows [`Cryptomatte`].
 pub fn cryptomatte(deep: &DeepImage, name: impl Fn(ObjectId) -> String) -> Part {
     let samples = pixels_of(deep).flat_map(|(x, y)| deep.at(x, y));
     let objects: BTreeSet<ObjectId> = samples.map(|s| s.object).collect();

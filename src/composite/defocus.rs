@@ -1,15 +1,16 @@
-//! Depth of field: what is rendered out of focus is as soft as a thin lens makes it.
+//! Depth of field: what is rendered out of focus is as soft as a thin lens would make it.
 //!
 //! # Method
-//! Every deep sample spreads over its circle of confusion, a disc whose radius is that of its own
+//! Every deep sample spreads over its circle of confusion, a disc whose radius depends on its own
 //! depth (Potmesil and Chakravarty, "A lens and aperture camera model for synthetic image
-//! generation", 1981), object by object: what an object hides in part is known by its own coverage,
-//! which samples keep, and its colour there is that of what is seen of it close by. Where the
-//! objects in a pixel are equally far out of focus their soft light simply adds up, as that of any
-//! blur; else the nearer ones hide the others behind them by their soft coverage. Cards and shadows
-//! beyond the border spread into the picture, too: they are rendered as far as circles reach.
+//! generation", 1981), object by object: the coverage of a partly hidden object is known from its
+//! samples, and its colour in the hidden part is taken from its visible part nearby. Where the
+//! objects in a pixel are equally far out of focus, their soft light simply adds up, as with any
+//! blur; otherwise the nearer ones hide the others behind them by their soft coverage. Cards and
+//! shadows beyond the border spread into the picture, too: they are rendered as far as circles
+//! reach.
 //!
-//! The plate is a photo and has its own depth of field: of it only the shadows are blurred.
+//! The plate is a photo and has its own depth of field: only the shadows on it are blurred.
 
 mod disc;
 
@@ -27,19 +28,20 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Radii of the objects in a pixel that differ by less are the same, and by more than three times
-/// as much have nothing in common, pixels.
+/// Radii of the objects in a pixel that differ by less count as equal; those that differ by more
+/// than three times as much count as entirely different, pixels.
 const SAME_RADIUS_PX: f64 = 0.25;
-/// Coverage below this is none: a fortieth of a code of 8 bits.
+/// Coverage below this counts as none: a fortieth of an 8-bit code.
 const LEAST_ALPHA: f32 = 1e-4;
-/// Seen share of an object's coverage from which on its colour is known in a pixel.
+/// Visible share of an object's coverage above which its colour is known in a pixel.
 const KNOWN_SHARE: f32 = 0.05;
-/// Weight of the surface's shadow where nothing is seen of it.
+/// Weight of the surface's shadow where the surface is hidden.
 const HIDDEN_WEIGHT: f32 = 0.01;
 
-/// The deep picture of a shot as its lens sees it; none where that is sharp everywhere.
+/// The deep picture of a shot as its lens sees it; none if that is sharp everywhere.
 ///
-/// Coverage becomes soft with the light: labels are made of the picture before.
+/// Coverage becomes soft together with the light: labels are made from the picture before
+/// defocusing.
 pub(super) fn defocus(deep: &DeepImage, shot: &Shot, options: &RenderOptions) -> Option<DeepImage> {
     let focus = Focus::new(shot, shot.thin_lens?);
     let surface = SoftSurface::new(&focus, [deep.width(), deep.height()]);
@@ -64,13 +66,13 @@ struct Focus<'a> {
 /// The samples of every object, in the picture and around it.
 type Objects = BTreeMap<ObjectId, Vec<PlacedSample>>;
 
-/// A deep sample, where it is, and per channel what it hides and how much is seen of it.
+/// A deep sample, its position, what it hides per channel, and how much of it is visible.
 struct PlacedSample {
     /// Column and row, which may be beyond the picture's border.
     at: [isize; 2],
     sample: DeepSample,
     hidden: LinearRgb,
-    /// Its `visible`, in the colour that what is nearer lets pass.
+    /// Its `visible`, tinted by the transmittance of what is nearer.
     seen: LinearRgb,
 }
 
@@ -91,7 +93,7 @@ struct SoftObject {
     columns: Range<usize>,
     rows: Range<usize>,
     pixels: Vec<SoftPixel>,
-    /// Pixels to the farthest that a circle of confusion of the picture reaches.
+    /// Distance to the farthest pixel that a circle of confusion of the picture reaches, pixels.
     reach: isize,
 }
 
@@ -108,11 +110,11 @@ struct Shadows {
     margin: usize,
     /// Factors on the plate.
     factors: Image<LinearRgb>,
-    /// How much is seen of the surface; a little everywhere.
+    /// How visible the surface is; never quite 0.
     seen: Image<f32>,
 }
 
-/// An object in a pixel out of focus.
+/// An out-of-focus object in a pixel.
 struct SoftSample<'a> {
     of: &'a SoftObject,
     depth: f32,
@@ -128,14 +130,14 @@ impl<'a> Focus<'a> {
         }
     }
 
-    /// Pixels beyond the border from which cards spread into the picture.
+    /// Distance beyond the border from which cards spread into the picture, pixels.
     fn reach_of(&self, cards: &[Card]) -> usize {
         let corners = cards.iter().flat_map(|card| card.quad.corners());
         let depths = corners.map(|corner| (self.camera.camera_from_world * corner).z);
         Discs::of_radii(depths.map(|depth| self.radius_px(depth as f32))).reach()
     }
 
-    /// The objects out of focus, over a shadow that is.
+    /// The objects out of focus, over an out-of-focus shadow.
     fn of(&self, shadow: Image<LinearRgb>, objects: Objects) -> DeepImage {
         work::add(Kind::Filters, 1);
         let is_tinted = objects.values().flatten().any(PlacedSample::is_tinted);
@@ -161,7 +163,7 @@ impl<'a> Focus<'a> {
             .blur_radius_px(f64::from(depth), self.camera.focal_px.x)
     }
 
-    /// Every object, each spread on its own.
+    /// Every object, each spread separately.
     fn soft_objects(&self, objects: Objects, size: [usize; 2]) -> Vec<SoftObject> {
         let depths = objects.values().flatten().map(|s| s.sample.depth.0);
         let discs = Discs::of_radii(depths.map(|depth| self.radius_px(depth)));
@@ -196,7 +198,7 @@ impl<'a> Focus<'a> {
         soft
     }
 
-    /// What is in a pixel, front to back, with what each object hides per channel.
+    /// The samples of a pixel, front to back, with what each object hides per channel.
     fn pixel(&self, objects: &[SoftObject], at: [usize; 2]) -> Vec<(DeepSample, LinearRgb)> {
         let mut seen: Vec<_> = objects.iter().filter_map(|soft| soft.at(at)).collect();
         seen.sort_by(|a, b| {
@@ -211,7 +213,7 @@ impl<'a> Focus<'a> {
             .collect()
     }
 
-    /// 0 for objects that are equally far out of focus, 1 for those that are not at all.
+    /// 0 for objects that are equally far out of focus, 1 for those that differ entirely.
     fn share_apart(&self, seen: &[SoftSample<'_>]) -> f32 {
         let radii = seen.iter().map(|s| self.radius_px(s.depth));
         let low = radii.clone().fold(f64::INFINITY, f64::min);
@@ -220,7 +222,8 @@ impl<'a> Focus<'a> {
         (0.5 * beyond).clamp(0.0, 1.0) as f32
     }
 
-    /// Radius of the circle of confusion of the surface at a pixel; 0 where it is not seen.
+    /// Radius of the circle of confusion of the surface at a pixel; 0 where the surface is not
+    /// visible.
     fn surface_radius_px(&self, x: usize, y: usize) -> f64 {
         let px = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
         let ray = self.camera.ray(self.distortion.undistort(px));
@@ -255,7 +258,8 @@ impl SoftSurface {
 }
 
 impl Shadows {
-    /// Of a picture, and of one with a margin around it for what is there; without any, itself.
+    /// From a picture, and one with a margin around it for the margin; without a margin, the
+    /// picture itself.
     fn new(deep: &DeepImage, wide: &DeepImage, margin: usize) -> Self {
         let inside = [deep.width(), deep.height()].map(|side| margin..margin + side);
         let place = |x: usize, y: usize| {
@@ -279,8 +283,8 @@ impl Shadows {
         }
     }
 
-    /// Columns and rows of a picture of `size` that shadows are in, or closer to than `reach`; none
-    /// without shadows.
+    /// Columns and rows of a picture of `size` that contain shadows or are closer to them than
+    /// `reach`; none without shadows.
     fn near(&self, reach: usize, size: [usize; 2]) -> Option<[Range<usize>; 2]> {
         let factors = self.factors.pixels().iter().enumerate();
         let dark = factors.filter(|(_, factor)| **factor != LinearRgb::WHITE);
@@ -294,8 +298,8 @@ impl Shadows {
         (!places.is_empty()).then(|| [0, 1].map(range))
     }
 
-    /// The mean factor on the plate over a disc around a pixel of the picture, by what is seen of
-    /// the surface. The margin holds all of the disc.
+    /// The mean factor on the plate over a disc around a pixel of the picture, weighted by the
+    /// visibility of the surface. The margin contains the whole disc.
     fn mean(&self, at: [usize; 2], disc: &Disc) -> LinearRgb {
         let [x, y] = at.map(|i| i + self.margin);
         let (mut sum, mut total) = (LinearRgb::BLACK, 0.0);
@@ -309,7 +313,7 @@ impl Shadows {
     }
 }
 
-/// Adds the samples of a picture, or of one with a margin around it: then those in the margin alone.
+/// Adds the samples of a picture, or for a picture with a margin around it, only those in the margin.
 fn add_samples(objects: &mut Objects, deep: &DeepImage, margin: usize) {
     let inside = [deep.width(), deep.height()].map(|side| margin..side - margin);
     let is_inside = |x: usize, y: usize| inside[0].contains(&x) && inside[1].contains(&y);
@@ -328,7 +332,7 @@ fn add_samples(objects: &mut Objects, deep: &DeepImage, margin: usize) {
     }
 }
 
-/// Columns (or rows) of a picture of `size` that are closer to some others than `reach`.
+/// Columns (or rows) of a picture of `size` that are closer to the given ones than `reach`.
 fn around(columns: impl Iterator<Item = isize> + Clone, reach: usize, size: usize) -> Range<usize> {
     let (low, high) = (columns.clone().min(), columns.max());
     let within = |column: isize| column.clamp(0, size as isize) as usize;
@@ -358,7 +362,7 @@ impl SoftObject {
         inside.then(|| (y - self.rows.start) * self.columns.len() + x - self.columns.start)
     }
 
-    /// What there is of it in a pixel.
+    /// Its sample in a pixel, if any.
     fn at(&self, [x, y]: [usize; 2]) -> Option<SoftSample<'_>> {
         let pixel = self.pixels[self.index([x as isize, y as isize])?];
         (pixel.alpha > LEAST_ALPHA).then(|| SoftSample {
@@ -368,8 +372,8 @@ impl SoftObject {
         })
     }
 
-    /// What is seen of it around a pixel, close by above all: as far as something nearer that is
-    /// out of focus lets it shine through.
+    /// Its visible part around a pixel, weighted towards the pixel: as much as nearer objects that
+    /// are out of focus let through.
     fn around(&self, [x, y]: [usize; 2]) -> SoftPixel {
         let side = -self.reach..=self.reach;
         let mut sum = SoftPixel::default();
@@ -398,7 +402,7 @@ impl SoftPixel {
         self.seen = self.seen.add_scaled(weight, placed.seen);
     }
 
-    /// Adds what is seen of another pixel of the same object.
+    /// Adds the visible part of another pixel of the same object.
     fn add_seen(&mut self, other: &Self, weight: f32) {
         self.visible += weight * other.visible;
         self.light = self.light.add_scaled(weight, other.light);
@@ -407,16 +411,17 @@ impl SoftPixel {
     }
 }
 
-/// What an object sends and hides in a pixel.
+/// The light and occlusion of an object in a pixel.
 struct PixelEffect {
     light: LinearRgb,
     hidden: LinearRgb,
 }
 
 impl SoftSample<'_> {
-    /// The sample behind what lets this much pass, which becomes what passes through both.
+    /// The sample behind objects with transmittance `through`, which becomes the transmittance of
+    /// both.
     ///
-    /// `apart` leads from the sum of what is seen, 0, to a soft object behind soft ones, 1.
+    /// `apart` blends from the sum of the visible parts, 0, to a soft object behind soft ones, 1.
     fn mixed_behind(
         &self,
         through: &mut LinearRgb,
@@ -436,7 +441,7 @@ impl SoftSample<'_> {
         self.sample(both, seen)
     }
 
-    /// What it does behind what lets this much pass.
+    /// Its effect behind objects with this transmittance.
     fn behind(&self, through: &mut LinearRgb, at: [usize; 2]) -> PixelEffect {
         if through.r.max(through.g).max(through.b) < LEAST_ALPHA {
             return PixelEffect {
@@ -454,7 +459,7 @@ impl SoftSample<'_> {
         effect
     }
 
-    /// What it would do if nothing hid it.
+    /// Its effect if nothing hid it.
     fn alone(&self, at: [usize; 2]) -> PixelEffect {
         let known = self.pixel.visible > KNOWN_SHARE * self.pixel.alpha;
         let seen = if known {
@@ -468,7 +473,7 @@ impl SoftSample<'_> {
                 hidden: LinearRgb::grey(self.pixel.alpha),
             };
         }
-        // By channel: dyed film in front has dyed what is seen.
+        // Per channel: tinted film in front has tinted the visible part.
         let least = KNOWN_SHARE * seen.visible;
         let whole = seen.seen.map(|share| self.pixel.alpha / share.max(least));
         PixelEffect {
@@ -494,7 +499,7 @@ fn mixed(a: LinearRgb, b: LinearRgb, share: f32) -> LinearRgb {
     a.scale(1.0 - share).add_scaled(share, b)
 }
 
-/// A colour with a mean of 1; white for one that is as good as black.
+/// A colour scaled to a mean of 1; white for one that is practically black.
 fn hue_of(color: LinearRgb) -> LinearRgb {
     match mean(color) {
         bright if bright > LEAST_ALPHA => color.scale(1.0 / bright),

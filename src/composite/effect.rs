@@ -1,4 +1,4 @@
-//! What objects and their shadows do to a plate.
+//! The effect of objects and their shadows on a plate.
 
 use crate::composite::frame::{frame, over, over_nothing};
 use crate::deep::DeepImage;
@@ -6,12 +6,12 @@ use crate::filter::gaussian_blur;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
 
-/// What the objects of a picture and their shadows do to the plate as it is seen, displaced where
+/// The effect of a picture's objects and their shadows on the plate as seen, displaced where
 /// objects bend light.
 pub(super) enum Effect<'a> {
-    /// What deep samples do.
+    /// That of deep samples.
     Still(&'a DeepImage),
-    /// The mean of that while the shutter is open.
+    /// Its mean while the shutter is open.
     Moved(&'a Image<Film>),
 }
 
@@ -25,7 +25,7 @@ impl Effect<'_> {
         }
     }
 
-    /// The frame over a plate, which alone is not blurred.
+    /// The frame over a plate, with everything except the plate blurred.
     pub(super) fn blurred_frame(
         &self,
         plate: &Image<LinearRgb>,
@@ -48,7 +48,7 @@ impl Effect<'_> {
     }
 }
 
-/// What cards and shadows do to the plate, as a film in front of it.
+/// The effect of cards and shadows on the plate, as a film in front of it.
 fn films(deep: &DeepImage) -> Image<Film> {
     Image::from_fn(deep.width(), deep.height(), |x, y| {
         deep.flat(x, y).shaded(deep.shadow()[(x, y)])

@@ -1,8 +1,7 @@
-//! A shot as lens and shutter show it, and as labels take it.
+//! A shot as lens and shutter show it, and as labels use it.
 //!
-//! What of the place stands in front belongs to the photo, which has its own blur: it hides objects
-//! when they are out of focus and moved, and not before. What of the photo is seen displaced, through
-//! objects that bend light, stays as sharp as the rest of it.
+//! The holdout belongs to the photo, which has its own blur: it hides objects after they have been defocused and moved,
+//! not before. Parts of the photo that are displaced by objects that bend light stay as sharp as the rest of it.
 
 use crate::composite::defocus::defocus;
 use crate::composite::effect::Effect;
@@ -15,19 +14,19 @@ use crate::render::RenderOptions;
 use crate::scene::{PostProcess, Shot};
 use std::borrow::Cow;
 
-/// The deep samples of a shot behind what of the place stands in front.
+/// The deep samples of a shot behind the holdout.
 pub(crate) struct Exposed {
     deep: DeepImage,
-    /// Out of focus, and without what is the plate's; none where all is sharp and nothing bends
-    /// light.
+    /// Out of focus, and without the displaced light of the plate; none if all is sharp and nothing
+    /// bends light.
     seen: Option<DeepImage>,
-    /// What they do to the plate in the mean while the shutter is open; none where nothing moves.
+    /// Their mean effect on the plate while the shutter is open; none if nothing moves.
     moved: Option<Image<Film>>,
 }
 
 impl Exposed {
-    /// Of samples that nothing of the place hides yet. What spreads into the picture from beyond its
-    /// border is rendered with the same `options`.
+    /// From samples before the holdout is applied. What spreads into the picture from beyond its border is rendered
+    /// with the same `options`.
     pub(crate) fn new(free: DeepImage, shot: &Shot, options: &RenderOptions) -> Self {
         let straight = free.undisplaced();
         let soft = defocus(straight.as_ref().unwrap_or(&free), shot, options);
@@ -44,19 +43,19 @@ impl Exposed {
     /// The frame over the shot's plate, scene-linear, premultiplied.
     ///
     /// # Panics
-    /// When the plate's size is not the picture's.
+    /// If the plate's size is not the picture's.
     pub(crate) fn frame(&self, shot: &Shot) -> Image<PremulRgba> {
         self.effect().frame(self.plate(shot).as_deref())
     }
 
-    /// The same, finished, with objects blended into the plate where the shot's edges ask for it.
+    /// The same, finished, with objects blended into the plate if the shot's edges are set to that.
     pub(crate) fn finished(&self, shot: &Shot, finish: &PostProcess) -> Image<PremulRgba> {
         let plate = self.plate(shot);
         let (effect, seen) = (self.effect(), self.seen());
         finish_exposed(&effect, seen, plate.as_deref(), shot.edges, finish)
     }
 
-    /// What labels are made of: sharp and at rest.
+    /// The source of labels: sharp and at rest.
     pub(crate) fn into_deep(self) -> DeepImage {
         self.deep
     }
@@ -65,7 +64,7 @@ impl Exposed {
         self.seen.as_ref().unwrap_or(&self.deep)
     }
 
-    /// A shot's plate as it is seen.
+    /// A shot's plate as seen through the objects.
     fn plate<'a>(&self, shot: &'a Shot) -> Option<Cow<'a, Image<LinearRgb>>> {
         let plate = shot.plate.as_deref();
         plate.map(|plate| self.deep.displaced_plate(plate))
@@ -90,8 +89,8 @@ mod tests {
     const PLATE: f32 = 0.25;
     const LIGHT: f32 = 0.5;
 
-    /// A striped object in focus over a half covered by one that is not, and above row 24 one in
-    /// front of all.
+    /// A striped object in focus over a half covered by an out-of-focus one, and above row 24 one
+    /// in front of all.
     fn free() -> DeepImage {
         let sample = |object: u32, depth: f32, visible: f32| DeepSample {
             object: ObjectId(object),

@@ -1,4 +1,4 @@
-//! The frame as a camera would have given it: blur and noise where there were none, white balance,
+//! The frame as a camera would deliver it: blur and noise for what has none, white balance,
 //! exposure, sharpening.
 
 use crate::composite::effect::Effect;
@@ -17,17 +17,17 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 const SHARPENING_SIGMA_PX: f32 = 1.0;
 
 /// Finishes a frame of deep samples over `plate`; scene-linear, premultiplied.
-/// [`PostProcess::default`] gives the same bits.
+/// [`PostProcess::default`] returns the same bits.
 ///
-/// Cards and shadows get the blur and the noise that a photograph of them would have: what is seen
-/// of the plate already has its own, so that a pixel far from card and shadow keeps its bits.
-/// The camera's colour fringes, blur and noise, exposure, white balance and sharpening are the whole frame's.
+/// Cards and shadows get the blur and the noise that a photograph of them would have: the visible plate already has its
+/// own, so a pixel far from cards and shadows keeps its bits. The camera's colour fringes, blur and noise, exposure,
+/// white balance and sharpening apply to the whole frame.
 ///
 /// # Method
-/// What the cards send and what they and the shadows let pass is blurred, the plate is not. Noise is
-/// Gaussian (by the ziggurat of Marsaglia and Tsang, 2000), its variance `shot * value + read^2` less
-/// what the plate's own share brings along. It depends on the seed, the pixel and the channel only.
-/// What is still to be matched ([`Noise::MatchPlate`]) is none.
+/// The light of the cards and the transmittance of cards and shadows are blurred, the plate is not. Noise is Gaussian
+/// (by the ziggurat of Marsaglia and Tsang, 2000), with variance `shot * value + read^2` minus what the visible plate
+/// contributes. It depends only on the seed, the pixel and the channel. Noise still to be matched
+/// ([`Noise::MatchPlate`]) counts as none.
 pub fn finish(
     frame: Image<PremulRgba>,
     deep: &DeepImage,
@@ -41,8 +41,8 @@ pub fn finish(
     graded(soft, &effect, plate.as_deref(), finish)
 }
 
-/// The finished frame of objects that do this to the plate as it is seen, blended into it where
-/// `edges` asks for it, which is after their blur and before all noise.
+/// The finished frame of objects with this effect on the plate as seen, blended into it if `edges`
+/// is set to that, after their blur and before any noise.
 pub(super) fn finish_exposed(
     effect: &Effect<'_>,
     deep: &DeepImage,
@@ -59,7 +59,7 @@ pub(super) fn finish_exposed(
     graded(blended, effect, plate, finish)
 }
 
-/// The frame with cards and shadows blurred as the plate is.
+/// The frame with cards and shadows blurred like the plate.
 fn blurred(
     frame: Image<PremulRgba>,
     effect: &Effect<'_>,
@@ -78,7 +78,7 @@ fn blurred(
     }
 }
 
-/// The frame with the noise of cards, and all that is of the whole frame.
+/// The frame with the noise of cards, and everything that applies to the whole frame.
 fn graded(
     frame: Image<PremulRgba>,
     effect: &Effect<'_>,
@@ -96,7 +96,7 @@ fn graded(
     sharpen(&exposed, finish.sharpening as f32)
 }
 
-/// The whole frame with the colour fringes, the blur and the noise of a camera.
+/// The whole frame with a camera's colour fringes, blur and noise.
 fn through_camera(frame: Image<PremulRgba>, finish: &PostProcess) -> Image<PremulRgba> {
     let fringed = match finish.chromatic_px {
         0.0 => frame,
@@ -112,7 +112,7 @@ fn through_camera(frame: Image<PremulRgba>, finish: &PostProcess) -> Image<Premu
     }
 }
 
-/// The frame with red magnified and blue made smaller about its middle, by so many pixels in the
+/// The frame with red magnified and blue reduced about its centre, by `corner_px` pixels in the
 /// corners.
 fn spread_colors(frame: &Image<PremulRgba>, corner_px: f64) -> Image<PremulRgba> {
     work::add(Kind::Filters, 1);
@@ -167,10 +167,10 @@ struct SensorNoise {
     seed: u64,
 }
 
-/// What [`seen_plate`] is where all noise is still to come.
+/// The value of [`seen_plate`] if all noise is still to be added.
 const NO_PLATE: ([f32; 3], [f32; 3]) = ([0.0; 3], [0.0; 3]);
 
-/// Factor on the plate at a pixel, and the plate; black where there is none.
+/// Factor on the plate at a pixel, and the plate; black if there is none.
 #[inline(always)]
 fn seen_plate(
     effect: &Effect<'_>,
@@ -185,7 +185,7 @@ fn seen_plate(
 }
 
 impl SensorNoise {
-    /// That of cards; none where no noise is added.
+    /// The noise of cards; none if no noise is added.
     fn of_cards(finish: &PostProcess) -> Option<Self> {
         match finish.noise {
             Noise::Known { shot, read } => Self::new(shot, read, noise_seeds(finish)[0]),
@@ -193,7 +193,7 @@ impl SensorNoise {
         }
     }
 
-    /// That of the whole frame; none where no noise is added.
+    /// The noise of the whole frame; none if no noise is added.
     fn of_camera(finish: &PostProcess) -> Option<Self> {
         let CameraNoise { shot, read } = finish.camera_noise;
         Self::new(shot, read, noise_seeds(finish)[1])
@@ -203,7 +203,7 @@ impl SensorNoise {
         (shot > 0.0 || read > 0.0).then_some(Self { shot, read, seed })
     }
 
-    /// To a frame of which `seen` says, of a pixel, the factor on a plate that has this noise
+    /// Adds noise to a frame. `seen` gives, for a pixel, the factor on a plate that has this noise
     /// already, and that plate.
     fn add_to(
         &self,
@@ -240,7 +240,7 @@ impl SensorNoise {
         noisy.into()
     }
 
-    /// Noise that a value should have and the plate that shows through does not bring.
+    /// Variance that a value should have and that the visible plate does not contribute.
     #[inline(always)]
     fn missing_variance(&self, value: f32, passes: f32, plate: f32) -> f64 {
         let share = f64::from(passes);
@@ -253,7 +253,7 @@ impl SensorNoise {
     }
 }
 
-/// Seeds of the noise of cards and of the camera, which have nothing in common.
+/// Independent seeds of the noise of cards and of the camera.
 fn noise_seeds(finish: &PostProcess) -> [u64; 2] {
     let mut rng = SplitMix64::seed_from_u64(finish.noise_seed);
     std::array::from_fn(|_| rng.next_u64())

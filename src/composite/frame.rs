@@ -1,19 +1,19 @@
-//! The finished frame: what objects add, over what their shadows leave of the plate.
+//! The finished frame: the light of objects over the shaded plate.
 
 use crate::deep::DeepImage;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
 use rayon::prelude::*;
 
-/// Folds deep samples into a picture, over `plate` where there is one.
+/// Folds deep samples into a picture, over `plate` if there is one.
 ///
 /// Scene-linear, premultiplied, of the deep picture's size. With a plate every pixel is opaque,
-/// `light + transmittance * shadow * plate`, and the plate's own bits where there is neither card
-/// nor shadow. Without, pixels are the objects' light and coverage; shadows need something to fall
-/// on and are left out, and film loses its tint ([`film`] keeps it).
+/// `light + transmittance * shadow * plate`, and has the plate's own bits where there is neither
+/// card nor shadow. Without one, pixels are the objects' light and coverage; shadows have nothing
+/// to fall on and are omitted, and film loses its tint ([`film`] keeps it).
 ///
 /// # Panics
-/// When the plate's size is not the picture's.
+/// If the plate's size is not the picture's.
 pub fn frame(deep: &DeepImage, plate: Option<&Image<LinearRgb>>) -> Image<PremulRgba> {
     let (width, height) = (deep.width(), deep.height());
     let Some(plate) = plate else {
@@ -49,13 +49,12 @@ pub(super) fn over_nothing(film: Film) -> PremulRgba {
     Film { color, ..film }.to_rgba()
 }
 
-/// Light without what is below 0: refraction takes away light of what lies behind an object, and lens
-/// and shutter may bring less of it there.
+/// Light clamped at 0: refraction removes light from behind an object, and lens and shutter may bring less of it there.
 fn at_least_none(light: LinearRgb) -> LinearRgb {
     light.map(|v| if v < 0.0 { 0.0 } else { v })
 }
 
-/// Folds deep samples into a picture of their light and of what they let pass, per channel;
+/// Folds deep samples into a picture of their light and of their transmittance per channel;
 /// scene-linear.
 pub fn film(deep: &DeepImage) -> Image<Film> {
     Image::from_fn(deep.width(), deep.height(), |x, y| deep.flat(x, y))

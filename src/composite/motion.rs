@@ -1,12 +1,11 @@
-//! Blur of what moves while the shutter is open.
+//! Motion blur of what moves while the shutter is open.
 //!
 //! # Method
-//! A pixel is `light + through * plate`, where `through` is what objects and their shadows leave of
-//! the plate. Plate and camera stand still, so the mean over time is that of `light` and of
-//! `through` alone. Cards and shadows move together along the surface: what a pixel shows at
-//! another time is what lay beside it on the surface, and both are averaged along that way. What
-//! stands high over the surface would move a little farther in the picture. Cards and shadows beyond
-//! the border move into the picture, too: they are rendered as far as ways reach.
+//! A pixel is `light + through * plate`, where `through` is what objects and their shadows leave of the plate. Plate
+//! and camera stand still, so the mean over time is that of `light` and of `through` alone. Cards and shadows move
+//! together along the surface: what a pixel shows at another time is what was next to it on the surface, and both are
+//! averaged along that path. What is high above the surface would move a little farther in the picture. Cards and
+//! shadows beyond the border move into the picture, too: they are rendered as far as paths reach.
 
 use crate::camera::{Camera, RadialDistortion};
 use crate::deep::{DeepImage, HoldoutSample};
@@ -18,22 +17,22 @@ use crate::render::{RenderOptions, render_beyond};
 use crate::scene::Shot;
 use crate::work::{self, Kind};
 
-/// Side of the squares of pixels that move by the same way.
+/// Side of the squares of pixels that share a path.
 const SQUARE_PX: usize = 8;
-/// Ways below this leave pixels as they are, pixels.
+/// Paths shorter than this leave pixels as they are, pixels.
 const LEAST_WAY_PX: f64 = 0.02;
-/// Places that are read along a way: near the horizon ways have no end.
+/// Maximum number of samples along a path: near the horizon paths have no end.
 const MOST_TAPS: f64 = 256.0;
-/// Pixels beyond the border that are rendered, at most.
+/// Maximum number of pixels rendered beyond the border.
 const MOST_BEYOND_PX: usize = 256;
-/// Pixels beside a place that a cubic curve reads.
+/// Pixels next to a position that a cubic curve reads.
 const CURVE_PX: f64 = 2.0;
 
-/// What objects and their shadows do to the plate in the mean while the shutter is open, behind what
-/// of the place stands in front and does not move; none where nothing moves.
+/// The mean effect of objects and their shadows on the plate while the shutter is open, behind the holdout, which does
+/// not move; none if nothing moves.
 ///
-/// `free` are samples that nothing of the place hides yet; what moves in from beyond the border is
-/// rendered with the same `options`.
+/// `free` are samples before the holdout is applied; what moves in from beyond the border is rendered with the same
+/// `options`.
 pub(super) fn moved(free: &DeepImage, shot: &Shot, options: &RenderOptions) -> Option<Image<Film>> {
     if shot.motion_m == [0.0; 2] {
         return None;
@@ -48,8 +47,7 @@ pub(super) fn moved(free: &DeepImage, shot: &Shot, options: &RenderOptions) -> O
     })
 }
 
-/// Means behind what of the place stands in front: where it is, only what passes in front of it
-/// counts.
+/// Means behind the holdout: where there is a holdout, only what passes in front of it counts.
 fn held_out(
     means: &Image<Film>,
     wide: &WideDeep<'_>,
@@ -68,7 +66,7 @@ fn held_out(
     })
 }
 
-/// The mean at some places, those of the nearest pixels, of what is in front of the place.
+/// The mean of what is in front of the holdout at some positions, each read from its nearest pixel.
 fn mean_in_front(
     wide: &WideDeep<'_>,
     place: &HoldoutSample,
@@ -103,12 +101,12 @@ impl<'a> WideDeep<'a> {
         }
     }
 
-    /// Width and height with the margin.
+    /// Width and height including the margin.
     fn size(&self) -> [usize; 2] {
         [self.free.width(), self.free.height()].map(|side| side + 2 * self.margin_px)
     }
 
-    /// The samples that have a pixel, counted from the margin's corner, and where they have it.
+    /// The samples that contain a pixel counted from the margin's corner, and its position in them.
     fn at(&self, x: usize, y: usize) -> (&DeepImage, usize, usize) {
         let inside = |at: usize, side| at.checked_sub(self.margin_px).filter(|at| *at < side);
         match (inside(x, self.free.width()), inside(y, self.free.height())) {
@@ -118,7 +116,7 @@ impl<'a> WideDeep<'a> {
     }
 }
 
-/// What objects and their shadows do to the plate, in the picture and in a margin around it.
+/// The effect of objects and their shadows on the plate, in the picture and in a margin around it.
 struct WideEffect {
     films: Image<Film>,
     /// Squares on every side.
@@ -146,7 +144,7 @@ impl WideEffect {
         }
     }
 
-    /// Means along each pixel's way, of the picture alone.
+    /// Means along each pixel's path, for the picture alone.
     fn averaged(&self, ways: &Image<Vector2<f64>>) -> Image<Film> {
         let (reached, least) = (reached(&self.films, ways), least(&self.films));
         let corner = Vector2::repeat((self.margin * SQUARE_PX) as f64);
@@ -158,7 +156,7 @@ impl WideEffect {
             }
             let way = along(center(x, y) + corner, ways[square]);
             let mean = mean(way, |p| sample_cubic_clamped(&self.films, p.x, p.y));
-            // A cubic curve is beyond its neighbours beside edges.
+            // A cubic curve overshoots near edges.
             Film {
                 color: larger(mean.color, least.color),
                 opacity: smaller(larger(mean.opacity, least.opacity), LinearRgb::WHITE),
@@ -167,7 +165,7 @@ impl WideEffect {
     }
 }
 
-/// Pixels beyond the border from which ways lead into the picture, as whole squares.
+/// Pixels beyond the border from which paths lead into the picture, as whole squares.
 fn margin_px(ways: &Image<Vector2<f64>>) -> usize {
     let longest = longest(ways);
     if longest == 0.0 {
@@ -191,11 +189,11 @@ fn reached(effect: &Image<Film>, ways: &Image<Vector2<f64>>) -> Mask {
             filled[(x / SQUARE_PX, y / SQUARE_PX)] |= *film != Film::default();
         }
     }
-    // Two squares for the curve that is read, and for corners.
+    // Two squares for the curve's neighbours, and for corners.
     filter::dilate(&filled, 0.5 * longest(ways) / SQUARE_PX as f64 + 2.0)
 }
 
-/// The mean of what is seen at some places.
+/// The mean of what is seen at some positions.
 fn mean(
     at: impl ExactSizeIterator<Item = Point2<f64>>,
     seen: impl Fn(Point2<f64>) -> Film,
@@ -208,13 +206,13 @@ fn center(x: usize, y: usize) -> Point2<f64> {
     Point2::new(x as f64 + 0.5, y as f64 + 0.5)
 }
 
-/// Places along a way through its middle, at most a pixel apart.
+/// Positions along a path about its middle, at most a pixel apart.
 fn along(middle: Point2<f64>, way: Vector2<f64>) -> impl ExactSizeIterator<Item = Point2<f64>> {
     let count = (way.norm().ceil() + 1.0).min(MOST_TAPS);
     (0..count as usize).map(move |i| middle + way * ((i as f64 + 0.5) / count - 0.5))
 }
 
-/// The least light and opacity of a picture: below 0 where refraction takes away what is seen
+/// The minimum light and opacity of a picture: below 0 where refraction removes what would be seen
 /// straight on, and where interreflection brightens the surface.
 fn least(effect: &Image<Film>) -> Film {
     let films = effect.pixels().iter();
@@ -232,8 +230,8 @@ fn larger(a: LinearRgb, b: LinearRgb) -> LinearRgb {
     LinearRgb::new(a.r.max(b.r), a.g.max(b.g), a.b.max(b.b))
 }
 
-/// Way in the picture, in pixels, of a point of the surface in the middle of each square; none
-/// where the surface is not seen.
+/// Path in the picture, in pixels, of a point of the surface in the middle of each square; 0 where
+/// the surface is not visible.
 fn ways(shot: &Shot) -> Image<Vector2<f64>> {
     let [width, height] = shot.camera.image.map(|n| (n as usize).div_ceil(SQUARE_PX));
     let (camera, distortion) = (&shot.camera, shot.distortion());
@@ -270,7 +268,7 @@ mod tests {
     use crate::scene::{AreaLight, Blur, Card, PostProcess};
     use std::sync::Arc;
 
-    /// Where a shutter that opens at -1/2 and closes at 1/2 sees the card, as shares of its way.
+    /// Where a shutter that opens at -1/2 and closes at 1/2 sees the card, as shares of its path.
     const TIMES: usize = 16;
     const WAY_M: [f64; 2] = [0.03, 0.01];
     const Z: f64 = 0.01;
@@ -381,7 +379,7 @@ mod tests {
         };
         let options = Quality::Draft.into();
         let exposed = Exposed::new(render(&moving, &options), &moving, &options);
-        // So narrow a Gaussian leaves every pixel to itself.
+        // A Gaussian this narrow leaves every pixel unchanged.
         let blur_px = Blur::Known(0.05);
         let [sharp, blurred] = [Blur::NONE, blur_px].map(|blur_px| {
             let finish = PostProcess {

@@ -6,7 +6,7 @@ use crate::pixel::PremulRgba;
 use crate::render::{RenderOptions, render_unhidden};
 use crate::scene::Shot;
 
-/// The picture of a shot in one call: its deep samples, out of focus where its lens has them so,
+/// The picture of a shot in one call: its deep samples, out of focus if its lens makes them so,
 /// over its plate, blurred where its cards move; scene-linear, premultiplied.
 ///
 /// ```
@@ -26,7 +26,7 @@ use crate::scene::Shot;
 /// ```
 ///
 /// # Panics
-/// When the plate's size is not the camera's.
+/// If the plate's size is not the camera's.
 pub fn picture(shot: &Shot, options: &RenderOptions) -> Image<PremulRgba> {
     Exposed::new(render_unhidden(shot, options), shot, options).frame(shot)
 }

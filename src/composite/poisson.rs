@@ -8,26 +8,26 @@ use crate::work::{self, Kind};
 
 /// Coverage above which a pixel is an object's: that of labels.
 const COVERED: f32 = 0.1;
-/// How far a difference at the outline reaches into the object, pixels.
+/// How far a difference at the outline extends into the object, pixels.
 const REACH_PX: f32 = 2.0;
-/// Reaches after which nothing of a difference is left.
+/// Number of reaches after which nothing of a difference is left.
 const BAND_REACHES: f64 = 4.0;
-/// Change of a value at which the solver stops: below a code of 8 bits in the dark.
+/// Change of a value at which the solver stops: below an 8-bit code in the dark.
 const TOLERANCE: f32 = 1e-4;
-/// Most sweeps over the picture. At this reach an error falls to an eighth in sixteen of them.
+/// Maximum number of sweeps over the picture. At this reach an error falls to an eighth in sixteen
+/// of them.
 const MAX_SWEEPS: usize = 48;
 
-/// Blends every object that is seen into what is behind it, along its outline; in a finished frame,
+/// Blends every visible object into what is behind it, along its outline, in a finished frame;
 /// scene-linear.
 ///
 /// # Method
-/// The composite keeps the gradients of the object and takes the values of what is behind at its
-/// outline ([Pérez, Gangnet and Blake 2003]). Departs from it by a screen ([Bhat et al. 2008]), so
-/// that the object keeps its own colours farther inside: a bottle does not take the tray's. The
-/// correction `c` of a pixel solves `sum (c - c_q) + sum (s + c - b_q) + c / reach^2 = 0`, the first
-/// sum over neighbours of the same object, the second over those behind, of which `b_q` is the value
-/// and `s` the object's; by Gauss and Seidel, forwards and backwards by turns, in the band where it
-/// is not 0.
+/// The composite keeps the gradients of the object and takes the values of what is behind at its outline ([Pérez,
+/// Gangnet and Blake 2003]). It departs from that by a screening term ([Bhat et al. 2008]), so that the object keeps
+/// its own colours farther inside: a bottle does not take on the tray's. The correction `c` of a pixel solves `sum (c -
+/// c_q) + sum (s + c - b_q) + c / reach^2 = 0`, the first sum over neighbours of the same object, the second over those
+/// behind, where `b_q` is their value and `s` the object's; by Gauss-Seidel, alternately forwards and backwards, in the
+/// band where it is not 0.
 ///
 /// [Pérez, Gangnet and Blake 2003]: https://doi.org/10.1145/882262.882269
 /// [Bhat et al. 2008]: https://doi.org/10.1007/978-3-540-88688-4_9
@@ -41,8 +41,8 @@ pub(super) fn blend(frame: &Image<PremulRgba>, deep: &DeepImage) -> Image<Premul
     frame.zip_map(&corrections, corrected)
 }
 
-/// The object that is seen in a pixel and its depth; none where nothing covers it, and none, in
-/// front of all, where what of the place stands in front hides it.
+/// The object that is visible in a pixel and its depth; none if nothing covers the pixel; none with
+/// depth 0, in front of everything, if the holdout hides the object.
 fn topmost(samples: &[DeepSample]) -> (u32, f32) {
     match samples.iter().find(|sample| sample.alpha > COVERED) {
         None => (0, f32::INFINITY),
@@ -56,7 +56,7 @@ fn corrected(p: PremulRgba, by: LinearRgb) -> PremulRgba {
     PremulRgba { r, g, b, ..p }
 }
 
-/// Pixels of objects near the outline of one.
+/// Pixels of objects near an object's outline.
 fn band(top: &Image<(u32, f32)>) -> Mask {
     let outline = Image::from_fn(top.width(), top.height(), |x, y| {
         neighbors(top, x, y).any(|(q, _)| top[q].0 != top[(x, y)].0)
@@ -87,12 +87,12 @@ fn neighbors<P: Copy>(
 struct PixelEquation {
     /// Number of the pixel.
     pixel: usize,
-    /// Numbers of the neighbours of the same object, as many as `count`.
+    /// Numbers of the neighbours of the same object, `count` of them.
     same: [usize; 4],
     count: usize,
-    /// Sum of the differences to the neighbours behind.
+    /// Sum of the differences from the neighbours behind.
     jump: LinearRgb,
-    /// Factor on its own correction.
+    /// Factor of its own correction.
     factor: f32,
 }
 
@@ -118,7 +118,7 @@ fn equation(
         if top[q].0 == top[at].0 {
             equation.add_same(number);
         } else if top[q].1 > top[at].1 {
-            // What is in front has an outline of its own.
+            // What is in front has its own outline.
             equation.add_behind(frame[at].color(), frame[q].color());
         }
     }

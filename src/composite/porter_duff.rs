@@ -1,7 +1,7 @@
 //! The operators of Porter and Duff on premultiplied pixels.
 //!
 //! # Method
-//! [Porter and Duff 1984]: each operator keeps a share of either picture that depends on the other's alpha alone.
+//! [Porter and Duff 1984]: each operator keeps a share of each picture that depends only on the other's alpha.
 //!
 //! [Porter and Duff 1984]: https://doi.org/10.1145/800031.808606
 
@@ -14,7 +14,7 @@ impl PremulRgba {
         self.add_scaled(1.0 - self.a, behind)
     }
 
-    /// The sum of two pixels that share a place without hiding each other.
+    /// The sum of two pixels that share an area without hiding each other.
     #[inline(always)]
     pub fn plus(self, other: Self) -> Self {
         self.add_scaled(1.0, other)
@@ -22,7 +22,7 @@ impl PremulRgba {
 }
 
 impl Film {
-    /// `self` in front of `behind`: films multiply what they let pass.
+    /// `self` in front of `behind`: films multiply their transmittances.
     #[inline(always)]
     pub fn over(self, behind: Self) -> Self {
         let pass = self.transmittance();

@@ -1,8 +1,8 @@
-//! What regions share, and what one has beyond another.
+//! Intersections and differences of regions.
 //!
 //! # Method
-//! `i_overlay` is asked directly: the older version within `geo` loses parts of outlines that touch
-//! themselves (17 of 3 million outlines on a grid of 8 x 8 cells, this one none).
+//! `i_overlay` is called directly: the older version within `geo` loses parts of outlines that
+//! touch themselves (17 of 3 million outlines on a grid of 8 x 8 cells; this one loses none).
 
 use geo::{Coord, LineString, MultiPolygon, Polygon};
 use i_overlay::core::fill_rule::FillRule;
@@ -13,7 +13,7 @@ use i_overlay::float::single::SingleFloatOverlay;
 /// Closed, without a repeated last point.
 type Contour = Vec<[f64; 2]>;
 
-/// Whatever an outline winds around.
+/// Everything that an outline winds around.
 pub(crate) fn unwound(outline: &[Coord<f64>]) -> MultiPolygon<f64> {
     region(contour(outline).simplify_shape(FillRule::NonZero))
 }

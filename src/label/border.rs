@@ -9,13 +9,13 @@ use serde::{Deserialize, Serialize};
 /// holes joined by slits.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Border {
-    /// Which object of the scene.
+    /// Id of the object in the scene.
     pub id: ObjectId,
     /// Index into the class list.
     pub class: u32,
-    /// Around the pixels that it covers, seen or not.
+    /// Around the pixels that it covers, visible or not.
     pub amodal: Vec<Vec<Point2<f64>>>,
-    /// Around the pixels in which it is seen.
+    /// Around the pixels in which it is visible.
     pub visible: Vec<Vec<Point2<f64>>>,
 }
 

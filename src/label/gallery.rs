@@ -1,4 +1,4 @@
-//! Pictures in a grid on a page, each enlarged by a click or by the keyboard, without another file.
+//! Pictures in a grid on a page, each enlarged by a click or the keyboard, without further files.
 
 use crate::color::to_srgb8;
 use crate::error::{Error, Result};
@@ -17,11 +17,11 @@ use std::path::Path;
 /// Longest side of a picture on a page, pixels, and its quality as JPEG: about 30 kB.
 const MAX_SIDE_PX: f64 = 480.0;
 const JPEG_QUALITY: u8 = 82;
-/// Height of letters, as a share of the longer side of what is shown.
+/// Height of letters, as a share of the longer side of the shown part.
 const LETTER_SHARE: f64 = 0.045;
 
-/// What a page with galleries needs once. An enlarged picture is the target of the address, so no
-/// script is needed for it; the script adds the keys Escape and the arrows.
+/// Style and script that a page with galleries needs once. An enlarged picture is the target of the
+/// URL, so enlarging needs no script; the script adds the Escape and arrow keys.
 pub(crate) const STYLE: &str = "<style>.gallery{display:grid;grid-template-columns:repeat(auto-fill,minmax(240px,1fr));\
     gap:14px;margin:1em 0}.gallery>div{min-width:0}.gallery figure{margin:0;overflow:visible}\
     .gallery .frame{display:block;position:relative;width:min(100%,calc(320px*var(--aspect)));background:#eee}\
@@ -41,12 +41,12 @@ pub(crate) struct Figure {
     view: BBox,
     /// Marks as SVG.
     pub(crate) drawing: String,
-    /// What is to be seen.
+    /// Description of the picture.
     pub(crate) caption: String,
 }
 
 impl Figure {
-    /// A part of a picture, as the drawing counts its pixels: in a picture of `size`.
+    /// A part of a picture, in the drawing's pixels, of which the picture has `size`.
     ///
     /// # Errors
     /// A picture that cannot be read.
@@ -85,12 +85,12 @@ impl Figure {
         LETTER_SHARE * self.view.width().max(self.view.height())
     }
 
-    /// Where it begins, in the units of the drawing.
+    /// Its top edge, in the units of the drawing.
     pub(crate) fn top(&self) -> f64 {
         self.view.y0
     }
 
-    /// Figure `i` of `count` of the gallery of a name.
+    /// Figure `i` of `count` in the gallery called `name`.
     fn html(&self, name: &str, i: usize, count: usize) -> Markup {
         html! {
             div id=(format_args!("{name}-{i}-at")) {
@@ -111,7 +111,7 @@ impl Figure {
         }
     }
 
-    /// The picture under its drawing, which a click enlarges.
+    /// The picture under its drawing; a click enlarges it.
     fn frame(&self, address: &str) -> Markup {
         let aspect = self.view.width() / self.view.height();
         let data = format!("data:image/jpeg;base64,{}", base64(&self.jpeg));
@@ -140,7 +140,7 @@ fn visible_pixels(
     [columns, rows]
 }
 
-/// Pixels of the picture for each unit of a drawing of `size`.
+/// Pixels of the picture per unit of a drawing of `size`.
 fn scale_of(picture: &Image<LinearRgb>, [width, height]: [f64; 2]) -> [f64; 2] {
     [
         picture.width() as f64 / width,
@@ -148,14 +148,14 @@ fn scale_of(picture: &Image<LinearRgb>, [width, height]: [f64; 2]) -> [f64; 2] {
     ]
 }
 
-/// The whole pixels between two places of a drawing, of a picture `scale` times as large.
+/// The whole pixels between two positions of a drawing, in a picture `scale` times as large.
 fn pixel_span([start, end]: [f64; 2], scale: f64, length: usize) -> Range<usize> {
     let [start, end] =
         [start, end + 1.0 / scale].map(|v| ((v * scale).max(0.0) as usize).min(length));
     start..end
 }
 
-/// What so many whole pixels show.
+/// The view of these whole pixels.
 fn view_of(columns: &Range<usize>, rows: &Range<usize>, [scale_x, scale_y]: [f64; 2]) -> BBox {
     BBox {
         x0: columns.start as f64 / scale_x,
@@ -165,12 +165,12 @@ fn view_of(columns: &Range<usize>, rows: &Range<usize>, [scale_x, scale_y]: [f64
     }
 }
 
-/// A picture as small as it is shown, in the bytes of a file.
+/// A picture at the size at which it is shown, as the bytes of a JPEG file.
 fn page_jpeg(picture: &Image<LinearRgb>) -> Result<Vec<u8>> {
     io::jpeg_bytes(&to_srgb8(&shrunk_for_page(picture)), JPEG_QUALITY)
 }
 
-/// A picture no larger than is shown.
+/// A picture no larger than it is shown.
 fn shrunk_for_page(picture: &Image<LinearRgb>) -> Image<LinearRgb> {
     let (w, h) = picture.size();
     let factor = MAX_SIDE_PX / w.max(h) as f64;
@@ -185,7 +185,7 @@ fn scaled_side(side: usize, factor: f64) -> usize {
     ((side as f64 * factor).round() as usize).max(1)
 }
 
-/// A grid of figures; `name` begins their addresses on the page.
+/// A grid of figures; `name` is the prefix of their ids on the page.
 pub(crate) fn gallery(name: &str, figures: &[Figure]) -> String {
     html! {
         div class="gallery" {
@@ -196,7 +196,7 @@ pub(crate) fn gallery(name: &str, figures: &[Figure]) -> String {
         + "\n"
 }
 
-/// A box with words at its upper left corner, inside it where there is no room above; `style` are
+/// A box with words at its upper left corner, inside it if there is no room above; `style` holds
 /// attributes.
 pub(crate) fn marked_box(
     b: &BBox,
@@ -218,7 +218,7 @@ pub(crate) fn marked_box(
     )
 }
 
-/// Above the box where there is room, else inside.
+/// Above the box if there is room, else inside.
 fn words_baseline(b: &BBox, letter: f64, top: f64) -> f64 {
     let has_room_above = b.y0 - 1.2 * letter >= top;
     if has_room_above {
@@ -235,7 +235,7 @@ fn rectangle(b: &BBox, color: &str, style: &str) -> String {
     )
 }
 
-/// Words that begin at a place.
+/// Words that begin at a position.
 pub(crate) fn words([x, y]: [f64; 2], content: &str, letter: f64, color: &str) -> String {
     html! {
         text x=(format_args!("{x:.2}")) y=(format_args!("{y:.2}")) font-size=(format_args!("{letter:.2}"))
@@ -253,7 +253,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         io::write(&path, &Image::filled(40, 20, LinearRgb::WHITE)).unwrap();
-        // The drawing counts in a picture half as large.
+        // The drawing uses the pixels of a picture half as large.
         let part = BBox {
             x0: 5.0,
             y0: 2.0,

@@ -1,4 +1,4 @@
-//! How much of an object the place hides.
+//! How much of an object the holdout hides.
 
 use crate::deep::HoldoutSample;
 use crate::geom::Point2;
@@ -7,8 +7,8 @@ use crate::label::outline::bounds;
 use crate::scene::{Card, Shot};
 use geo::{LinesIter, MultiPolygon};
 
-/// Area of a part of a card's outline that the place hides, square pixels; 0 for a shot in which it
-/// hides nothing.
+/// Area of a part of a card's outline that the holdout hides, square pixels; 0 for a shot in which
+/// it hides nothing.
 pub(crate) fn hidden_area(region: &MultiPolygon<f64>, card: &Card, shot: &Shot) -> f64 {
     let Some(holdout) = &shot.holdout else {
         return 0.0;
@@ -20,7 +20,7 @@ pub(crate) fn hidden_area(region: &MultiPolygon<f64>, card: &Card, shot: &Shot) 
         .sum()
 }
 
-/// Whether a card lies behind the place at a pixel.
+/// Whether a card is behind the holdout at a pixel.
 fn is_behind(card: &Card, shot: &Shot, px: Point2<f64>, sample: &HoldoutSample) -> bool {
     let seen = shot.distortion().undistort(px);
     sample.hides(1.0 / card.inverse_depth(&shot.camera, seen))
@@ -59,7 +59,7 @@ fn crossings_by_row(region: &MultiPolygon<f64>, first_row: usize, height: usize)
     rows
 }
 
-/// The first pixel whose centre is not before a position.
+/// The first pixel whose centre is at or after a position.
 fn first_center(position: f64) -> usize {
     (position - 0.5).ceil().max(0.0) as usize
 }

@@ -4,11 +4,11 @@ use crate::geom::BBox;
 use crate::label::rle;
 use serde::{Deserialize, Serialize};
 
-/// Yes or no for each pixel of a picture, in the run lengths that COCO uses.
+/// A yes or no for each pixel of a picture, in COCO's run lengths.
 ///
-/// The runs go down the columns, from left to right, and take turns: the first is of pixels
-/// outside, the second of pixels inside, and so on. In files: `{ size = [height, width], counts =
-/// "..." }`, COCO's compressed text. The default is the mask of a picture without pixels.
+/// The runs go down the columns, from left to right, and alternate: the first is of pixels outside,
+/// the second of pixels inside, and so on. In files: `{ size = [height, width], counts = "..." }`,
+/// COCO's compressed text. The default is the mask of a picture without pixels.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "rle::MaskText", into = "rle::MaskText")]
 pub struct RleMask {
@@ -17,7 +17,7 @@ pub struct RleMask {
 }
 
 impl RleMask {
-    /// From what `inside` says of column and row; `size` is width and height.
+    /// From a function of column and row; `size` is width and height.
     pub fn from_fn(size: [u32; 2], mut inside: impl FnMut(u32, u32) -> bool) -> Self {
         let pixels = pixels_by_column(size);
         Self::from_pixels(size, pixels.map(|(x, y)| inside(x, y)))
@@ -37,7 +37,7 @@ impl RleMask {
         Self { size, runs }
     }
 
-    /// From runs; none unless they add up to the picture, no run but the first being empty.
+    /// From runs; none unless they add up to the picture and no run except the first is empty.
     pub(crate) fn from_runs(size: [u32; 2], runs: Vec<u32>) -> Option<Self> {
         are_runs_of(size, &runs).then_some(Self { size, runs })
     }
@@ -57,7 +57,7 @@ impl RleMask {
         self.inside().map(|(_, length)| length).sum()
     }
 
-    /// No pixel is inside.
+    /// Whether no pixel is inside.
     pub fn is_empty(&self) -> bool {
         self.runs.len() < 2
     }
@@ -97,7 +97,7 @@ fn bounds_of_run(first: u64, last: u64, height: u64) -> BBox {
     let [top, bottom] = if left == right {
         [first % height, last % height + 1]
     } else {
-        // A run that turns into the next column touches the picture's lower and upper edge.
+        // A run that continues in the next column touches the picture's lower and upper edge.
         [0, height]
     };
     BBox {
@@ -120,7 +120,7 @@ fn pixels_by_column([width, height]: [u32; 2]) -> impl Iterator<Item = (u32, u32
     (0..width).flat_map(move |x| (0..height).map(move |y| (x, y)))
 }
 
-/// A mask under construction: one bit a pixel, column by column.
+/// A mask under construction: one bit per pixel, column by column.
 #[derive(Clone, Debug)]
 pub(crate) struct MaskBits {
     words: Vec<u64>,
@@ -137,7 +137,7 @@ impl MaskBits {
         }
     }
 
-    /// Takes a pixel in.
+    /// Marks a pixel as inside.
     #[inline]
     pub(crate) fn insert(&mut self, x: usize, y: usize) {
         let i = x * self.size[1] as usize + y;
@@ -160,7 +160,7 @@ impl MaskBits {
         }
     }
 
-    /// The first place from `at` on that has this value, or any place beyond the end.
+    /// The first index from `at` on with this value, or any index beyond the end.
     fn next(&self, at: usize, value: bool) -> usize {
         let mut word = at / 64;
         let mut mask = u64::MAX << (at % 64);

@@ -1,9 +1,9 @@
 //! Label: what is where in a picture, read from the same deep samples as the picture itself.
 //!
 //! Masks, boxes and visibility are folds over the deep samples, so a label cannot disagree with its
-//! picture. Outlines and what lies over what are geometry: the cards' outlines as the camera sees
-//! them, or the borders of their masks ([`OutlineKind`]). An [`ObstructionRule`] says which of the
-//! two decides what is topmost.
+//! picture. Outlines and which object covers which are geometry: the cards' outlines as the camera
+//! sees them, or the borders of their masks ([`OutlineKind`]). An [`ObstructionRule`] decides which
+//! objects are topmost.
 //!
 //! ```
 //! use petcomp::geom::{Pose, Quad};
@@ -65,73 +65,72 @@ use serde::{Deserialize, Serialize};
 use std::cell::LazyCell;
 use visibility::ObjectVisibility;
 
-/// How far the outline that is written may be from the border of a mask, pixels: the stairs of a
-/// slanting border become a line. What lies over what goes by the border itself.
+/// Maximum distance of the written outline from the border of a mask, pixels: the staircase of a
+/// slanting border becomes a line. Which object covers which is decided by the exact border.
 const MASK_OUTLINE_TOLERANCE_PX: f64 = 1.0;
 
-/// Everything known of the objects in one picture.
+/// Everything known about the objects in one picture.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Labels {
     /// Width and height of the picture, pixels.
     pub image: [u32; 2],
     /// One entry per object that touches the picture, in order of id.
     pub objects: Vec<ObjectLabel>,
-    /// What touches the picture and has no label: it is in the way, in order of id.
+    /// Objects that touch the picture, are in the way and have no label, in order of id.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub distractors: Vec<Distractor>,
-    /// What the picture shows too faintly for a box, no pixel being above
-    /// [`alpha_threshold`](LabelOptions::alpha_threshold), with its class (none of a distractor), in
-    /// order of id; in no file.
+    /// Objects that the picture shows too faintly for a box, no pixel being above
+    /// [`alpha_threshold`](LabelOptions::alpha_threshold), with their class (none for a distractor), in order of id;
+    /// not written to files.
     #[serde(skip)]
     pub faint: Vec<(ObjectId, Option<u32>)>,
 }
 
-/// Everything known of one object in one picture.
+/// Everything known about one object in one picture.
 ///
-/// "Amodal" is the whole object as far as it lies in the picture, as if it were alone; "visible" is
-/// what is seen of it.
+/// "Amodal" is the whole object as far as it is in the picture, as if it were alone; "visible" is
+/// its visible part.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ObjectLabel {
-    /// Which object of the scene.
+    /// Id of the object in the scene.
     pub id: ObjectId,
     /// Index into the class list.
     pub class: u32,
-    /// Outline in the picture, pixels, by [`LabelOptions::outline`]: one ring per part (the clipping
-    /// leaves one of a convex outline), none for a card seen edge-on. That of a mask is simplified by
-    /// up to 1 pixel; what lies over what goes by the mask, to the pixel.
+    /// Outline in the picture, pixels, according to [`LabelOptions::outline`]: one ring per part (a convex outline has
+    /// one after clipping), none for a card seen edge-on. The outline of a mask is simplified by up to 1 pixel; which
+    /// object covers which is decided by the mask itself, to the pixel.
     pub outline_px: Vec<Vec<Point2<f64>>>,
     /// Box around the whole object.
     pub amodal_box: BBox,
-    /// Box around what is seen of it; empty when nothing is.
+    /// Box around its visible part; empty if nothing is visible.
     pub visible_box: BBox,
-    /// Pixels that it covers, seen or not.
+    /// Pixels that it covers, visible or not.
     pub amodal_mask: RleMask,
-    /// Pixels in which it is seen. See-through objects over each other are seen in the same
+    /// Pixels in which it is visible. See-through objects over each other are visible in the same
     /// pixels.
     pub visible_mask: RleMask,
-    /// Seen share of its coverage, 0 to 1: what half covers a pixel counts half.
+    /// Visible share of its coverage, 0 to 1: a half-covered pixel counts half.
     pub visible_fraction: f64,
-    /// How far away it is; of a curved card, how far the flat one is.
+    /// Its distance; for a curved card, that of the flat card.
     pub depth: DepthRange,
-    /// Objects and distractors that lie over it, by their outlines, in order of id.
+    /// Objects and distractors that cover it, by their outlines, in order of id.
     pub covered_by: Vec<ObjectId>,
-    /// Share of its outline that no other one lies over and the place does not hide, 0 to 1; none
-    /// by [`ObstructionRule::Overlap`], which does not ask.
+    /// Share of its outline that no other object covers and the holdout does not hide, 0 to 1; none
+    /// with [`ObstructionRule::Overlap`], which does not need it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uncovered_fraction: Option<f64>,
-    /// Whether that is too little, by [`ObstructionRule::Visibility`]; by
-    /// [`ObstructionRule::Overlap`] it is true where the place hides more than that share of it, and
-    /// else none: `covered_by` tells.
+    /// With [`ObstructionRule::Visibility`], whether that share is too small. With [`ObstructionRule::Overlap`], true
+    /// if the holdout hides more than the rule's share of the object, otherwise none: `covered_by` decides.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstructed: Option<bool>,
-    /// How far it reaches out of the picture; none where
-    /// [`max_truncation`](LabelOptions::max_truncation) does not ask.
+    /// How far it extends beyond the picture; none unless
+    /// [`max_truncation`](LabelOptions::max_truncation) is set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truncation: Option<Truncation>,
 }
 
 impl ObjectLabel {
-    /// It is not obstructed, by the rule that it was labelled with: it can be picked.
+    /// Whether it is not obstructed, by the rule that it was labelled with, and can be picked.
     pub fn is_topmost(&self) -> bool {
         match self.obstructed {
             Some(obstructed) => !obstructed,
@@ -139,31 +138,30 @@ impl ObjectLabel {
         }
     }
 
-    /// More of it lies outside of the picture than the options allow: it has no label.
+    /// Whether more of it is outside the picture than the options allow, so that it has no label.
     pub fn is_too_truncated(&self) -> bool {
         self.truncation
             .is_some_and(|truncation| truncation.above_max)
     }
 }
 
-/// How [`label()`] decides.
+/// Options of [`label()`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LabelOptions {
     /// What the amodal box is drawn around. Default: `mask`.
     pub amodal: AmodalBox,
-    /// What is taken for the outline of an object. Default: `hull`.
+    /// What is used as the outline of an object. Default: `hull`.
     #[serde(skip_serializing_if = "OutlineKind::is_hull")]
     pub outline: OutlineKind,
-    /// A pixel belongs to an object when more than this share of it is covered, 0 to less than 1;
-    /// counts for masks, not for sums of coverage. Default: 0.1, under which thin film and the noise
-    /// of a matte look alike.
+    /// A pixel belongs to an object if more than this share of it is covered, 0 to less than 1; applies to masks, not
+    /// to sums of coverage. Default: 0.1, below which thin film and the noise of a matte look alike.
     pub alpha_threshold: f32,
-    /// An object has no label when more than this share of its outline lies outside of the picture,
-    /// 0 to 1. Default: none, however little of it is inside; then truncation is not measured.
+    /// An object has no label if more than this share of its outline is outside the picture, 0 to
+    /// 1. Default: none: labelled however little of it is inside; truncation is then not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_truncation: Option<f64>,
-    /// When an object is obstructed. Default: when another lies over it, any overlap.
+    /// When an object is obstructed. Default: when another covers it, with any overlap.
     #[serde(flatten)]
     pub obstruction: ObstructionRule,
 }
@@ -187,26 +185,25 @@ pub enum AmodalBox {
     /// The pixels that the object covers, as if alone.
     #[default]
     Mask,
-    /// The outline, which may be wider than what can be seen of a transparent object.
+    /// The outline, which may be wider than the visible part of a transparent object.
     Outline,
 }
 
-/// What is taken for the outline of an object: what lies over it, how much of it is free, and
-/// where it is drawn go by that.
+/// What is used as the outline of an object: it decides which objects cover it, how much of it is
+/// free, and where it is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OutlineKind {
-    /// The card's own outline, projected: of an asset its convex hull, as in the paper.
+    /// The card's own outline, projected: for an asset its convex hull, as in the paper.
     #[default]
     Hull,
-    /// The border of the pixels that it covers, as if alone: without the hole of a ring and the
-    /// angle of an L, and, where film is clearer than
-    /// [`alpha_threshold`](LabelOptions::alpha_threshold), without that film.
+    /// The border of the pixels that it covers, as if alone: excludes the hole of a ring, the notch
+    /// of an L, and film that is clearer than [`alpha_threshold`](LabelOptions::alpha_threshold).
     Mask,
 }
 
 impl OutlineKind {
-    /// Whether it is the default, which no file has to tell.
+    /// Whether it is the default, which files omit.
     pub(crate) fn is_hull(&self) -> bool {
         *self == Self::Hull
     }
@@ -222,7 +219,7 @@ pub fn outline_of(card: &Card, camera: &Camera) -> Vec<Vec<Point2<f64>>> {
 /// A card as the camera sees it.
 struct Silhouette<'a> {
     card: &'a Card,
-    /// What lies inside of its outline.
+    /// The region inside its outline.
     region: MultiPolygon<f64>,
     outline_px: Vec<Vec<Point2<f64>>>,
     visibility: ObjectVisibility,
@@ -232,7 +229,7 @@ struct Silhouette<'a> {
 /// Labels the picture `deep` of `shot`: every object with a box in the picture, in order of id.
 ///
 /// # Panics
-/// When `deep` does not have the size of the shot's camera.
+/// If `deep` does not have the size of the shot's camera.
 pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     let image = shot.camera.image;
     check_size(deep, image);
@@ -261,21 +258,21 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     labels
 }
 
-/// Those that cover anything, and their classes.
+/// Those that cover anything, with their classes.
 fn faint(boxless: &[Silhouette<'_>]) -> Vec<(ObjectId, Option<u32>)> {
     let covering = boxless.iter().filter(|s| s.visibility.covers_any());
     covering.map(|s| (s.card.id, s.card.class)).collect()
 }
 
-/// What lies over a card: others by their ids, and the share that neither they nor the place cover,
-/// where a rule asks.
+/// What covers a card: the ids of other cards, and the share that neither they nor the holdout
+/// cover, if the rule needs it.
 struct Cover {
     by: Vec<ObjectId>,
     free: Option<f64>,
 }
 
 impl Labels {
-    /// Adds a card as what it is: an object of a class, or a distractor.
+    /// Adds a card as an object of a class or as a distractor.
     fn push(
         &mut self,
         silhouette: Silhouette<'_>,
@@ -298,7 +295,7 @@ impl Labels {
     }
 }
 
-/// How much of each object no other one lies over, where the rule asks for it.
+/// How much of each object no other one covers, if the rule needs it.
 fn uncovered_fractions(
     objects: &[Silhouette<'_>],
     occluders: &[Vec<ObjectId>],
@@ -313,7 +310,7 @@ fn uncovered_fractions(
 }
 
 impl ObstructionRule {
-    /// Whether an object is obstructed; none where only those over it tell.
+    /// Whether an object is obstructed; none if only the objects covering it decide.
     fn verdict(self, object: &Silhouette<'_>, uncovered: Option<f64>, shot: &Shot) -> Option<bool> {
         match uncovered {
             Some(share) => self.is_obstructed(share),
@@ -330,7 +327,7 @@ fn check_size(deep: &DeepImage, [width, height]: [u32; 2]) {
     );
 }
 
-/// What a mask covers, to the pixel, and its border with fewer corners.
+/// The region of a mask, to the pixel, and its border with fewer corners.
 fn mask_outline(mask: &RleMask) -> (MultiPolygon<f64>, Vec<Vec<Point2<f64>>>) {
     let [exact, simplified] = trace::exact_and_simplified(mask, MASK_OUTLINE_TOLERANCE_PX);
     (outline::inside(&exact), simplified)
@@ -364,7 +361,7 @@ impl<'a> Silhouette<'a> {
         visibility: ObjectVisibility,
         options: &LabelOptions,
     ) -> Self {
-        // Where the mask's border is the outline, truncation alone asks for it.
+        // If the mask's border is the outline, only truncation needs the hull.
         let hull = LazyCell::new(|| outline::region(card, &shot.camera, &shot.distortion()));
         let truncation = options
             .max_truncation
@@ -389,7 +386,7 @@ impl<'a> Silhouette<'a> {
         }
     }
 
-    /// All but what lies over it.
+    /// Everything except what covers it.
     fn into_label(self, class: u32, options: &LabelOptions) -> ObjectLabel {
         let amodal_box = self.amodal_box(options.amodal);
         let seen = self.visibility;

@@ -10,20 +10,20 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "RuleInFile", into = "RuleInFile")]
 pub enum ObstructionRule {
-    /// Another object lies over it, however little that hides of it: the paper's rule.
+    /// Another object covers it, however little of it that hides: the paper's rule.
     Overlap {
-        /// Outlines are a pair when their intersection over union is above this, 0 to 1.
+        /// Outlines are a pair if their intersection over union is above this, 0 to 1.
         overlap_iou: f64,
     },
-    /// Others lie over more than a share of it.
+    /// Others cover more than a share of it.
     Visibility {
-        /// Least share of its outline that no other one lies over, see-through or not, 0 to 1; an
+        /// Minimum share of its outline that no other object covers, see-through or not, 0 to 1; an
         /// object seen edge-on has the share 0.
         min_visible: f64,
     },
 }
 
-/// The keys of a rule, of which a file gives one or none.
+/// The keys of a rule; a file has one or none.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(crate) struct RuleInFile {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -41,7 +41,7 @@ impl Default for ObstructionRule {
 
 impl ObstructionRule {
     /// # Errors
-    /// [`Error::Value`](crate::Error::Value) for a share that is none.
+    /// [`Error::Value`](crate::Error::Value) for a share outside 0 to 1.
     pub(crate) fn check(self) -> Result<()> {
         let share = Bounds::new(0.0, 1.0, "a share");
         match self {
@@ -50,8 +50,8 @@ impl ObstructionRule {
         }
     }
 
-    /// Intersection over union above which outlines are a pair. By visibility any overlap makes
-    /// one: what lies over an object is known even where too little is hidden to obstruct it.
+    /// Intersection over union above which outlines are a pair. For visibility any overlap makes a
+    /// pair: what covers an object is recorded even if it hides too little to obstruct the object.
     pub(crate) fn pair_iou(self) -> f64 {
         match self {
             Self::Overlap { overlap_iou } => overlap_iou,
@@ -59,13 +59,12 @@ impl ObstructionRule {
         }
     }
 
-    /// It is a share of an object that decides.
+    /// Whether a share of the object decides.
     pub(crate) fn asks_for_share(self) -> bool {
         matches!(self, Self::Visibility { .. })
     }
 
-    /// Whether an object of which this share is not covered is obstructed; none where overlaps
-    /// decide.
+    /// Whether an object with this uncovered share is obstructed; none if overlaps decide.
     pub(crate) fn is_obstructed(self, uncovered_fraction: f64) -> Option<bool> {
         match self {
             Self::Overlap { .. } => None,

@@ -2,14 +2,14 @@
 //!
 //! # Method
 //! The outline is clipped in space, before the division by depth, against the pyramid of the
-//! picture (Sutherland and Hodgman, "Reentrant Polygon Clipping", 1974), so a card that reaches
-//! behind the camera projects like any other. What that leaves along the picture's edge, and loops
-//! of an outline that crosses itself, a boolean operation then resolves under the non-zero
-//! rule: whatever the outline winds around is inside.
+//! picture (Sutherland and Hodgman, "Reentrant Polygon Clipping", 1974), so a card that extends
+//! behind the camera projects like any other. A boolean operation with the non-zero rule then
+//! resolves what that leaves along the picture's edge, and loops of an outline that crosses itself:
+//! whatever the outline winds around is inside.
 //!
-//! Where the lens bends straight lines, the pyramid is that of all that it lets into the picture,
-//! and the sides of the outline are cut into short ones before the lens bends them. What a barrel
-//! cannot show, beyond its fold, lies outside of what it shows.
+//! If the lens bends straight lines, the pyramid is that of everything that it lets into the
+//! picture, and the sides of the outline are cut into short ones before the lens bends them. What a
+//! barrel cannot show, beyond its fold, is outside what it shows.
 
 use crate::camera::{Camera, RadialDistortion};
 use crate::geom::{BBox, Point2, Vector3};
@@ -17,23 +17,21 @@ use crate::label::boolean::{intersection, unwound, unwound_within};
 use crate::scene::Card;
 use geo::{Area, BoundingRect, Coord, MapCoords, MultiPolygon, Polygon, Rect};
 
-/// Least distance from the camera that is projected, metres: closer than any lens focuses, far
-/// above rounding.
+/// Minimum distance from the camera for projection, metres: closer than any lens focuses, far above
+/// rounding errors.
 const NEAR_PLANE_M: f64 = 1e-4;
 
-/// Parts of an outline smaller than this are rounding, square pixels: `i_overlay` snaps to a grid of
-/// 2^-30 of the extent, which along the sides of a picture of 32,768 pixels makes slivers of a
-/// hundredth of this.
+/// Parts of an outline smaller than this are rounding errors, square pixels: `i_overlay` snaps to a grid of 2^-30 of
+/// the extent, which along the sides of a picture of 32,768 pixels makes slivers of a hundredth of this.
 pub(crate) const SLIVER_AREA_PX2: f64 = 1e-2;
 
-/// Length of the sides that a lens bends, pixels: within one, a line that k1 = 0.1 bends is straight
-/// to a hundredth of a pixel.
+/// Length of the sides that a lens bends, pixels: over this length, a line that k1 = 0.1 bends is straight to a
+/// hundredth of a pixel.
 const BENT_SIDE_PX: f64 = 8.0;
-/// Most pieces of a side, which may be as long as it likes outside of the picture.
+/// Maximum number of pieces of a side, which may be arbitrarily long outside the picture.
 const MAX_PIECES: f64 = 4096.0;
 
-/// The part of the picture that lies inside a card's outline; empty where the card is out of sight
-/// or edge-on.
+/// The part of the picture inside a card's outline; empty if the card is out of sight or edge-on.
 pub(crate) fn region(card: &Card, camera: &Camera, lens: &RadialDistortion) -> MultiPolygon<f64> {
     let px = projected(card, camera, lens);
     if !has_area(&px) {
@@ -45,7 +43,7 @@ pub(crate) fn region(card: &Card, camera: &Camera, lens: &RadialDistortion) -> M
         .collect()
 }
 
-/// All that lies inside a card's outline, beyond the picture's edges too; empty where the card is
+/// Everything inside a card's outline, including beyond the picture's edges; empty if the card is
 /// behind the camera or edge-on.
 pub(crate) fn whole(card: &Card, camera: &Camera, lens: &RadialDistortion) -> MultiPolygon<f64> {
     let in_front = clip_to_front(in_camera(card, camera));
@@ -56,7 +54,7 @@ pub(crate) fn whole(card: &Card, camera: &Camera, lens: &RadialDistortion) -> Mu
     without_slivers(unwound(&px)).collect()
 }
 
-/// What lies inside of polygons that do not cross; slits of no width lead to holes.
+/// The region inside polygons that do not cross; slits of no width lead to holes.
 pub(crate) fn inside(polygons: &[Vec<Point2<f64>>]) -> MultiPolygon<f64> {
     let coords = |ring: &Vec<Point2<f64>>| -> Vec<_> {
         ring.iter().map(|p| Coord { x: p.x, y: p.y }).collect()
@@ -71,7 +69,7 @@ fn projected(card: &Card, camera: &Camera, lens: &RadialDistortion) -> Vec<Coord
     shown(&seen, camera, lens)
 }
 
-/// Where the picture shows a ring of points before the camera.
+/// The picture positions of a ring of points in front of the camera.
 fn shown(ring: &[Vector3<f64>], camera: &Camera, lens: &RadialDistortion) -> Vec<Coord<f64>> {
     let px = ring.iter().map(|p| to_pixel(p, camera)).collect();
     if lens.is_none() {
@@ -96,7 +94,7 @@ fn bent(ring: &[Coord<f64>], lens: &RadialDistortion) -> Vec<Coord<f64>> {
         .collect()
 }
 
-/// The start of a side, and what cuts it into short ones.
+/// The start of a side, and the points that cut it into short ones.
 fn points_along(a: Coord<f64>, b: Coord<f64>) -> impl Iterator<Item = Coord<f64>> {
     let side = b - a;
     let pieces = (libm::hypot(side.x, side.y) / BENT_SIDE_PX)
@@ -117,7 +115,7 @@ fn clamp_to_picture(c: Coord<f64>, camera: &Camera) -> Coord<f64> {
     }
 }
 
-/// What two outlines share, slivers left out.
+/// The intersection of two outlines, without slivers.
 pub(crate) fn overlap(a: &MultiPolygon<f64>, b: &MultiPolygon<f64>) -> MultiPolygon<f64> {
     without_slivers(intersection(a, b)).collect()
 }
@@ -161,7 +159,7 @@ fn in_camera(card: &Card, camera: &Camera) -> Vec<Vector3<f64>> {
         .collect()
 }
 
-/// The part of an outline that is seen between two positions of the pinhole's picture.
+/// The part of an outline that is visible between two positions of the pinhole's picture.
 fn clip_to_view(
     outline: Vec<Vector3<f64>>,
     camera: &Camera,
@@ -175,7 +173,7 @@ fn clip_to_view(
     clip_to_half_space(below_top, |p| (high.y - c.y) * p.z - f.y * p.y)
 }
 
-/// The part that is far enough before the camera.
+/// The part that is far enough in front of the camera.
 fn clip_to_front(outline: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
     clip_to_half_space(outline, |p| p.z - NEAR_PLANE_M)
 }
@@ -221,11 +219,11 @@ mod tests {
     use geo::Contains;
     use proptest::prelude::*;
 
-    /// Outlines have their corners on a grid of so many cells a side, so that they often touch,
+    /// Outlines have their corners on a grid of this many cells per side, so that they often touch,
     /// cross themselves, run back along themselves, and share edges.
     const GRID: u32 = 8;
 
-    /// Pixels of a cell; a card fills the picture.
+    /// Pixels per cell; a card fills the picture.
     const CELL: f64 = 5.0;
 
     const SIDE: f64 = CELL * GRID as f64;
@@ -267,7 +265,7 @@ mod tests {
         }
     }
 
-    /// Times that an outline winds around a point, by crossings of the line to its right.
+    /// How many times an outline winds around a point, by crossings of the line to its right.
     fn winding(corners: &[[u32; 2]], p: Point2<f64>) -> i32 {
         let px = |&[x, y]: &[u32; 2]| Point2::new(CELL * f64::from(x), CELL * f64::from(y));
         corners
@@ -284,8 +282,8 @@ mod tests {
             })
     }
 
-    /// Points between pixels' centres, away from every line through two points of the grid by more
-    /// than rounding.
+    /// Points between pixel centres, away from every line through two points of the grid by more
+    /// than rounding errors.
     fn points() -> impl Iterator<Item = Point2<f64>> {
         let along = |i: u32| f64::from(i) + 0.514_285_7;
         (0..SIDE as u32).flat_map(move |y| {
@@ -329,10 +327,10 @@ mod tests {
                 prop_assert_eq!(holds(&found, p), is_inside, "{:?}", p);
                 count += f64::from(u8::from(is_inside));
             }
-            // A raster of one point a pixel is off by less than half a pixel for each pixel of border.
+            // A raster of one point per pixel is off by less than half a pixel for each pixel of border.
             let border = 2.0 * SIDE * corners.len() as f64;
             prop_assert!((found.unsigned_area() - count).abs() <= 0.5 * border);
-            // All of it lies in the picture.
+            // All of it is in the picture.
             let all = whole(&card_on_grid(&corners), &camera(), &RadialDistortion::new(&camera(), 0.0));
             prop_assert!((all.unsigned_area() - found.unsigned_area()).abs() < 0.1);
         }

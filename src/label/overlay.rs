@@ -1,4 +1,4 @@
-//! Labels drawn onto their picture, to look at.
+//! Labels drawn over their picture, for inspection.
 
 use crate::color::encode_srgb8;
 use crate::draw;
@@ -11,7 +11,7 @@ use crate::pixel::{PremulRgba, Srgb8};
 pub(crate) const UNLABELLED: Srgb8 = draw::rgb(0xC8, 0xC8, 0xC8);
 
 /// Draws labels onto a scene-linear picture (over black where it is transparent): a box with the
-/// name of its class around each topmost object that is not cut off too much, the outlines of the
+/// name of its class around each topmost object that is not truncated too much, the outlines of the
 /// others in thin grey.
 ///
 /// `classes` are names in order; a class beyond them is named by its number.
@@ -54,7 +54,7 @@ fn draw_box(canvas: &mut Image<Srgb8>, object: &ObjectLabel, scale: [f64; 2]) {
     draw::border(canvas, &b, draw::class_color(object.class), 1);
 }
 
-/// Pixels of the canvas for each of the labelled picture.
+/// Pixels of the canvas per pixel of the labelled picture.
 fn scale_of(canvas: &Image<Srgb8>, image: [u32; 2]) -> [f64; 2] {
     let [width, height] = image.map(|side| f64::from(side.max(1)));
     [
@@ -78,7 +78,7 @@ fn scaled(b: &BBox, [x, y]: [f64; 2]) -> BBox {
     }
 }
 
-/// A name on the box's upper edge; below the edge where there is no room above it.
+/// A name on the box's upper edge; below the edge if there is no room above it.
 fn draw_tag(canvas: &mut Image<Srgb8>, object: &ObjectLabel, name: &str) {
     let tag = [draw::text_width(name) + 6, draw::LINE_PX];
     let [x, y] = tag_corner(&object.amodal_box, tag, canvas.width());
@@ -87,7 +87,7 @@ fn draw_tag(canvas: &mut Image<Srgb8>, object: &ObjectLabel, name: &str) {
     draw::text(canvas, [x + 3, y], name, draw::ink_on(paper));
 }
 
-/// Above the box where there is room, else in it.
+/// Above the box if there is room, else in it.
 fn tag_corner(b: &BBox, [w, h]: [usize; 2], canvas_width: usize) -> [isize; 2] {
     let (left, top) = (b.x0 as isize, b.y0 as isize);
     let x = left.min(canvas_width as isize - w as isize).max(0);

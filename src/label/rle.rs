@@ -1,10 +1,11 @@
-//! Run lengths as COCO writes them: one text for a mask.
+//! Run lengths in COCO's format: one text per mask.
 //!
 //! # Method
-//! COCO's "compressed RLE", as its annotations define it: from the fourth run on, the difference to
-//! the run two before is stored (runs of neighbouring columns are alike); each number goes, lowest
-//! bits first, into groups of five bits, the sixth bit of a group says that another follows, the
-//! highest bit of the last group is the sign; a group is the character that many places after `0`.
+//! COCO's "compressed RLE", as its annotations define it: from the fourth run on, the difference
+//! from the run two before is stored (runs of neighbouring columns are alike). Each number is
+//! split, lowest bits first, into groups of five bits; the sixth bit of a group means that another
+//! follows, the highest bit of the last group is the sign. A group is stored as the character that
+//! many places after `0`.
 
 use crate::bounds::{LONGEST_SIDE_PX, MOST_PIXELS};
 use crate::label::RleMask;
@@ -16,10 +17,10 @@ const GROUP_ZERO: u8 = b'0';
 /// Bits in a group.
 const GROUP_BITS: u32 = 5;
 
-/// Set in a group that another follows.
+/// Set in a group if another follows.
 const MORE_FLAG: u8 = 1 << GROUP_BITS;
 
-/// Set in a last group of a negative number.
+/// Set in the last group of a negative number.
 const SIGN_FLAG: u8 = 1 << (GROUP_BITS - 1);
 
 /// A mask in a file.
@@ -63,7 +64,7 @@ pub(crate) fn encode(runs: &[u32]) -> String {
     text
 }
 
-/// The run that the next one is stored as the difference from.
+/// The run that the next one is stored relative to.
 fn run_before(runs: &[u32]) -> i64 {
     match runs {
         [_, .., before, _] => i64::from(*before),
@@ -94,13 +95,13 @@ fn push_number(text: &mut String, mut number: i64) {
     }
 }
 
-/// All bits that follow the last group.
+/// All higher bits after the last group.
 #[inline]
 fn sign_of(group: u8) -> i64 {
     if group & SIGN_FLAG == 0 { 0 } else { -1 }
 }
 
-/// The runs of a text; none where it is no text of runs.
+/// The runs of a text; none if it is not a text of runs.
 pub(crate) fn decode(text: &str) -> Option<Vec<u32>> {
     let mut runs: Vec<u32> = Vec::new();
     let mut bytes = text.bytes();

@@ -1,16 +1,15 @@
-//! Borders with fewer corners.
+//! Simplifies borders to fewer corners.
 //!
 //! # Method
-//! Corners are dropped one at a time, first the one that costs least (as Visvalingam and Whyatt,
-//! "Line generalisation by repeated elimination of points", 1993, with a distance in place of their
-//! area): the cost is the distance from the new line to the farthest corner of the first border
-//! that it passes over, so that no point of that border is ever farther from the new one than the
-//! tolerance. A corner stays while the triangle of it and its two neighbours holds another corner,
-//! its sides included, or its ring has three corners left. A line that crossed the new one would
-//! have to end in that triangle or cross one of the two lines that it replaces: so rings that did
-//! not cross never do, none turns over, none vanishes, and what lies in a hole stays there.
-//! (`docs/design.md` says what `geo`, which simplifies one polygon at a time, makes of the
-//! same rings.)
+//! Corners are dropped one at a time, the cheapest first (as Visvalingam and Whyatt, "Line
+//! generalisation by repeated elimination of points", 1993, with a distance instead of their area):
+//! the cost is the distance from the new line to the farthest corner of the original border that it
+//! skips, so no point of that border is ever farther from the new one than the tolerance. A corner
+//! stays if the triangle of it and its two neighbours contains another corner, its sides included,
+//! or if its ring has only three corners left. A line that crossed the new one would have to end in
+//! that triangle or cross one of the two lines that it replaces: so rings that did not cross never
+//! do, none turns over, none vanishes, and what is in a hole stays there. (`docs/design.md`
+//! explains what `geo`, which simplifies one polygon at a time, makes of the same rings.)
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -38,10 +37,10 @@ pub(super) fn simplified(rings: Vec<Ring>, tolerance_px: f64) -> Vec<Ring> {
     corners.rings()
 }
 
-/// A corner and what dropping it costs, cheapest first.
+/// A corner and the cost of dropping it, cheapest first.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct CornerCandidate {
-    /// A cost is not negative, and then its bits are in its order.
+    /// A cost is not negative, so the order of its bits is its own order.
     cost_bits: u64,
     corner: usize,
 }
@@ -52,21 +51,21 @@ impl CornerCandidate {
     }
 }
 
-/// All corners of all rings, and which are left.
+/// All corners of all rings, and which of them are left.
 struct CornerLinks {
     positions: Ring,
     kept: Vec<bool>,
-    /// The corners before and after each, of those that are left.
+    /// The remaining corners before and after each.
     before: Vec<usize>,
     after: Vec<usize>,
     /// The ring of each corner.
     ring_of: Vec<usize>,
     rings: Vec<RingSpan>,
-    /// Corners by the row that they are in.
+    /// Corners by their row.
     rows: Vec<Vec<usize>>,
 }
 
-/// The corners of a ring: where they begin, how many there were, and how many are left.
+/// The corners of a ring: the first index, the original number, and the number left.
 struct RingSpan {
     first: usize,
     length: usize,
@@ -82,12 +81,12 @@ impl RingSpan {
         }
     }
 
-    /// All that there were.
+    /// All original corners.
     fn corners(&self) -> Range<usize> {
         self.first..self.first + self.length
     }
 
-    /// The corner after another one, of all that there were.
+    /// The next original corner.
     fn follower(&self, at: usize) -> usize {
         self.first + (at + 1 - self.first) % self.length
     }
@@ -126,13 +125,13 @@ impl CornerLinks {
         self.rings.push(span);
     }
 
-    /// All corners; what costs the same goes in the order of the rings.
+    /// All corners; those of equal cost are in the order of the rings.
     fn candidates(&self) -> BinaryHeap<Reverse<CornerCandidate>> {
         let corners = 0..self.positions.len();
         corners.map(|at| Reverse(self.candidate(at))).collect()
     }
 
-    /// Whether its corner is left and still costs what it did.
+    /// Whether its corner is left and still has the same cost.
     fn is_current(&self, candidate: CornerCandidate) -> bool {
         self.kept[candidate.corner] && self.candidate(candidate.corner) == candidate
     }
@@ -144,7 +143,7 @@ impl CornerLinks {
         }
     }
 
-    /// The farthest corner that there was, between the neighbours of a corner, from the line
+    /// Distance of the farthest original corner between the neighbours of a corner from the line
     /// between those.
     fn cost(&self, at: usize) -> f64 {
         let (a, b) = (self.before[at], self.after[at]);
@@ -169,7 +168,7 @@ impl CornerLinks {
         !near.any(|i| self.is_held(i, triangle) && !own.contains(&i))
     }
 
-    /// Whether a corner is left and lies in the triangle.
+    /// Whether a corner is left and is in the triangle.
     fn is_held(&self, i: usize, triangle: [[f64; 2]; 3]) -> bool {
         self.kept[i] && triangle_holds(triangle, self.positions[i])
     }
@@ -184,7 +183,7 @@ impl CornerLinks {
             .filter(move |i| (left..=right).contains(&self.positions[*i][0]))
     }
 
-    /// Drops a corner and returns those beside it.
+    /// Drops a corner and returns its neighbours.
     fn drop(&mut self, at: usize) -> [usize; 2] {
         let (a, b) = (self.before[at], self.after[at]);
         (self.after[a], self.before[b], self.kept[at]) = (b, a, false);
@@ -215,7 +214,7 @@ fn last_row(positions: &[[f64; 2]]) -> usize {
     rows.max().unwrap_or(0)
 }
 
-/// Least and greatest of coordinates of at least 0.
+/// Minimum and maximum of coordinates of at least 0.
 fn extent(values: [f64; 3]) -> [f64; 2] {
     [
         values.into_iter().fold(f64::INFINITY, f64::min),
@@ -229,7 +228,7 @@ fn doubled_triangle_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     u[0] * v[1] - u[1] * v[0]
 }
 
-/// Whether a point within a triangle's bounds lies in it or on its sides.
+/// Whether a point within a triangle's bounds is in it or on its sides.
 fn triangle_holds([a, b, c]: [[f64; 2]; 3], p: [f64; 2]) -> bool {
     let turns = [
         doubled_triangle_area(a, b, p),
@@ -239,7 +238,7 @@ fn triangle_holds([a, b, c]: [[f64; 2]; 3], p: [f64; 2]) -> bool {
     turns.iter().all(|t| *t >= 0.0) || turns.iter().all(|t| *t <= 0.0)
 }
 
-/// From a point to a line between two.
+/// Distance from a point to the line between two.
 fn distance(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
     let (along, from) = (difference(b, a), difference(p, a));
     let share = share_along(from, along);

@@ -1,12 +1,11 @@
-//! Which object lies over which.
+//! Which object covers which.
 //!
 //! # Method
-//! The topmost rule of "Synthetic Data Generation for Visual Detection of Flattened PET Bottles": outlines
-//! that overlap are a pair, the one nearer the camera lies over the other, and an object that
-//! nothing lies over is unobstructed. The paper compares one altitude per object; here a pair is
-//! compared *over its overlap*, which is right for tilted cards too. The inverse depth of a plane
-//! is an affine function of the pixel position, so its mean over the overlap is its value at
-//! the overlap's centroid: one comparison, exact, whatever the shape.
+//! The topmost rule of "Synthetic Data Generation for Visual Detection of Flattened PET Bottles": outlines that overlap
+//! are a pair, the one nearer the camera covers the other, and an object that nothing covers is unobstructed. The paper
+//! compares one altitude per object; here a pair is compared *over its overlap*, which is right for tilted cards too.
+//! The inverse depth of a plane is an affine function of the pixel position, so its mean over the overlap is its value
+//! at the overlap's centroid: one comparison, exact, whatever the shape.
 
 use crate::camera::Camera;
 use crate::geom::Point2;
@@ -19,10 +18,10 @@ use crate::scene::{Card, Shot};
 use geo::{Area, Centroid, MultiPolygon};
 use std::collections::BTreeSet;
 
-/// For each object, the ids of those that lie over it, in order of id.
+/// For each object, the ids of those that cover it, in order of id.
 ///
-/// Two objects are a pair when the intersection over union of their outlines is above `iou`. Of two
-/// cards at exactly the same depth, the one given first lies over the other.
+/// Two objects are a pair if the intersection over union of their outlines is above `iou`. Of two
+/// cards at exactly the same depth, the one given first covers the other.
 pub(crate) fn occluders(objects: &[Silhouette<'_>], shot: &Shot, iou: f64) -> Vec<Vec<ObjectId>> {
     let boxes: Vec<_> = objects.iter().map(|o| bounds(&o.region)).collect();
     let mut occluders = vec![Vec::new(); objects.len()];
@@ -38,11 +37,11 @@ pub(crate) fn occluders(objects: &[Silhouette<'_>], shot: &Shot, iou: f64) -> Ve
     occluders
 }
 
-/// Share of an object's outline that neither those `over` it nor the place covers, in the picture;
-/// 0 where it has no area.
+/// Share of an object's outline that neither those `over` it nor the holdout covers, in the
+/// picture; 0 if it has no area.
 ///
-/// Outlines cover whatever lies under them, see-through objects too: what is under one cannot be
-/// picked.
+/// Outlines cover whatever is under them, even those of see-through objects: what is under one
+/// cannot be picked.
 pub(crate) fn uncovered_fraction(
     object: &Silhouette<'_>,
     over: &[ObjectId],
@@ -61,13 +60,13 @@ pub(crate) fn uncovered_fraction(
     seen.max(0.0) / whole
 }
 
-/// Whether the place hides more than this share of an object's outline.
+/// Whether the holdout hides more than this share of an object's outline.
 pub(crate) fn is_held_out(object: &Silhouette<'_>, share: f64, shot: &Shot) -> bool {
     let hidden = hidden_area(&object.region, object.card, shot);
     hidden > share * object.region.unsigned_area()
 }
 
-/// None where the two do not overlap enough.
+/// None if the two do not overlap enough.
 fn is_first_above(
     first: &Silhouette<'_>,
     second: &Silhouette<'_>,
@@ -79,12 +78,12 @@ fn is_first_above(
     Some(is_above(first.card, second.card, &shot.camera, ideal))
 }
 
-/// Of two cards that meet at a pixel position, the first is at least as near.
+/// Whether, of two cards that meet at a pixel position, the first is at least as near.
 fn is_above(first: &Card, second: &Card, camera: &Camera, px: Point2<f64>) -> bool {
     first.inverse_depth(camera, px) >= second.inverse_depth(camera, px)
 }
 
-/// The objects of cyclic overlaps: each lies, through others, over itself (A over B over C over A).
+/// The objects of cyclic overlaps: each covers itself through others (A over B over C over A).
 pub fn cyclic_overlaps(objects: &[ObjectLabel]) -> Vec<ObjectId> {
     objects
         .iter()
@@ -93,7 +92,7 @@ pub fn cyclic_overlaps(objects: &[ObjectLabel]) -> Vec<ObjectId> {
         .collect()
 }
 
-/// All that lies over an object, directly or through others.
+/// Everything that covers an object, directly or through others.
 fn all_above(objects: &[ObjectLabel], id: ObjectId) -> BTreeSet<ObjectId> {
     let mut found = BTreeSet::new();
     let mut next = vec![id];
@@ -109,7 +108,7 @@ fn directly_above(objects: &[ObjectLabel], id: ObjectId) -> impl Iterator<Item =
     below.flat_map(|o| &o.covered_by).copied()
 }
 
-/// Centroid of the overlap of a pair; none where they are no pair.
+/// Centroid of the overlap of a pair; none if they are not a pair.
 fn overlap_center(a: &MultiPolygon<f64>, b: &MultiPolygon<f64>, iou: f64) -> Option<Point2<f64>> {
     let shared = overlap(a, b);
     let area = shared.unsigned_area();

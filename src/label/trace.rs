@@ -2,12 +2,12 @@
 //!
 //! # Method
 //! Every side of a pixel inside that has a pixel outside beyond it is an edge, directed so that the
-//! inside lies to its right; edges chain into rings, and where two pixels touch only at a corner
-//! the chain turns right, so that each ring encloses pixels joined by their sides. Corners are then
-//! dropped as far as a tolerance allows, of all rings together (`simplify.rs`). Formats know
-//! neither holes nor several parts: a hole is joined to what lies left of it, and a part to the one
-//! before it, by a slit of no width, as triangulations do (Eberly, "Triangulation by Ear Clipping",
-//! 2002). Without a tolerance the area, by the shoelace formula, stays that of the mask.
+//! inside is on its right; edges chain into rings, and where two pixels touch only at a corner the
+//! chain turns right, so that each ring encloses pixels joined by their sides. Corners are then
+//! dropped as far as a tolerance allows, for all rings together (`simplify.rs`). Formats support
+//! neither holes nor several parts: a hole is joined to what is left of it, and a part to the
+//! previous one, by a slit of no width, as in triangulation (Eberly, "Triangulation by Ear
+//! Clipping", 2002). Without a tolerance the area, by the shoelace formula, stays that of the mask.
 
 use super::simplify::{Ring, simplified};
 use crate::geom::{BBox, Point2};
@@ -19,14 +19,15 @@ const STEPS: [[i64; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
 /// The parts of a mask, joined by the sides of their pixels: one closed polygon each, clockwise in
 /// the picture, holes joined by slits. Together they cover what the mask covers.
 ///
-/// Corners that the border goes without are dropped: no point of it is then farther than
-/// `tolerance_px` from the polygons, and no side crosses another. 0 keeps all corners; parts and
+/// Corners that the tolerance makes unnecessary are dropped: no point of the border is then farther
+/// than `tolerance_px` from the polygons, and no side crosses another. 0 keeps all corners; parts
+/// and holes are kept at any tolerance.
 /// holes are kept at any tolerance.
 pub fn polygons(mask: &RleMask, tolerance_px: f64) -> Vec<Vec<Point2<f64>>> {
     as_polygons(simplified(Grid::new(mask).rings(), tolerance_px))
 }
 
-/// [`polygons`] with all corners, and with those of a tolerance: the mask is traced once for both.
+/// [`polygons`] with all corners, and with a tolerance: the mask is traced once for both.
 pub(super) fn exact_and_simplified(
     mask: &RleMask,
     tolerance_px: f64,
@@ -55,7 +56,7 @@ fn points(ring: Ring) -> Vec<Point2<f64>> {
 fn joined_parts(rings: Vec<Ring>) -> Vec<Ring> {
     let (mut parts, mut holes): (Vec<_>, Vec<_>) =
         rings.into_iter().partition(|r| doubled_area(r) > 0.0);
-    // What lies left of a hole is then joined before it.
+    // So what is left of a hole is joined before it.
     holes.sort_by(|a, b| left_to_right(&leftmost(a).1, &leftmost(b).1));
     for hole in holes {
         join_hole(&mut parts, hole);
@@ -103,8 +104,8 @@ impl Grid {
         }
     }
 
-    /// A side of a pixel, leaving `at` in direction `d`: border, unless the pixel beyond it has
-    /// taken the opposite side.
+    /// A side of a pixel, leaving `at` in direction `d`: it is border unless the pixel beyond it
+    /// has taken the opposite side.
     fn add_side(&mut self, at: [i64; 2], d: usize) {
         let end = self.index(step(at, d));
         let opposite = 1 << ((d + 2) % 4);
@@ -124,7 +125,7 @@ impl Grid {
         let mut rings = Vec::new();
         for i in 0..self.columns * self.rows {
             let at = self.corner(i);
-            // Every ring has an edge to the right.
+            // Every ring has an edge that goes right.
             while self.leaving[self.index(at)] & 1 != 0 {
                 rings.push(self.walk_ring(at));
             }
@@ -137,15 +138,15 @@ impl Grid {
         [self.left + i % self.columns, self.top + i / self.columns]
     }
 
-    /// Takes away an edge of the border.
+    /// Removes an edge of the border.
     #[inline]
     fn take_edge(&mut self, at: [i64; 2], d: usize) {
         let start = self.index(at);
         self.leaving[start] &= !(1 << d);
     }
 
-    /// Takes the ring that leaves `start` to the right; corners where it goes straight on are left
-    /// out.
+    /// Removes and returns the ring that leaves `start` to the right; corners where it goes
+    /// straight on are left out.
     fn walk_ring(&mut self, start: [i64; 2]) -> Ring {
         let mut ring = Vec::new();
         let (mut at, mut d, mut came) = (start, 0, usize::MAX);
@@ -155,8 +156,8 @@ impl Grid {
             }
             self.take_edge(at, d);
             (at, came) = (step(at, d), d);
-            // Another ring may pass through the same corner: this one comes back from below, to
-            // turn right.
+            // Another ring may pass through the same corner; this one comes back from below in
+            // order to turn right.
             let is_closed = at == start && d == 3;
             match self.next_direction(at, d).filter(|_| !is_closed) {
                 Some(next) => d = next,
@@ -165,8 +166,8 @@ impl Grid {
         }
     }
 
-    /// Where the border goes on from a corner that it came to in direction `d`: right, straight on
-    /// or left.
+    /// The direction in which the border continues from a corner that it came to in direction `d`:
+    /// right, straight on or left.
     fn next_direction(&self, at: [i64; 2], d: usize) -> Option<usize> {
         let leaving = self.leaving[self.index(at)];
         [1, 0, 3]
@@ -200,7 +201,7 @@ fn left_to_right(a: &[f64; 2], b: &[f64; 2]) -> std::cmp::Ordering {
     a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]))
 }
 
-/// The place in the ring and the position of its upper one of the leftmost corners.
+/// The index in the ring and the position of the upper one of its leftmost corners.
 fn leftmost(ring: &Ring) -> (usize, [f64; 2]) {
     ring.iter()
         .copied()
@@ -209,7 +210,7 @@ fn leftmost(ring: &Ring) -> (usize, [f64; 2]) {
         .unwrap_or_default()
 }
 
-/// Joins a hole to the ring whose border is next to its left.
+/// Joins a hole to the ring whose border is nearest on its left.
 fn join_hole(parts: &mut [Ring], hole: Ring) {
     let (first, leftmost) = leftmost(&hole);
     let Some(border) = next_border_to_the_left(parts, leftmost) else {
@@ -226,7 +227,7 @@ fn join_hole(parts: &mut [Ring], hole: Ring) {
     part.dedup();
 }
 
-/// Where the row through a point meets an edge that has the inside to its right.
+/// Where the row through a point crosses an edge that has the inside on its right.
 struct BorderCrossing {
     x: f64,
     part: usize,
@@ -249,7 +250,7 @@ fn next_border_to_the_left(parts: &[Ring], from: [f64; 2]) -> Option<BorderCross
     nearest
 }
 
-/// Where an edge that goes up, which has the inside to its right, is passed.
+/// The crossing with an edge that goes up, which has the inside on its right.
 #[inline]
 fn crossing_to_the_left([x, y]: [f64; 2], a: [f64; 2], b: [f64; 2]) -> Option<f64> {
     let goes_up = b[1] <= y && y < a[1];
@@ -257,7 +258,7 @@ fn crossing_to_the_left([x, y]: [f64; 2], a: [f64; 2], b: [f64; 2]) -> Option<f6
     (goes_up && crossing < x).then_some(crossing)
 }
 
-/// Joins a part to the corner that is nearest to its first.
+/// Joins a part at the corner that is nearest to its first corner.
 fn join_part(mut whole: Ring, part: Ring) -> Ring {
     let Some(&first) = part.first() else {
         return whole;
@@ -291,7 +292,7 @@ mod tests {
             .sum::<f64>()
     }
 
-    /// Times that a ring winds around the middle of a pixel.
+    /// How many times a ring winds around the middle of a pixel.
     fn winding(ring: &[Point2<f64>], x: u32, y: u32) -> i32 {
         let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
         let edges = ring.iter().zip(ring.iter().cycle().skip(1));
@@ -324,7 +325,7 @@ mod tests {
         }
     }
 
-    /// Whether two lines cross in a point that is no end of either.
+    /// Whether two lines cross in a point that is not an end of either.
     fn cross(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> bool {
         let side = |p: [[f64; 2]; 2], q: [f64; 2]| {
             (p[1][0] - p[0][0]) * (q[1] - p[0][1]) - (p[1][1] - p[0][1]) * (q[0] - p[0][0])

@@ -1,10 +1,9 @@
-//! How far an object reaches out of the picture.
+//! How far an object extends beyond the picture.
 //!
 //! # Method
-//! Truncation as KITTI has it ("refers to the object leaving image boundaries", 0 to 1), by area:
-//! the share of the outline, as the camera sees it, that lies beyond the picture's edges. Samples
-//! end at the edges, outlines do not. What a barrel lens cannot show is outside, at the scale of its
-//! fold.
+//! Truncation as defined by KITTI ("refers to the object leaving image boundaries", 0 to 1), by area: the share of the
+//! outline, as the camera sees it, that is beyond the picture's edges. Samples end at the edges, outlines do not. What
+//! a barrel lens cannot show is outside, at the scale of its fold.
 
 use crate::geom::BBox;
 use crate::label::outline::{self, SLIVER_AREA_PX2};
@@ -12,20 +11,20 @@ use crate::scene::{Card, Shot};
 use geo::{Area, MultiPolygon};
 use serde::{Deserialize, Serialize};
 
-/// How far an object reaches out of the picture.
+/// How far an object extends beyond the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Truncation {
     /// Share of its outline's area beyond the picture's edges, 0 to 1.
     pub fraction: f64,
-    /// Box around all of its outline, in the picture or not.
+    /// Box around all of its outline, inside the picture or not.
     pub whole_box: BBox,
-    /// The share is above [`LabelOptions::max_truncation`](crate::label::LabelOptions).
+    /// Whether the share is above [`LabelOptions::max_truncation`](crate::label::LabelOptions).
     pub above_max: bool,
 }
 
 impl Truncation {
-    /// Of a card whose part inside of the picture is known.
+    /// Of a card whose part inside the picture is known.
     pub(crate) fn new(card: &Card, shot: &Shot, inside: &MultiPolygon<f64>, max: f64) -> Self {
         let whole = outline::whole(card, &shot.camera, &shot.distortion());
         let fraction = outside_fraction(&whole, inside);
@@ -37,7 +36,7 @@ impl Truncation {
     }
 }
 
-/// What is outside by less than rounding is inside.
+/// Less than a rounding error outside counts as inside.
 fn outside_fraction(whole: &MultiPolygon<f64>, inside: &MultiPolygon<f64>) -> f64 {
     let all = whole.unsigned_area();
     let outside = all - inside.unsigned_area();

@@ -1,4 +1,4 @@
-//! What is seen of each object: one fold over the deep samples.
+//! Visibility of each object: one fold over the deep samples.
 
 use crate::deep::{DeepImage, DeepSample};
 use crate::label::mask::MaskBits;
@@ -7,16 +7,16 @@ use crate::pixel::ObjectId;
 use crate::work::{self, Kind};
 use serde::{Deserialize, Serialize};
 
-/// What the deep samples say of one object.
+/// What the deep samples give for one object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ObjectVisibility {
     /// The pixels that the object covers, as if alone.
     pub(crate) amodal: RleMask,
-    /// The pixels in which it is seen.
+    /// The pixels in which it is visible.
     pub(crate) visible: RleMask,
-    /// Seen share of its coverage.
+    /// Visible share of its coverage.
     pub(crate) fraction: f64,
-    /// How far away it is.
+    /// Its distance.
     pub(crate) depth: DepthRange,
 }
 
@@ -27,8 +27,8 @@ impl ObjectVisibility {
     }
 }
 
-/// Distances of an object along the optical axis, metres, over the pixels that it touches; zeros
-/// where it touches none.
+/// Distances of an object along the optical axis, metres, over the pixels that it touches; zeros if
+/// it touches none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DepthRange {
     /// Of its nearest pixel.
@@ -43,7 +43,7 @@ pub struct DepthRange {
 struct VisibilityTally {
     amodal: MaskBits,
     visible: MaskBits,
-    /// Coverage, the seen part of it, and coverage times depth, summed over pixels.
+    /// Coverage, its visible part, and coverage times depth, summed over pixels.
     alpha: f64,
     visible_alpha: f64,
     alpha_depth: f64,
@@ -76,7 +76,7 @@ impl VisibilityTally {
         self.mark(x, y, sample, threshold);
     }
 
-    /// In the masks of what covers more than the threshold.
+    /// Marks the pixel in the masks if the coverage is above the threshold.
     #[inline]
     fn mark(&mut self, x: usize, y: usize, sample: &DeepSample, threshold: f32) {
         if sample.alpha > threshold {
@@ -141,8 +141,8 @@ pub(crate) fn fold_samples(
     tallies.into_iter().map(VisibilityTally::finish).collect()
 }
 
-/// Where an id is among others in ascending order. Those of a scene have no gaps, so that there is
-/// nothing to search.
+/// Index of an id among others in ascending order. The ids of a scene have no gaps, so there is
+/// normally nothing to search.
 #[inline]
 fn index_of(id: ObjectId, ids: &[ObjectId]) -> Option<usize> {
     let without_gaps = id.0.wrapping_sub(ids.first()?.0) as usize;

@@ -4,19 +4,19 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-/// A box is within an anchor's reach when no side differs from the anchor's by this factor or more:
+/// A box is within an anchor's reach if no side differs from the anchor's by this factor or more:
 /// what equation 1 can decode, and YOLOv5's default.
 pub(crate) const MAX_SIDE_RATIO: f64 = 4.0;
-/// Rounds of the clustering; it rests after a few dozen.
+/// Maximum number of rounds of the clustering; it converges after a few dozen.
 const MAX_ROUNDS: usize = 300;
 
-/// Widths and heights that stand for a dataset's.
+/// Widths and heights that represent a dataset's boxes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Anchors {
     /// Width and height, by area, in the unit of the boxes.
     pub sizes: Vec<[f64; 2]>,
-    /// Mean intersection over union of a box with the anchor that fits it best, both about one
-    /// centre.
+    /// Mean intersection over union of a box with its best-fitting anchor, both centred at the same
+    /// point.
     pub mean_iou: f64,
     /// Share of the boxes within reach of some anchor (`MAX_SIDE_RATIO`).
     pub best_possible_recall: f64,
@@ -25,8 +25,8 @@ pub struct Anchors {
 /// `count` anchors for boxes of these widths and heights, in any unit; the same seed gives the same
 /// anchors.
 ///
-/// Boxes without area are left out. Fewer boxes than anchors give one anchor per box; no boxes
-/// none.
+/// Boxes without area are ignored. Fewer boxes than anchors give one anchor per box; without boxes
+/// there are none.
 ///
 /// # Method
 /// k-means with 1 - IoU as distance ([Redmon and Farhadi 2017], section 2), started by [k-means++].
@@ -62,7 +62,7 @@ impl Anchors {
     }
 }
 
-/// Moves each anchor to the mean of the boxes that are nearest to it, until they stay.
+/// Moves each anchor to the mean of the boxes that are nearest to it, until nothing changes.
 fn cluster_sizes(boxes: &[[f64; 2]], mut sizes: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let mut before = Vec::new();
     for _ in 0..MAX_ROUNDS {
@@ -79,7 +79,8 @@ fn cluster_sizes(boxes: &[[f64; 2]], mut sizes: Vec<[f64; 2]>) -> Vec<[f64; 2]> 
     sizes
 }
 
-/// Starting points far from each other: each drawn with the square of its distance to those before.
+/// Starting points far from each other: each drawn with the square of its distance to the previous
+/// ones.
 fn spread_sizes(boxes: &[[f64; 2]], count: usize, rng: &mut ChaCha8Rng) -> Vec<[f64; 2]> {
     let mut sizes = vec![boxes[(uniform_share(rng) * boxes.len() as f64) as usize]];
     while sizes.len() < count {
@@ -111,7 +112,7 @@ fn nearest_size(b: &[f64; 2], sizes: &[[f64; 2]]) -> (usize, f64) {
     })
 }
 
-/// Intersection over union about one centre.
+/// Intersection over union of boxes with the same centre.
 fn overlap_at_one_corner(a: &[f64; 2], b: &[f64; 2]) -> f64 {
     let shared = a[0].min(b[0]) * a[1].min(b[1]);
     shared / (area(a) + area(b) - shared)

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 pub struct Balance {
     /// Share of the real images in the loss of an epoch, 0 to 1. Default: 0.5.
     pub alpha: f64,
-    /// Twice the weights, so that `alpha` equal to the real images' share of all gives weights of
-    /// 1: plain concatenation. Without it such an `alpha` halves the loss, and with it the
-    /// learning rate. Default: false, the paper's form.
+    /// Doubles the weights, so that an `alpha` equal to the real images' share of all images gives
+    /// weights of 1: plain concatenation. Otherwise such an `alpha` halves the loss, and with it
+    /// the learning rate. Default: false, the paper's form.
     pub normalize: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Which images make a batch: one source each.
+//! Which images form a batch: one source each.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub enum Source {
     /// Photographs.
     Real,
-    /// Made by petcomp.
+    /// Images made by petcomp.
     Synthetic,
 }
 
@@ -19,16 +19,16 @@ pub enum Source {
 pub struct Batch {
     /// Where they are from.
     pub source: Source,
-    /// Their places in the source's list.
+    /// Their indices in the source's list.
     pub images: Vec<usize>,
 }
 
-/// How images are put into batches.
+/// How images are grouped into batches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BatchOptions {
     /// Images in a batch. Default: 32, the paper's.
     pub size: usize,
-    /// Where the order comes from. Default: 0.
+    /// Seed of the order. Default: 0.
     pub seed: u64,
 }
 
@@ -58,7 +58,7 @@ pub fn batches(real: usize, synthetic: usize, epoch: u64, options: &BatchOptions
     all
 }
 
-/// Fisher and Yates.
+/// The shuffle of Fisher and Yates.
 fn shuffle<T>(things: &mut [T], rng: &mut ChaCha8Rng) {
     for last in (1..things.len()).rev() {
         let count = last as u128 + 1;

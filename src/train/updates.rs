@@ -1,11 +1,11 @@
-//! How many epochs make equally many updates.
+//! How many epochs give equally many updates.
 
-/// How many batches an epoch has; the last may be smaller.
+/// Number of batches in an epoch; the last may be smaller.
 pub fn batches_per_epoch(images: u64, batch: u64) -> u64 {
     images.div_ceil(batch.max(1))
 }
 
-/// Updates of the weights in a training.
+/// Weight updates of a training run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Updates {
     /// Batches in an epoch.
@@ -15,7 +15,7 @@ pub struct Updates {
 }
 
 impl Updates {
-    /// Those of `epochs` over `images` in batches of `batch`.
+    /// The updates of `epochs` over `images` in batches of `batch`.
     pub fn new(images: u64, batch: u64, epochs: u64) -> Self {
         let batches = batches_per_epoch(images, batch);
         Self {
@@ -24,7 +24,7 @@ impl Updates {
         }
     }
 
-    /// How many epochs of `batches` batches make as many updates; rarely whole.
+    /// How many epochs of `batches` batches give as many updates; rarely a whole number.
     pub fn epochs_of(&self, batches: u64) -> f64 {
         self.total as f64 / batches.max(1) as f64
     }
@@ -42,7 +42,7 @@ mod tests {
             (batches_per_epoch(4000, 32), batches_per_epoch(1624, 32)),
             (125, 51)
         );
-        // 422.4 and 1035.3: the paper rounds the one up to 423 and the other down to 1035.
+        // 422.4 and 1035.3: the paper rounds one up to 423 and the other down to 1035.
         assert_eq!(concatenated.epochs_of(125).ceil(), 423.0);
         assert_eq!(concatenated.epochs_of(51).floor(), 1035.0);
     }

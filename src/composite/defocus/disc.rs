@@ -1,29 +1,30 @@
-//! Circles of confusion as weights of pixels.
+//! Circles of confusion as pixel weights.
 
 use std::collections::BTreeMap;
 
-/// Larger circles are treated as this one, pixels: beyond, a picture has no objects any more.
+/// Larger circles are treated as this one, pixels: beyond it, objects are no longer recognisable.
 const MOST_RADIUS_PX: f64 = 64.0;
-/// Radii up to this are told apart by sixteenths of a pixel, larger ones by a 64th of themselves.
+/// Radii up to this are distinguished in steps of 1/16 pixel, larger ones in steps of 1/64 of
+/// themselves.
 const FINE_RADIUS_PX: f64 = 4.0;
 const FINE_STEPS: f64 = 16.0;
 const COARSE_STEPS: f64 = 64.0;
-/// Up to this radius the pixels' own size is taken off, pixels.
+/// Up to this radius the blur by the pixels themselves is compensated, pixels.
 const EXACT_RADIUS_PX: f64 = 8.0;
-/// Halvings that find a radius to a millionth of a pixel.
+/// Bisections that find a radius to a millionth of a pixel.
 const HALVINGS: usize = 24;
 
 /// A disc: offsets of pixels, and weights whose sum is 1.
 #[derive(Debug)]
 pub(super) struct Disc {
     taps: Vec<(isize, isize, f32)>,
-    /// Pixels from its middle to its last.
+    /// Distance from its centre to its last pixel, pixels.
     reach: isize,
 }
 
 impl Disc {
     /// # Method
-    /// Weights fall from 1 to 0 over the pixel on the rim. The radius is that which gives the
+    /// Weights fall from 1 to 0 over the pixel on the rim. The radius is chosen to give the
     /// variance of the circle, a quarter of its radius squared, along each axis.
     fn new(radius: f64) -> Self {
         let weights = soft_disc(matching_rim(radius));
@@ -39,7 +40,7 @@ impl Disc {
     }
 }
 
-/// The pixels of a disc whose rim is a pixel wide, half of it inside of a radius.
+/// The pixels of a disc whose rim is a pixel wide, half of it inside the radius.
 fn soft_disc(rim: f64) -> Vec<(isize, isize, f64)> {
     let reach = (rim + 0.5).floor() as isize;
     let side = -reach..=reach;
@@ -103,18 +104,18 @@ impl Discs {
         }
     }
 
-    /// The disc of one of the radii that they were made for.
+    /// The disc of one of the radii given when they were created.
     pub(super) fn of_radius(&self, radius: f64) -> &Disc {
         &self.by_step[&step_of(radius)]
     }
 
-    /// Pixels from the centre of the largest one to its last.
+    /// Distance from the centre of the largest disc to its last pixel, pixels.
     pub(super) fn reach(&self) -> usize {
         self.reach
     }
 }
 
-/// The number of a radius among those that are told apart.
+/// The step number of a radius.
 fn step_of(radius: f64) -> u32 {
     let radius = radius.clamp(0.0, MOST_RADIUS_PX);
     let fine = radius.min(FINE_RADIUS_PX) * FINE_STEPS;

@@ -5,7 +5,7 @@ use crate::pixel::PremulRgba;
 use crate::scene::AreaLight;
 use std::sync::Arc;
 
-/// Thirty millimetres at f/2, in focus half a metre away.
+/// Thirty millimetres at f/2, focused at half a metre.
 const LENS: ThinLens = ThinLens {
     aperture_m: 0.015,
     focus_m: 0.5,
@@ -33,7 +33,7 @@ fn picture(pixel: impl Fn(usize, usize) -> Vec<DeepSample>) -> DeepImage {
     DeepImage::from_pixels(Image::filled(64, 48, LinearRgb::WHITE), pixels)
 }
 
-/// What a lens makes of a picture without anything beyond its border.
+/// The picture through a lens, with nothing beyond its border.
 fn softened(deep: &DeepImage, lens: ThinLens) -> DeepImage {
     defocus(deep, &shot(Some(lens)), &RenderOptions::default()).unwrap()
 }
@@ -43,7 +43,7 @@ fn hidden(deep: &DeepImage, x: usize, y: usize) -> f32 {
 }
 
 /// The circle on the sensor by the lens equation: a point at `depth` is in focus at v, the sensor
-/// stands where `focus` is, and the cone from the aperture to v is so wide there.
+/// is where `focus` is, and this is the width of the cone from the aperture to v there.
 fn circle_px(focal_m: f64, depth: f64, focal_px: f64) -> f64 {
     let image_of = |depth: f64| 1.0 / (1.0 / focal_m - 1.0 / depth);
     let (sensor, focused) = (image_of(LENS.focus_m), image_of(depth));
@@ -139,7 +139,7 @@ fn nothing_shines_through_where_a_soft_card_ends_over_a_sharp_one() {
     assert_eq!(near(36), None);
 }
 
-/// A card of so many millimetres, ten centimetres above the surface, and turned.
+/// A card with its size in millimetres, ten centimetres above the surface, and turned.
 fn card(id: u32, [x, y]: [f64; 2], [width, height]: [f64; 2], turn_deg: f64) -> Card {
     let place = Pose::translation(x / 1e3, y / 1e3, 0.1);
     let quad = Quad {
@@ -156,7 +156,7 @@ fn white_plate(camera: &Camera) -> Arc<Image<LinearRgb>> {
     Arc::new(Image::filled(width, height, LinearRgb::WHITE))
 }
 
-/// The picture of a shot, which is the same in one that shows 40 pixels more on every side.
+/// The picture of a shot, which must equal that of one that shows 40 pixels more on every side.
 fn middle_of_a_larger_picture(small: Shot, options: &RenderOptions) -> Image<PremulRgba> {
     let camera = small.camera.widened(40);
     let large = Shot {

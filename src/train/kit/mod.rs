@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// Equation 2 for PyTorch.
 const BALANCED_PY: &str = include_str!("balanced.py");
-/// The paper's settings where it states them, YOLOv5's defaults elsewhere.
+/// The paper's settings where it gives them, YOLOv5's defaults elsewhere.
 const HYP_YAML: &str = include_str!("hyp.yaml");
 
 /// Options of the kit.
