@@ -115,7 +115,7 @@ pub(crate) struct AddPhotoArgs {
     quality: Quality,
 }
 
-/// What belongs to photos on a luminous display.
+/// Options for photos on a luminous display.
 #[derive(clap::Args)]
 struct CaptureArgs {
     /// With --captured: photos of the same frames without the object, from the same position
@@ -131,7 +131,7 @@ struct CaptureArgs {
     display_width: Option<f64>,
 }
 
-/// How large the object is, by one of these.
+/// The size of the object, in one of these ways.
 #[derive(clap::Args)]
 #[group(required = true, multiple = false)]
 struct ScaleArgs {
@@ -160,7 +160,7 @@ struct ScaleArgs {
 }
 
 impl ScaleArgs {
-    /// The one that is given; `corners` are those of the screen.
+    /// The given one; `corners` are those of the screen.
     fn scale(&self, corners: Option<[[f64; 2]; 4]>) -> Scale {
         let screen = self.screen_size.map(|size| Scale::Screen(size, corners));
         let scale = self.scale.map(Scale::PxPerMetre);
@@ -190,7 +190,7 @@ pub(crate) fn run(command: &AssetCommand, global: &GlobalArgs) -> anyhow::Result
     }
 }
 
-/// A name without the spaces that may stand behind a comma.
+/// A name without surrounding spaces, such as those after a comma.
 fn trimmed(name: &str) -> Result<String, Infallible> {
     Ok(name.trim().to_owned())
 }
@@ -227,7 +227,7 @@ fn check_folder(folder: &Path, strict: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Lists what there is to review, and counts it.
+/// Lists the cut-outs that need review, and counts them.
 fn list_to_review(records: &[&PhotoRecord]) -> usize {
     let to_review = records.iter().filter(|record| record.needs_review());
     to_review.inspect(|record| list_reasons(record)).count()
@@ -238,7 +238,7 @@ fn records_of(library: &Library) -> impl Iterator<Item = &PhotoRecord> {
     photos.map(|photo| &photo.record)
 }
 
-/// Prints why a person should review a cut-out.
+/// Prints why a cut-out needs review.
 fn list_reasons(record: &PhotoRecord) {
     for diagnostic in &record.diagnostics {
         print::line(located(&record.file, diagnostic));
@@ -252,14 +252,15 @@ fn list_capture(record: &PhotoRecord) {
     }
 }
 
-/// Fails where a photo gave no cut-out, unless a person rejected it; the others are done by then.
+/// Fails if a photo gave no cut-out, unless it was rejected in a review; the others are finished by
+/// then.
 fn build_all(list: &Path, folder: &Path, resume: bool, global: &GlobalArgs) -> anyhow::Result<()> {
     let built = build_library(list, folder, resume, global)?;
     let failed = built.refused.len() - built.rejected;
     FileBatch::counted(built.photos + failed, failed).finish()
 }
 
-/// Cuts out all photos of a list, showing progress; `resume` keeps what is there already.
+/// Cuts out all photos of a list, showing progress; `resume` keeps existing cut-outs.
 pub(crate) fn build_library(
     list: &Path,
     folder: &Path,
@@ -275,7 +276,7 @@ pub(crate) fn build_library(
     };
     drop(progress);
     let built = built.inspect_err(|error| {
-        // After a stop there are seconds left, and resuming draws it.
+        // After a stop only seconds are left, and resuming draws the sheet.
         if !matches!(error, Error::Interrupted { .. }) {
             refresh_sheet(folder, before.as_ref(), global);
         }
@@ -289,7 +290,7 @@ pub(crate) fn build_library(
     Ok(built)
 }
 
-/// Shows what became of the photos of a list.
+/// Reports what happened to the photos of a list.
 fn report_built(built: &Built, folder: &Path, global: &GlobalArgs) {
     for reason in &built.refused {
         log::warn!("{reason}");
@@ -312,10 +313,10 @@ fn report_built(built: &Built, folder: &Path, global: &GlobalArgs) {
     }
 }
 
-/// Cut-outs that are named; more of them are another list's.
+/// Maximum number of cut-outs that are named; more of them belong to another list.
 const SHOWN_UNLISTED: usize = 8;
 
-/// What a list that was corrected leaves in the folder.
+/// Describes what a corrected list leaves behind in the folder.
 fn describe_unlisted(files: &[String]) -> String {
     let shown = files[..files.len().min(SHOWN_UNLISTED)].join(", ");
     let more = if files.len() > SHOWN_UNLISTED {
@@ -353,7 +354,7 @@ fn write_sheet(folder: &Path, library: &Library, global: &GlobalArgs) -> anyhow:
     Ok(())
 }
 
-/// Draws and writes a contact sheet page by page, and counts them.
+/// Draws and writes a contact sheet page by page, and counts the pages.
 fn write_pages(library: &Library, first: &Path) -> petcomp::Result<usize> {
     let pages = asset::contact_sheets(library);
     let count = pages.len();
@@ -363,8 +364,8 @@ fn write_pages(library: &Library, first: &Path) -> petcomp::Result<usize> {
     Ok(count)
 }
 
-/// Draws the contact sheet of a folder whose manifest is another than before, though photos failed:
-/// others may be new, and cut-outs of rejected ones gone.
+/// Redraws the contact sheet of a folder whose manifest has changed, even if photos failed: other
+/// cut-outs may be new, and those of rejected photos gone.
 fn refresh_sheet(folder: &Path, before: Option<&Manifest>, global: &GlobalArgs) {
     if Manifest::read(folder).ok().as_ref() == before {
         return;
@@ -407,7 +408,7 @@ fn describe_size(record: &PhotoRecord) -> String {
 }
 
 impl AddPhotoArgs {
-    /// Clap asks for none of the options that exclude each other where another one of them is given.
+    /// Clap does not enforce `requires` for options of a mutually exclusive group if another one of it is given.
     fn check_companions(&self) -> petcomp::Result<()> {
         let (scale, capture) = (&self.scale, &self.capture);
         let (corners, screen) = (self.screen_corners.is_some(), scale.screen_size.is_some());
@@ -422,8 +423,8 @@ impl AddPhotoArgs {
         })
     }
 
-    /// Adds the photos, and counts those that gave a cut-out. Of several, one that cannot be used
-    /// does not stop the others; an option that cannot be right does, since it is that of all.
+    /// Adds the photos, and counts those that gave a cut-out. With several photos, an unusable one
+    /// does not stop the others; an invalid option does, since it applies to all.
     fn add_each(&self, global: &GlobalArgs) -> petcomp::Result<(usize, FileBatch)> {
         let options = self.quality.cut_out(CutOutOptions::default());
         let entries = self.entries();
@@ -455,7 +456,7 @@ impl AddPhotoArgs {
         Ok(())
     }
 
-    /// One for each cut-out; all photos of a capture are of one.
+    /// One for each cut-out; all photos of a capture belong to one.
     fn entries(&self) -> Vec<PhotoEntry> {
         let count = if self.scale.captured {
             1
@@ -488,12 +489,12 @@ impl AddPhotoArgs {
         }
     }
 
-    /// Empty where none is given, as a distractor needs none.
+    /// Empty if none is given, since a distractor needs none.
     fn class_name(&self) -> &str {
         self.class.as_deref().unwrap_or_default()
     }
 
-    /// The name that is given, or that of the first photo.
+    /// The given name, or that of the first photo.
     fn asset_name(&self) -> String {
         let first = self.photos.first().map(|photo| stem_of(photo));
         self.name.clone().or(first).unwrap_or_default()
@@ -509,7 +510,7 @@ fn extremes_mm(metres: &[[f64; 2]], i: usize) -> [f64; 2] {
     ends.map(|metres| 1e3 * metres)
 }
 
-/// Shows which number each class has, and how to change that; distractors alone have none.
+/// Shows the number of each class, and how to change it; distractors have none.
 fn show_classes(classes: &[String], how: &str, global: &GlobalArgs) {
     if classes.is_empty() {
         return;
@@ -533,7 +534,7 @@ fn list_photos(folder: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Characters of the longest name and of the longest class, and those of short ones at least.
+/// Widths of the columns for names and classes, characters: those of the longest, with a minimum.
 fn column_widths(assets: &[Asset<PhotoRecord>]) -> [usize; 2] {
     assets.iter().fold([12, 10], |[name, class], asset| {
         let class_width = class_column(asset).chars().count();
@@ -541,7 +542,7 @@ fn column_widths(assets: &[Asset<PhotoRecord>]) -> [usize; 2] {
     })
 }
 
-/// Name, class, size, how sure outline and colour are, file.
+/// Name, class, size, confidence of outline and colour, file.
 fn list_line(
     asset: &Asset<PhotoRecord>,
     photo: &PhotoRecord,

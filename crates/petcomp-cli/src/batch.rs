@@ -1,9 +1,9 @@
-//! Many files in one run, of which some may fail.
+//! Many files in one run, some of which may fail.
 
 use crate::print;
 use std::fmt;
 
-/// Counts the files of a run that goes on where one of them fails.
+/// Counts the files of a run that continues if one of them fails.
 #[derive(Debug, Default)]
 pub(crate) struct FileBatch {
     files: usize,
@@ -11,12 +11,12 @@ pub(crate) struct FileBatch {
 }
 
 impl FileBatch {
-    /// A run whose failures were told already.
+    /// A run whose failures were reported already.
     pub(crate) fn counted(files: usize, failed: usize) -> Self {
         Self { files, failed }
     }
 
-    /// Counts a file; the error of one that failed is printed at once.
+    /// Counts a file; if it failed, its error is printed at once.
     pub(crate) fn count(&mut self, outcome: anyhow::Result<()>) {
         self.files += 1;
         if let Err(error) = outcome {
@@ -26,7 +26,7 @@ impl FileBatch {
     }
 
     /// # Errors
-    /// [`Incomplete`] when any file failed.
+    /// [`Incomplete`] if any file failed.
     pub(crate) fn finish(self) -> anyhow::Result<()> {
         match self.failed {
             0 => Ok(()),

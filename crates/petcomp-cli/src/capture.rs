@@ -64,7 +64,7 @@ impl FramesArgs {
     }
 }
 
-/// A display of known pixels whose picture has this diagonal.
+/// A display of known resolution whose picture has this diagonal.
 fn with_diagonal(display: Display, inches: f64) -> petcomp::Result<Display> {
     let width = Display::width_of_diagonal(display.size_px, METRES_IN_INCH * inches);
     let display = Display {

@@ -55,8 +55,8 @@ impl DemoArgs {
         self.output.join("dataset")
     }
 
-    /// A recipe file that names its folders and nothing else, or the one that is there: a person
-    /// may have changed it.
+    /// A recipe file that names its folders and nothing else, or the existing one, which the user
+    /// may have changed.
     fn recipe(&self) -> petcomp::Result<PathBuf> {
         let path = self.output.join("recipe.toml");
         if path.exists() {

@@ -1,4 +1,4 @@
-//! Diagnostics on the terminal: `FILE: message [code]`, as compilers print them.
+//! Diagnostics on the terminal: `FILE: message [code]`, in the format of compilers.
 
 use petcomp::{Diagnostic, Severity};
 use std::fmt::Display;
@@ -15,12 +15,12 @@ pub(crate) fn report_diagnostics(file: impl Display, diagnostics: &[Diagnostic])
     }
 }
 
-/// One diagnostic as it is printed.
+/// A diagnostic in printed form.
 pub(crate) fn located(file: impl Display, diagnostic: &Diagnostic) -> String {
     format!("{file}: {diagnostic} [{}]", diagnostic.code)
 }
 
-/// Errors that a stage got over are warnings: what ends the program is another line.
+/// Errors that a stage survived become warnings: what ends the program is a separate line.
 fn level_of(severity: Severity) -> log::Level {
     match severity {
         Severity::Note => log::Level::Info,

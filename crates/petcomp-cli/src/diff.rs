@@ -59,7 +59,7 @@ pub(crate) struct DiffArgs {
     only_different: bool,
 }
 
-/// Infinity is one, too: nothing is above it.
+/// Infinity is allowed: nothing is above it.
 fn parse_threshold(text: &str) -> Result<f32, String> {
     let threshold = text.parse::<f32>().ok().filter(|v| *v >= 0.0);
     threshold.ok_or_else(|| "expected a number from 0".into())
@@ -71,7 +71,7 @@ fn parse_scale(text: &str) -> Result<f32, String> {
     scale.ok_or_else(|| "expected a finite number above 0".into())
 }
 
-/// `idiff` has long flags with a single dash; they become ours.
+/// `idiff` has long flags with a single dash, which are translated to ours.
 const SINGLE_DASH: [&str; 11] = [
     "-fail",
     "-failrelative",
@@ -86,7 +86,7 @@ const SINGLE_DASH: [&str; 11] = [
     "-od",
 ];
 
-/// The command line with `idiff`'s spelling turned into ours, for the `diff` subcommand only.
+/// The command line with `idiff`'s spelling translated to ours, for the `diff` subcommand only.
 pub(crate) fn accept_idiff_spelling(words: impl Iterator<Item = OsString>) -> Vec<OsString> {
     let words: Vec<OsString> = words.collect();
     if is_diff(&words) {
@@ -96,7 +96,7 @@ pub(crate) fn accept_idiff_spelling(words: impl Iterator<Item = OsString>) -> Ve
     }
 }
 
-/// The verb stands before the first of these flags; before the verb may be options with values.
+/// The verb comes before the first of these flags; options with values may precede the verb.
 fn is_diff(words: &[OsString]) -> bool {
     let mut before = words.iter().skip(1).take_while(|word| !is_of_idiff(word));
     before.any(|word| word == "diff")
@@ -144,7 +144,7 @@ fn print_comparison(args: &DiffArgs, report: &Comparison, global: &GlobalArgs) {
     print::text(report);
 }
 
-/// The two pictures: the second is what the first should be.
+/// The two pictures: the second is the expected one.
 struct PicturePair {
     a: Picture,
     b: Picture,
@@ -159,7 +159,8 @@ impl PicturePair {
         Ok(Self { a, b, passed_over })
     }
 
-    /// Pictures with other channels beside their colours are not the same, whatever the colours.
+    /// Pictures with different channels besides their colours are not the same, whatever the
+    /// colours.
     fn has_same_channels(&self) -> bool {
         let [a, b] = &self.passed_over;
         a.channels == b.channels
@@ -177,7 +178,7 @@ impl PicturePair {
         b.print_parts(&args.b, global);
     }
 
-    /// Pictures without alpha have three channels, over which means are taken.
+    /// Pictures without alpha have three channels, over which means are computed.
     fn compare(&self, thresholds: &Thresholds) -> Comparison {
         if self.a.has_alpha() || self.b.has_alpha() {
             let [a, b] = self.rows(|value| value);
@@ -188,7 +189,7 @@ impl PicturePair {
         }
     }
 
-    /// Their stored values, made into pixels.
+    /// Their stored values as pixels.
     fn rows<P: Copy + Send>(
         &self,
         pixel: impl Fn([f32; 4]) -> P + Copy + Sync,
@@ -204,7 +205,7 @@ impl PicturePair {
         io::write(path, &absolute_difference(&a, &b, scale).map(with_alpha))
     }
 
-    /// It takes long, so nothing is computed that is not shown.
+    /// It takes long, so it is computed only if it is shown.
     fn print_likeness(&self, global: &GlobalArgs) {
         if !global.is_quiet()
             && let Some(likeness) = self.likeness()
@@ -213,7 +214,7 @@ impl PicturePair {
         }
     }
 
-    /// How alike the two are to the eye, over black.
+    /// How similar the two look, over black.
     fn likeness(&self) -> Option<Likeness> {
         let [a, b] = [&self.a, &self.b].map(|picture| RowsFromFn {
             size: picture.size(),
@@ -223,20 +224,20 @@ impl PicturePair {
     }
 }
 
-/// Channels that are compared, or that colours are made from.
+/// Channels that are compared, or that colours are computed from.
 const COLOR_CHANNELS: [&str; 7] = ["R", "G", "B", "A", "Y", "RY", "BY"];
 
-/// What a file has beside the colours that are compared.
+/// What a file has besides the colours that are compared.
 #[derive(Default)]
 struct PassedOver {
-    /// The other channels of the part that is compared.
+    /// The other channels of the compared part.
     channels: Vec<String>,
-    /// The names of several parts, first that of the one that is compared.
+    /// The names of the parts if there are several, that of the compared part first.
     parts: Vec<String>,
 }
 
 impl PassedOver {
-    /// Nothing of a file that is no EXR.
+    /// Empty for a file that is not an EXR.
     fn of(picture: &Picture, path: &Path) -> petcomp::Result<Self> {
         if picture.format() != Format::Exr {
             return Ok(Self::default());
@@ -267,12 +268,12 @@ fn opaque([r, g, b, _]: [f32; 4]) -> LinearRgb {
     LinearRgb::new(r, g, b)
 }
 
-/// A difference of alpha alone is one to be seen, too.
+/// A difference in alpha alone must be visible, too.
 fn with_alpha([r, g, b, a]: [f32; 4]) -> LinearRgb {
     LinearRgb::new(r.max(a), g.max(a), b.max(a))
 }
 
-/// The values as the file stores them, which is what `idiff` compares: codes of integer formats as
+/// The values as stored in the file, which is what `idiff` compares: codes of integer formats as
 /// shares of full scale, floats as they are.
 fn stored_values(picture: &Picture, rows: Range<usize>) -> Image<[f32; 4]> {
     if picture.is_display_encoded() {
@@ -289,7 +290,7 @@ fn encoded(pixel: StraightRgba) -> [f32; 4] {
 }
 
 impl DiffArgs {
-    /// Where a picture of the difference goes, if it is wanted and there is one.
+    /// Path for a picture of the difference, if it is wanted and there is one.
     fn difference_path(&self, report: &Comparison) -> Option<&Path> {
         let is_comparable = report.verdict != Verdict::Incomparable;
         let is_wanted = report.max_error > 0.0 || !self.only_different;

@@ -5,13 +5,13 @@ use petcomp::io::ToFile;
 use petcomp::{Error, Image, PremulRgba, Srgba8, io};
 use std::process::Command;
 
-/// Something that petcomp needs does not work.
+/// Exit status if something that petcomp needs does not work.
 const UNHEALTHY_STATUS: u8 = 1;
 
 #[derive(clap::Args)]
 pub(crate) struct DoctorArgs {}
 
-/// One line per check; the exit status is 1 when something that petcomp needs does not work.
+/// Prints one line per check; the exit status is 1 if something that petcomp needs does not work.
 pub(crate) fn run(_: &DoctorArgs) -> anyhow::Result<u8> {
     print::line(format_args!("petcomp {}", env!("CARGO_PKG_VERSION")));
     print::line(format_args!("threads  {}", rayon::current_num_threads()));
@@ -39,7 +39,7 @@ fn blender_version() -> Option<String> {
     text.lines().next().map(str::to_owned)
 }
 
-/// Prints what a check found; whether it passed.
+/// Prints the result of a check, and returns whether it passed.
 fn report_check(name: &str, outcome: anyhow::Result<String>) -> bool {
     match &outcome {
         Ok(found) => print::line(format_args!("{name:8} {found}")),
@@ -72,7 +72,7 @@ fn png_alpha() -> anyhow::Result<String> {
     Ok("alpha is premultiplied in linear light".into())
 }
 
-/// What is written is what is read.
+/// What is read equals what was written.
 fn exr_round_trip() -> anyhow::Result<String> {
     let value = PremulRgba::new(0.25, 3.5, -0.125, 0.5);
     let back = round_trip("value.exr", value)?;
@@ -80,7 +80,7 @@ fn exr_round_trip() -> anyhow::Result<String> {
     Ok("values above 1 and below 0 survive".into())
 }
 
-/// Writes a picture of one value and reads its last pixel.
+/// Writes a picture of one value and reads back its last pixel.
 fn round_trip<P: ToFile + Copy>(name: &str, value: P) -> anyhow::Result<PremulRgba> {
     let folder = tempfile::tempdir().map_err(|e| Error::file(std::env::temp_dir(), e))?;
     let path = folder.path().join(name);

@@ -1,5 +1,5 @@
-//! Recipes, scenes and options: the documents that several commands read, and what they refuse to
-//! write before they begin.
+//! Recipes, scenes and options: the documents that several commands read, and checks of output
+//! paths before the work begins.
 
 use petcomp::dataset::{DatasetConfig, Pipeline};
 use petcomp::io::{self, Override};
@@ -7,19 +7,19 @@ use petcomp::{Error, Quality, Result, Scene};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
-/// Options from a TOML file, or the defaults where there is none.
+/// Options from a TOML file, or the defaults without one.
 pub(crate) fn read_options<T: Default + DeserializeOwned>(file: Option<&Path>) -> Result<T> {
     file.map_or_else(|| Ok(T::default()), io::read_toml)
 }
 
-/// Reads a scene that is possible: photos are opened by the size of its pictures.
+/// Reads a scene and checks it: photos are opened at the size of its pictures.
 pub(crate) fn read_scene(path: &Path) -> Result<Scene> {
     let scene: Scene = io::read_document(path)?;
     scene.check().map_err(|e| e.in_file(path))?;
     Ok(scene)
 }
 
-/// A recipe file, and values in it that are to be different.
+/// A recipe file, and overrides of its values.
 #[derive(clap::Args)]
 pub(crate) struct RecipeArgs {
     /// Recipe file (TOML), which names the folders of assets and backgrounds and what to draw
@@ -36,19 +36,19 @@ impl RecipeArgs {
         self.read_config_at(None)
     }
 
-    /// Reads the recipe, everything computed as finely as is asked for.
+    /// Reads the recipe for a quality, if one is given.
     pub(crate) fn read_config_at(&self, quality: Option<Quality>) -> anyhow::Result<DatasetConfig> {
         let overrides = Quality::overrides_at(quality, self.overrides.iter().cloned());
         Ok(DatasetConfig::read(&self.path, &overrides)?)
     }
 
-    /// Reads the recipe, one more of its values replaced.
+    /// Reads the recipe with one more of its values replaced.
     pub(crate) fn read_config_with(&self, switch: &Override) -> anyhow::Result<DatasetConfig> {
         let overrides: Vec<_> = self.overrides.iter().chain([switch]).cloned().collect();
         Ok(DatasetConfig::read(&self.path, &overrides)?)
     }
 
-    /// Reads the recipe for a scene that is there already.
+    /// Reads the recipe for an existing scene.
     pub(crate) fn read_config_for(&self, scene: &Scene) -> Result<DatasetConfig> {
         DatasetConfig::read_for_scene(&self.path, scene, &self.overrides)
     }
@@ -59,7 +59,7 @@ impl RecipeArgs {
     }
 }
 
-/// A scene file, and where the files that it names are.
+/// A scene file, and the source of the files that it names.
 #[derive(clap::Args)]
 pub(crate) struct SceneArgs {
     /// Scene file (TOML or JSON); its unknowns are solved first
@@ -84,7 +84,7 @@ impl SceneArgs {
         read_scene(&self.path)
     }
 
-    /// Opens what the scene is made from, of which no target may be a part.
+    /// Opens what the scene is made from, and checks that no target is part of it.
     pub(crate) fn open_pipeline<'a>(
         &self,
         scene: &Scene,
@@ -92,7 +92,7 @@ impl SceneArgs {
         targets: impl Iterator<Item = &'a PathBuf>,
     ) -> anyhow::Result<Pipeline> {
         let pipeline = Pipeline::open_for(self.config_for(scene, quality)?, scene)?;
-        // A file that is not there yet is none of the inputs, of which there may be very many.
+        // A file that does not exist yet is none of the inputs, of which there may be very many.
         let there: Vec<_> = targets.filter(|target| target.exists()).collect();
         if !there.is_empty() {
             io::check_distinct(pipeline.input_files(scene)?, there)?;
@@ -100,8 +100,7 @@ impl SceneArgs {
         Ok(pipeline)
     }
 
-    /// The recipe's config or, without a recipe, that which the scene brings; everything computed as
-    /// finely as is asked for.
+    /// The recipe's config or, without a recipe, the one contained in the scene; at the given quality, if any.
     fn config_for(&self, scene: &Scene, quality: Option<Quality>) -> Result<DatasetConfig> {
         let overrides = Quality::overrides_at(quality, self.overrides.iter().cloned());
         match &self.recipe {
@@ -111,14 +110,14 @@ impl SceneArgs {
     }
 }
 
-/// Fails on a picture to write that no format is known for, or no folder.
+/// Fails for a picture to write without a known format, or without an existing folder.
 pub(crate) fn check_picture_target(path: &Path) -> Result<()> {
     let known = ["png", "jpg", "jpeg", "exr", "tif", "tiff"];
     let expected = ".png, .jpg, .exr or .tif";
     check_target(path, &known, expected)
 }
 
-/// The same of a scene.
+/// The same for a scene.
 pub(crate) fn check_scene_target(path: &Path) -> Result<()> {
     check_target(path, &["toml", "json"], ".toml or .json")
 }
@@ -137,7 +136,7 @@ pub(crate) fn stem_of(path: &Path) -> String {
     stem.to_string_lossy().into_owned()
 }
 
-/// A path as one word of a command for the shell.
+/// A path quoted as one word for the shell.
 pub(crate) fn shell_word(path: &Path) -> String {
     let text = path.display().to_string();
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "._-/".contains(c);

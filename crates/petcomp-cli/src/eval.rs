@@ -1,4 +1,4 @@
-//! `petcomp eval`: detections against the truth.
+//! `petcomp eval`: evaluates detections against ground truth.
 
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
@@ -110,7 +110,8 @@ impl EvalArgs {
         split.map(|(_, runs)| runs).unwrap_or_default()
     }
 
-    /// Fails for an option that the truth has no use for, and for pictures that are nowhere.
+    /// Fails for an option that the ground truth does not need, and for a missing folder of
+    /// pictures.
     fn check_options(&self) -> petcomp::Result<()> {
         let truth = self.paths.last();
         let is_yolo = truth.is_some_and(|truth| !EvalTruth::is_coco(truth));
@@ -125,7 +126,7 @@ impl EvalArgs {
         }
     }
 
-    /// Fails where a file of the evaluation would replace one that it is made from.
+    /// Fails if a file of the evaluation would replace one of its inputs.
     fn check_inputs_stay(&self) -> petcomp::Result<()> {
         let Some(folder) = &self.output else {
             return Ok(());
@@ -134,7 +135,7 @@ impl EvalArgs {
         page::check_inputs_stay(inputs, folder, &page::run_names(self.predictions()))
     }
 
-    /// Tags of the images of the truth, which is the same for all runs.
+    /// Tags of the ground truth's images, which are the same for all runs.
     fn tags_of(&self, runs: &[Run]) -> petcomp::Result<Tags> {
         match (&self.tags, runs) {
             (Some(path), [run, ..]) => read_tags(path, &run.sheets),
@@ -142,7 +143,7 @@ impl EvalArgs {
         }
     }
 
-    /// Scores of the runs, written where that is asked for.
+    /// Scores of the runs, written if an output is given.
     fn measure(&self, runs: &[Run], options: &EvalReportOptions) -> petcomp::Result<Vec<Metrics>> {
         match &self.output {
             Some(folder) => page::write(folder, runs, options),
@@ -156,7 +157,8 @@ impl EvalArgs {
         }
     }
 
-    /// All runs; the options get the names of classes and the pictures of the truth.
+    /// Reads all runs; sets the names of classes and the pictures of the ground truth in the
+    /// options.
     fn read_runs(&self, options: &mut EvalReportOptions) -> anyhow::Result<Vec<Run>> {
         let Some(truth) = self.paths.last() else {
             anyhow::bail!("expected PREDICTIONS TRUTH");

@@ -11,7 +11,7 @@ const DATA_STATUS: u8 = 3;
 pub(crate) const FILE_STATUS: u8 = 4;
 pub(crate) const INTERRUPTED_STATUS: u8 = 130;
 
-/// Everything was done, and `--strict` asked for a failure where a person should look.
+/// Everything was done, but `--strict` was given and something needs review.
 #[derive(Debug)]
 pub(crate) struct NeedsReview(pub(crate) String);
 
@@ -23,15 +23,15 @@ impl fmt::Display for NeedsReview {
 
 impl std::error::Error for NeedsReview {}
 
-/// Prints an error and its causes in one line and gives the exit status.
+/// Prints an error and its causes on one line and returns the exit status.
 pub(crate) fn report_error(error: &anyhow::Error) -> u8 {
     print::aside(format_args!("error: {error:#}"));
     status_of(error)
 }
 
-/// 1 where `--strict` found something to review, 2 where some of many files could not be used, 3
-/// for data that cannot be right, 4 for files that cannot be used, 130 after an interruption. (2 is
-/// a wrong command line too; clap says that.)
+/// 1 if `--strict` found something to review, 2 if some of many files could not be used, 3 for
+/// invalid data, 4 for files that cannot be used, 130 after an interruption. (2 is also the status
+/// of a wrong command line, which clap returns.)
 fn status_of(error: &anyhow::Error) -> u8 {
     if error.is::<NeedsReview>() {
         return NEEDS_REVIEW_STATUS;

@@ -68,10 +68,10 @@ impl OpenImageIo {
 }
 
 impl GlobalArgs {
-    /// Sets up threads, messages and what is read; called once.
+    /// Sets up threads, messages and read options; called once.
     pub(crate) fn apply(&self) -> anyhow::Result<()> {
         self.start_logger();
-        // Fails only if a pool exists already, and then that pool serves.
+        // Fails only if a pool exists already, and then that pool will do.
         let _ = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads)
             .build_global();
@@ -103,7 +103,7 @@ impl GlobalArgs {
         })
     }
 
-    /// Only results and errors are asked for.
+    /// Whether only results and errors are printed.
     pub(crate) fn is_quiet(&self) -> bool {
         self.quiet
     }
@@ -116,18 +116,18 @@ impl GlobalArgs {
         }
     }
 
-    /// Prints what a file that was written holds: `FILE: what`.
+    /// Prints the contents of a written file: `FILE: what`.
     pub(crate) fn print_written(&self, file: &Path, what: impl Display) {
         self.print_status(format_args!("{}: {what}", file.display()));
     }
 
-    /// Points at a picture or page.
+    /// Tells the user to look at a picture or page.
     pub(crate) fn print_look_at(&self, file: &Path) {
         self.print_status(format_args!("look at {}", file.display()));
     }
 
     /// A progress display: a bar on a terminal, plain lines elsewhere, nothing when quiet; or JSON,
-    /// where that is asked for.
+    /// if requested.
     pub(crate) fn start_progress(&self, job: &'static str) -> ProgressDisplay {
         ProgressDisplay::new(job, self.quiet, self.progress)
     }

@@ -6,15 +6,15 @@ use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// From the first Ctrl-C (or SIGTERM) to the end of the program at the latest: schedulers kill
-/// after 10 s and more.
+/// Maximum time from the first Ctrl-C (or SIGTERM) to the end of the program: schedulers kill after
+/// 10 s or more.
 const GRACE_PERIOD: Duration = Duration::from_secs(8);
 
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// Turns true at the first Ctrl-C (or SIGTERM), so that a long job can stop between two pictures.
-/// What has not ended by itself after [`GRACE_PERIOD`] is ended in the middle, as the second signal
-/// ends it at once: every file is complete or absent, so that nothing that is done is lost.
+/// Becomes true at the first Ctrl-C (or SIGTERM), so that a long job can stop between two pictures.
+/// A job that has not ended after [`GRACE_PERIOD`] is terminated, as it is at once by a second
+/// signal: every file is complete or absent, so no finished work is lost.
 pub(crate) fn interruption() -> &'static AtomicBool {
     static ONCE: Once = Once::new();
     ONCE.call_once(catch_interrupts);
@@ -27,8 +27,8 @@ fn catch_interrupts() {
     }
 }
 
-/// Calls `handler` at every Ctrl-C, SIGTERM and SIGHUP, but for those that the program was started
-/// to ignore.
+/// Calls `handler` at every Ctrl-C, SIGTERM and SIGHUP, except for those that the program was
+/// started to ignore.
 pub(crate) fn on_interrupt(handler: impl FnMut() + Send + 'static) -> Result<(), ctrlc::Error> {
     let ignored = ignored_signals();
     let caught = ctrlc::set_handler(handler);
@@ -36,8 +36,8 @@ pub(crate) fn on_interrupt(handler: impl FnMut() + Send + 'static) -> Result<(),
     caught
 }
 
-/// What the program was started to ignore, as `nohup` does with hang-ups and a script's shell with
-/// interrupts of what it runs in the background.
+/// The signals that the program was started to ignore: `nohup` ignores hang-ups, and a script's
+/// shell ignores interrupts of background commands.
 #[cfg(unix)]
 fn ignored_signals() -> Vec<i32> {
     let signals = [libc::SIGHUP, libc::SIGINT].into_iter();
@@ -47,7 +47,7 @@ fn ignored_signals() -> Vec<i32> {
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "a function of C, which fills a struct")]
 fn is_ignored(signal: i32) -> bool {
-    // SAFETY: zeros are a `sigaction`, and none is set.
+    // SAFETY: all zeros are a valid `sigaction`, and none is set.
     let action = unsafe {
         let mut action: libc::sigaction = std::mem::zeroed();
         libc::sigaction(signal, std::ptr::null(), &mut action);
@@ -63,7 +63,7 @@ fn ignore(signal: i32) {
     unsafe { libc::signal(signal, libc::SIG_IGN) };
 }
 
-/// Other systems have no such thing.
+/// Other systems do not have this.
 #[cfg(not(unix))]
 fn ignored_signals() -> Vec<i32> {
     Vec::new()

@@ -36,7 +36,7 @@ pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 }
 
 impl LabelArgs {
-    /// Refuses what could not be written before anything is labelled.
+    /// Rejects invalid output paths before anything is labelled.
     fn check_targets(&self) -> petcomp::Result<()> {
         let mut pictures = self.overlay.iter();
         pictures.try_for_each(|path| check_picture_target(path))?;
@@ -72,7 +72,7 @@ fn count_objects(labels: &Labels) -> String {
     format!("{} objects, {topmost} on top", objects.len())
 }
 
-/// Takes the picture, and writes it with its labels drawn on it.
+/// Renders the picture, and writes it with its labels drawn on it.
 fn write_overlay(path: &Path, pipeline: &Pipeline, scene: Scene) -> petcomp::Result<Labels> {
     let sample = pipeline.take(scene)?;
     let classes = &pipeline.library().classes;

@@ -1,6 +1,6 @@
-//! The `petcomp` program: reads arguments, calls the library, writes results. A library itself, so that
-//! the package for Python has the program inside.
-// What prints, and does not panic where nobody can take it, is print.rs.
+//! The `petcomp` program: reads arguments, calls the library, writes results. It is a library so that the Python
+//! package can include the program.
+// Printing, without a panic if the output is closed, is in print.rs.
 #![warn(clippy::unwrap_used, clippy::print_stderr, clippy::print_stdout)]
 
 mod asset;
@@ -99,8 +99,8 @@ enum StageVerb {
     Dataset(dataset::DatasetCommand),
 }
 
-/// Runs a command line, the program's name first, and returns its exit status. To be called once in
-/// a process: it sets up threads, messages and the handling of Ctrl-C.
+/// Runs a command line, which starts with the program's name, and returns its exit status. Call it
+/// once per process: it sets up threads, messages and the handling of Ctrl-C.
 pub fn run(words: impl Iterator<Item = OsString>) -> u8 {
     match parse_command_line(words) {
         Ok(program) => program

@@ -1,4 +1,4 @@
-//! Where results go: a folder of this machine, or an object store.
+//! Where results go: a local folder, or an object store.
 
 use crate::values::check_companion;
 use clap::builder::{OsStringValueParser, TypedValueParser};
@@ -8,7 +8,7 @@ use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What `-o` of a dataset says.
+/// The `-o` of a dataset.
 #[derive(Clone, Debug)]
 pub(crate) enum Output {
     Folder(PathBuf),
@@ -37,11 +37,11 @@ impl Output {
         }
     }
 
-    /// The folder, or the one for what is not finished: that of `scratch`, or one of the system's
-    /// temporary folder that the same output has the next time, too.
+    /// The folder, or for a store the one for unfinished files: `scratch`, or one in the system's
+    /// temporary folder that is the same each time for the same output.
     ///
     /// # Errors
-    /// `scratch` for a folder, which holds what is not finished itself.
+    /// `scratch` for a folder, which keeps unfinished files itself.
     pub(crate) fn folder(&self, scratch: Option<&Path>) -> Result<PathBuf> {
         let is_store = matches!(self, Self::Store(_));
         let store = "an object store as --output";
@@ -54,7 +54,7 @@ impl Output {
     }
 }
 
-/// Reads the folder of a command that writes to no object store; `file://` is a path.
+/// Parser for the folder of a command that cannot write to object stores; `file://` is a path.
 pub(crate) fn folder_parser() -> impl TypedValueParser<Value = PathBuf> {
     OsStringValueParser::new().try_map(parse_folder)
 }
@@ -70,7 +70,7 @@ fn parse_folder(text: OsString) -> Result<PathBuf> {
     }
 }
 
-/// What stands before the `://` of a URL, or before the `:/` of a file's, in small letters; none of
+/// The part before the `://` of a URL, or before the `:/` of a `file:` URL, in lower case; none for
 /// a path.
 fn scheme_of(text: &OsStr) -> Option<String> {
     let (scheme, rest) = text.to_str()?.split_once(":/")?;
@@ -88,7 +88,7 @@ fn scratch_name(url: &str) -> String {
 #[cfg(feature = "object-store")]
 use petcomp_store as stores;
 
-/// A program that knows folders alone.
+/// A program that supports folders only.
 #[cfg(not(feature = "object-store"))]
 mod stores {
     use super::*;

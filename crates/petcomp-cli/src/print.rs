@@ -1,23 +1,23 @@
-//! Everything that is printed: what no terminal obeys, and no panic where nobody can take it.
+//! All printing: free of terminal control sequences, and without a panic if the output is closed.
 
 use petcomp::{Error, printable};
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 
-/// The status of a program that SIGPIPE ended.
+/// Exit status of a program terminated by SIGPIPE.
 const BROKEN_PIPE_STATUS: i32 = 141;
 
-/// A line on the standard output, whatever is in it.
+/// Prints a line on standard output, whatever it contains.
 pub(crate) fn line(line: impl Display) {
     write_out(&(printable(&line.to_string()) + "\n"));
 }
 
-/// Lines on the standard output: a table, a script.
+/// Prints lines on standard output: a table, a script.
 pub(crate) fn text(text: impl Display) {
     write_out(&(printable_lines(&text.to_string()) + "\n"));
 }
 
-/// A line on the standard error. Where it cannot be written, nobody can be told.
+/// Prints a line on standard error. If that fails, nobody can be told.
 pub(crate) fn aside(line: impl Display) {
     let _ = writeln!(std::io::stderr(), "{}", printable(&line.to_string()));
 }
@@ -28,7 +28,7 @@ pub(crate) fn counted(count: usize, thing: &str) -> String {
     format!("{count} {thing}{plural}")
 }
 
-/// Clap's message, help or a wrong command line, and the exit status that goes with it.
+/// Prints clap's message (help or an error in the command line), and returns its exit status.
 pub(crate) fn usage(message: &clap::Error) -> u8 {
     match print_usage(message) {
         Err(error) if !message.use_stderr() => exit_unwritable(&error),
@@ -36,7 +36,7 @@ pub(crate) fn usage(message: &clap::Error) -> u8 {
     }
 }
 
-/// With its colours, unless an argument brings some of its own.
+/// In colour, unless an argument contains control characters.
 fn print_usage(message: &clap::Error) -> std::io::Result<()> {
     let plain = message.render().to_string();
     let tame = printable_lines(&plain);
@@ -59,7 +59,7 @@ fn write_out(text: &str) {
     }
 }
 
-/// `petcomp ... | head` ends when head does, which is no failure of ours; a full disk is one.
+/// `petcomp ... | head` ends when head does, which is not a failure of ours; a full disk is one.
 fn exit_unwritable(error: &std::io::Error) -> ! {
     if error.kind() == ErrorKind::BrokenPipe {
         std::process::exit(BROKEN_PIPE_STATUS);

@@ -1,4 +1,4 @@
-//! How far a long job is: a bar on a terminal, lines in a log.
+//! Progress of a long job: a bar on a terminal, lines in a log.
 
 use crate::print;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -24,10 +24,10 @@ impl ProgressFormat {
     }
 }
 
-/// Shows how far a long job is, until it is dropped.
+/// Shows the progress of a long job, until it is dropped.
 pub(crate) struct ProgressDisplay {
     bar: ProgressBar,
-    /// On a terminal; elsewhere there are lines, or nothing.
+    /// Whether the bar is drawn on a terminal; elsewhere there are lines, or nothing.
     is_drawn: bool,
     log: Option<Mutex<ProgressLog>>,
 }
@@ -44,7 +44,7 @@ impl ProgressDisplay {
         }
     }
 
-    /// So many steps of so many are done; the first call says what was done before.
+    /// `done` of `total` steps are done; the first call gives those done before.
     pub(crate) fn update(&self, done: u64, total: u64) {
         if self.bar.length() != Some(total) {
             self.restart_bar(done, total);
@@ -71,7 +71,7 @@ impl Drop for ProgressDisplay {
     }
 }
 
-/// A bar of no length yet, which would be drawn full.
+/// A bar without a length yet, which would be drawn full.
 fn hidden_bar(job: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}  {per_sec}  {eta} left");
     ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::hidden())
@@ -79,11 +79,11 @@ fn hidden_bar(job: &'static str) -> ProgressBar {
         .with_message(job)
 }
 
-/// Progress as lines on the standard error.
+/// Progress as lines on standard error.
 struct ProgressLog {
     job: &'static str,
     format: ProgressFormat,
-    /// When the job began, and how many steps were done then.
+    /// When the job began, and how many steps were already done.
     began: Option<(Instant, u64)>,
     last: Instant,
 }
@@ -113,7 +113,7 @@ impl ProgressLog {
         }
     }
 
-    /// JSON has a line for the first step and the last one, too.
+    /// In JSON there is always a line for the first and the last step.
     fn is_due(&self, is_end: bool) -> bool {
         (self.format == ProgressFormat::Json && is_end)
             || self.last.elapsed() >= self.format.interval()
@@ -127,7 +127,7 @@ impl ProgressLog {
     }
 }
 
-/// How far a job is, and how fast it goes.
+/// The progress and speed of a job.
 struct JobStatus {
     job: &'static str,
     done: u64,
@@ -141,7 +141,7 @@ impl JobStatus {
     }
 
     fn to_json(&self) -> serde_json::Value {
-        // JSON has no infinity: what is not known yet is null.
+        // JSON has no infinity: values not known yet are null.
         serde_json::json!({
             "job": self.job,
             "done": self.done,

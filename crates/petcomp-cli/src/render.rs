@@ -55,7 +55,7 @@ pub(crate) fn run(args: &RenderArgs, global: &GlobalArgs) -> anyhow::Result<()> 
 }
 
 impl RenderArgs {
-    /// Refuses what could not be written before anything is rendered.
+    /// Rejects invalid output paths before anything is rendered.
     fn check_targets(&self) -> anyhow::Result<()> {
         if !self.aov.is_empty() && !io::has_extension(&self.output, "exr") {
             let path = self.output.display();
@@ -68,7 +68,7 @@ impl RenderArgs {
         Ok(())
     }
 
-    /// What is written.
+    /// The files to write.
     fn targets(&self) -> impl Iterator<Item = &PathBuf> {
         let extras = self.preview.iter().chain(&self.resolved);
         extras.chain([&self.output])

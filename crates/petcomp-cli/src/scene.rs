@@ -105,7 +105,7 @@ fn export_scene(args: &ExportSceneArgs, global: &GlobalArgs) -> anyhow::Result<(
     Ok(())
 }
 
-/// What a picture of ours has and the exported one lacks.
+/// What our pictures have and exported ones lack.
 fn left_out(scene: &Scene, shot: &Shot) -> Vec<&'static str> {
     let bends = |card: &Card| card.refraction.flows.iter().any(Option::is_some);
     let parts = [

@@ -49,7 +49,7 @@ pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> 
 }
 
 impl SettleArgs {
-    /// Refuses what could not be written before anything falls.
+    /// Rejects invalid output paths before anything falls.
     fn check_targets(&self) -> petcomp::Result<()> {
         check_scene_target(&self.output)?;
         let mut pictures = self.preview.iter();
@@ -58,13 +58,13 @@ impl SettleArgs {
         texts.try_for_each(|path| io::check_folder_of(path))
     }
 
-    /// What is written.
+    /// The files to write.
     fn targets(&self) -> impl Iterator<Item = &PathBuf> {
         let extras = self.trace.iter().chain(&self.preview);
         extras.chain([&self.output])
     }
 
-    /// Lets the objects fall and writes the trace, for a failed fall too: it shows what went wrong.
+    /// Lets the objects fall and writes the trace, even of a failed fall: it shows what went wrong.
     fn settle(&self, scene: Scene, options: &SettleOptions) -> petcomp::Result<Settled> {
         let (settled, samples) = settle_traced(scene, options, self.trace_interval(options))
             .map_err(|e| e.in_file(&self.scene))?;
@@ -74,7 +74,7 @@ impl SettleArgs {
         Ok(settled)
     }
 
-    /// Steps of the simulation from one line of the trace to the next; 0 without a trace.
+    /// Simulation steps between lines of the trace; 0 without a trace.
     fn trace_interval(&self, options: &SettleOptions) -> usize {
         match self.trace {
             Some(_) => (1.0 / (TRACE_RATE * options.step)).round().max(1.0) as usize,
@@ -82,7 +82,7 @@ impl SettleArgs {
         }
     }
 
-    /// Writes the scene at rest, the files that it names seen from its new place.
+    /// Writes the scene at rest, with the paths of its files relative to its new location.
     fn write_rest(&self, mut scene: Scene) -> petcomp::Result<Scene> {
         if let Some(files) = &scene.files {
             scene.files = Some(files.moved(&self.scene, &self.output)?);
@@ -99,7 +99,7 @@ impl SettleArgs {
         })
     }
 
-    /// Those of the file that was given, or the scene's own.
+    /// The options of the given file, or the scene's own.
     fn given_options(&self, scene: &Scene) -> petcomp::Result<SettleOptions> {
         match &self.options {
             Some(path) => read_options(path),
@@ -107,7 +107,7 @@ impl SettleArgs {
         }
     }
 
-    /// Those of the scene's own settings.
+    /// The options from the scene's own settings.
     fn scene_options(&self, scene: &Scene) -> petcomp::Result<SettleOptions> {
         let config = DatasetConfig::from_settings(&scene.settings, &[]);
         Ok(config.map_err(|e| e.in_file(&self.scene))?.scene.settle)

@@ -1,9 +1,9 @@
 //! Help of the subcommands: the global options in one line.
 
-/// Where the global options are listed in full.
+/// Heading under which the global options are listed in full.
 pub(crate) const GLOBAL_HEADING: &str = "Global options";
 
-/// The same program, its global options a line at the end of every subcommand's help.
+/// The same program, with its global options on one line at the end of every subcommand's help.
 pub(crate) fn with_short_help(program: clap::Command) -> clap::Command {
     let options = program.get_arguments().filter(|arg| arg.is_global_set());
     let options: Vec<clap::Arg> = options.cloned().collect();
@@ -26,7 +26,7 @@ fn with_hidden_options(command: clap::Command, options: &[clap::Arg], line: &str
         .mut_subcommands(|inner| with_hidden_options(inner, options, line))
 }
 
-/// `-j` or, where it has no letter, `--limit`.
+/// `-j` or, without a short form, `--limit`.
 fn shortest_flag(arg: &clap::Arg) -> String {
     match (arg.get_short(), arg.get_long()) {
         (Some(letter), _) => format!("-{letter}"),

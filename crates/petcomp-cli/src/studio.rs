@@ -1,4 +1,4 @@
-//! `petcomp studio`: pages in the browser of this machine.
+//! `petcomp studio`: pages for the browser on this machine.
 
 use crate::global::GlobalArgs;
 use crate::interruption::on_interrupt;
@@ -17,7 +17,7 @@ pub(crate) struct StudioArgs {
     port: u16,
 }
 
-/// Prints the address, and answers until Ctrl-C.
+/// Prints the URL, and serves until Ctrl-C.
 pub(crate) fn run(args: &StudioArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let server = Server::open(&args.folder, args.port)?;
     print::line(server.address());

@@ -1,5 +1,5 @@
-//! Values on the command line that are more than one number or name, and options that belong
-//! together.
+//! Values on the command line that are more than one number or name, and options that depend on
+//! each other.
 
 use clap::builder::RangedU64ValueParser;
 use petcomp::asset::ScreenSource;
@@ -9,12 +9,12 @@ use std::any::TypeId;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-/// A number of things within a range: more of them would take days, or all of the memory.
+/// A number within a range: more would take days, or all of the memory.
 pub(crate) fn count(range: RangeInclusive<u64>) -> RangedU64ValueParser<usize> {
     RangedU64ValueParser::new().range(range)
 }
 
-/// Fails where an option is given without the one that it belongs to.
+/// Fails if an option is given without the one that it belongs to.
 pub(crate) fn check_companion(
     name: &str,
     is_given: bool,
@@ -27,8 +27,8 @@ pub(crate) fn check_companion(
     }
 }
 
-/// The same program, whose options take numbers below 0 for their value and say what they expect;
-/// clap would take them for another option.
+/// The same program, whose options accept numbers below 0 as values and report what they expect;
+/// clap would treat such numbers as options.
 pub(crate) fn with_negative_numbers(program: clap::Command) -> clap::Command {
     program
         .mut_args(with_negative_number)
@@ -42,8 +42,8 @@ fn with_negative_number(arg: clap::Arg) -> clap::Arg {
         .allow_hyphen_values(is_list)
 }
 
-/// Whether the value is a list of numbers, or may be one. Clap takes for it whatever follows,
-/// another option too: what parses it says what was expected.
+/// Whether the value is a list of numbers, or may be one. Clap accepts anything that follows as its
+/// value, even another option; the value's parser reports what was expected.
 fn takes_list(arg: &clap::Arg) -> bool {
     let lists = [
         TypeId::of::<LinearRgb>(),
@@ -121,7 +121,7 @@ pub(crate) fn parse_pixel(text: &str) -> Result<[usize; 2], String> {
     parse_numbers(text, "X,Y, whole numbers of at least 0, as in 40,30")
 }
 
-/// Numbers with commas between them.
+/// Numbers separated by commas.
 fn parse_numbers<T: FromStr, const N: usize>(text: &str, form: &str) -> Result<[T; N], String> {
     let numbers: Option<Vec<T>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
     let numbers = numbers.and_then(|numbers| numbers.try_into().ok());

@@ -1,4 +1,4 @@
-//! `petcomp camera export`: cameras in the files of other programs.
+//! `petcomp camera export`: cameras in the formats of other programs.
 
 use crate::print;
 use petcomp::camera::{CameraFile, ColmapModel, OpencvCamera};
@@ -49,7 +49,7 @@ pub(super) fn export_cameras(args: &ExportCameraArgs) -> anyhow::Result<()> {
     }
 }
 
-/// Blender's cameras have no lens that bends lines.
+/// Blender's cameras have no lens distortion.
 fn warn_of_bent_lines(path: &Path, file: &CameraFile) {
     if file.k1() != 0.0 {
         let (path, k1) = (path.display(), file.k1());
@@ -59,7 +59,7 @@ fn warn_of_bent_lines(path: &Path, file: &CameraFile) {
     }
 }
 
-/// What OpenCV's functions take.
+/// The input of OpenCV's functions.
 #[derive(serde::Serialize)]
 struct OpencvDocument {
     #[serde(flatten)]
@@ -91,7 +91,7 @@ fn only_file(files: &[CameraFile]) -> anyhow::Result<&CameraFile> {
     }
 }
 
-/// COLMAP tells pictures apart by their names alone.
+/// COLMAP distinguishes pictures only by their names.
 fn check_names(paths: &[PathBuf], files: &[CameraFile]) -> anyhow::Result<()> {
     let mut named = BTreeMap::new();
     for (path, file) in paths.iter().zip(files) {

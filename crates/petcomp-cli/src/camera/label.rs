@@ -61,7 +61,7 @@ pub(super) fn init_label(args: &InitLabelArgs, global: &GlobalArgs) -> anyhow::R
 }
 
 impl InitLabelArgs {
-    /// The given file, or `photos/bg.label.json` of `photos/bg.jpg`.
+    /// The given file, or `photos/bg.label.json` for `photos/bg.jpg`.
     fn output_path(&self) -> PathBuf {
         self.output.clone().unwrap_or_else(|| {
             let name = format!("{}.label.json", stem_of(&self.photo));
@@ -88,8 +88,8 @@ impl InitLabelArgs {
         Ok(label)
     }
 
-    /// The label with the corners of the markers that it has; where its own corners are given it
-    /// does without those.
+    /// The label with the corners of its markers; if its own corners are given, the markers are
+    /// optional.
     fn with_markers(&self, label: Label) -> petcomp::Result<Label> {
         if label.markers.is_none() {
             return Ok(label);
@@ -109,7 +109,7 @@ impl InitLabelArgs {
         Error::file(&self.photo, what)
     }
 
-    /// Where the corners come from, for a photo in which so many corners of markers were found.
+    /// The source of the corners, for a photo with `found` marker corners.
     fn describe_corners(&self, found: usize) -> String {
         match (self.corners, found) {
             (_, 1..) => format!("{found} marker corners found"),
@@ -122,7 +122,7 @@ impl InitLabelArgs {
 }
 
 pub(super) fn add_markers(args: &MarkersArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    // The map may be the label to write: it gets its markers.
+    // The map may be the label to write: then the markers are added to it.
     io::check_distinct([&args.photo], [&args.output])?;
     let label = args.known_label()?;
     let photo: Image<LinearRgb> = io::read(&args.photo)?;
@@ -134,7 +134,7 @@ pub(super) fn add_markers(args: &MarkersArgs, global: &GlobalArgs) -> anyhow::Re
 }
 
 impl MarkersArgs {
-    /// The map's label where that is of this photo, or else a new one with what photos share.
+    /// The map's label if it belongs to this photo, otherwise a new one with what photos share.
     fn known_label(&self) -> petcomp::Result<Label> {
         let mut map = camera::read_label(&self.map)?;
         let new = camera::init_label(&self.photo, &self.output, Some(&map))?;

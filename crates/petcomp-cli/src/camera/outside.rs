@@ -1,17 +1,18 @@
-//! Corners that may have been marked in a larger size of the photo.
+//! Corners that may have been marked on a larger copy of the photo.
 
 use petcomp::camera::Label;
 use std::fmt::Display;
 
-/// Asks where the corners of a label come from that looks like one of a larger picture.
+/// Warns if the corners of a label seem to come from a larger picture.
 pub(super) fn warn_of_outside(shown: impl Display, label: &Label) {
     if let Some(question) = question_of_outside(label) {
         log::warn!("{shown}: {question}");
     }
 }
 
-/// Two or more corners lie beyond the picture, right or below, and none left or above: what
-/// reaches beyond it by itself does so on any side, pixels of a larger picture only there.
+/// Whether two or more corners are beyond the picture's right or lower edge, and none beyond the
+/// left or upper: a rectangle that really extends beyond the picture does so on any side, pixels of
+/// a larger picture only there.
 fn question_of_outside(label: &Label) -> Option<String> {
     let ([w, h], corners) = (label.image_size(), label.surface.corners_px?);
     let is_beyond = |&&[x, y]: &&[f64; 2]| x > f64::from(w) || y > f64::from(h);
@@ -41,7 +42,7 @@ mod tests {
         assert!(told.starts_with("3 of 4 corners lie outside the 640 x 480 picture;"));
         let one = [[10.0, 10.0], [600.0, 10.0], [700.0, 500.0], [10.0, 400.0]];
         assert_eq!(asked(one), None);
-        // A surface that fills more than the picture.
+        // A surface that more than fills the picture.
         let around = [
             [-300.0, -200.0],
             [1000.0, 0.0],

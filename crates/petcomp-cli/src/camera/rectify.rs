@@ -31,7 +31,7 @@ pub(crate) struct RectifyArgs {
     force: bool,
 }
 
-/// Writes the photo from above, or another picture as the photo's camera sees it on the surface.
+/// Writes the photo as a top view, or another picture as the photo's camera sees it on the surface.
 pub(super) fn write_view(args: &RectifyArgs) -> anyhow::Result<()> {
     let inputs = [&args.photo, &args.label].into_iter().chain(&args.back);
     io::check_distinct(inputs, [&args.output])?;
@@ -45,7 +45,7 @@ pub(super) fn write_view(args: &RectifyArgs) -> anyhow::Result<()> {
 }
 
 impl RectifyArgs {
-    /// The size of the photo, which may be a reduced one of the label's.
+    /// The size of the photo, which may be a reduced copy of the label's.
     fn photo_size(&self, labelled: &LabelledPhoto) -> anyhow::Result<[u32; 2]> {
         let header = io::read_header(&self.photo)?;
         header.check_square_pixels(&self.photo)?;
@@ -83,7 +83,7 @@ impl RectifyArgs {
     }
 }
 
-/// At the rectangle's centre, of a photo that may be a reduced one of the label's.
+/// At the rectangle's centre, for a photo that may be a reduced copy of the label's.
 fn px_per_metre_of_photo(camera: &Camera, solution: &Solution) -> f64 {
     let [photo, label] = [camera, &solution.camera].map(|camera| f64::from(camera.image[0]));
     solution.fit.px_per_metre * photo / label

@@ -44,7 +44,7 @@ pub(crate) struct JointArgs {
 }
 
 impl LabelFileArgs {
-    /// The given files, without the cameras of an earlier run where a pattern took these in too.
+    /// The given files, without the cameras of an earlier run that a pattern may have matched too.
     fn files(&self) -> Vec<&Path> {
         let given = || self.labels.iter().map(PathBuf::as_path);
         let labels: Vec<&Path> = given()
@@ -66,8 +66,7 @@ impl LabelFileArgs {
         camera::read_labels(path, self.size)
     }
 
-    /// Does something with every label; where there are several, one that cannot be used does not
-    /// stop the others.
+    /// Calls `act` for every label; if there are several, an unusable one does not stop the others.
     fn for_each(&self, act: impl Fn(&LabelledPhoto) -> anyhow::Result<()>) -> anyhow::Result<()> {
         let files = self.files();
         if let [path] = files[..]
@@ -87,7 +86,7 @@ impl LabelFileArgs {
 }
 
 impl SolveArgs {
-    /// One file can hold one camera only, and not a label or a photo too.
+    /// A file can hold only one camera, and must not be a label or a photo as well.
     fn check_output(&self) -> anyhow::Result<()> {
         if let Some(output) = &self.output {
             io::check_distinct(self.labels.files(), [output])?;
@@ -98,7 +97,7 @@ impl SolveArgs {
     }
 }
 
-/// Solves each label alone.
+/// Solves each label separately.
 pub(super) fn solve_each(args: &SolveArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     args.check_output()?;
     args.labels.for_each(|labelled| {
@@ -148,7 +147,7 @@ fn solve_together(members: &[LabelledPhoto]) -> petcomp::Result<Vec<JointOutcome
     Ok(joint.photos)
 }
 
-/// What became of a photo that was solved together with others.
+/// The outcome of a photo that was solved together with others.
 type JointOutcome = Result<Solution, SolveError>;
 
 fn labels_of(photos: &[LabelledPhoto]) -> Vec<Label> {
@@ -171,7 +170,7 @@ fn accept_member(
     Ok(())
 }
 
-/// Says in plain words how well each camera is known.
+/// Explains in plain words how well each camera is known.
 pub(super) fn explain_each(args: &LabelFileArgs) -> anyhow::Result<()> {
     args.for_each(|labelled| {
         let solution = solved(labelled)?;
@@ -195,8 +194,7 @@ fn possible(solution: Solution, labelled: &LabelledPhoto) -> petcomp::Result<Sol
     Ok(solution)
 }
 
-/// A solution that fits its label, through a lens that can have taken the photo; any where that is
-/// asked for.
+/// A solution that fits its label, through a lens that can have taken the photo; with `force`, any.
 pub(super) fn accepted(
     solution: Solution,
     labelled: &LabelledPhoto,
@@ -208,7 +206,7 @@ pub(super) fn accepted(
     if let Some(error) = solution.misfit() {
         return Err(needs_force(&labelled.source, error.into()));
     }
-    // Pictures may show the middle of the photo alone.
+    // Pictures may show only the middle of the photo.
     camera::check_lens(&solution.camera, solution.k1())
         .map_err(|e| needs_force(&labelled.source, e))?;
     Ok(solution)
@@ -226,7 +224,7 @@ fn located(error: SolveError, labelled: &LabelledPhoto) -> Error {
     Error::from(error).in_file(&labelled.source)
 }
 
-/// Writes the camera and, where the photo is there, the overlay.
+/// Writes the camera and, if the photo exists, the overlay.
 fn write_camera(
     target: &Path,
     labelled: &LabelledPhoto,
@@ -250,7 +248,7 @@ fn write_overlay(camera: &Path, photo: &Path, solution: &Solution) -> petcomp::R
     io::write(overlay_beside(camera), &camera::overlay(&photo, solution))
 }
 
-/// `bg.overlay.png` of `bg.camera.json`.
+/// `bg.overlay.png` for `bg.camera.json`.
 fn overlay_beside(camera: &Path) -> PathBuf {
     let name = camera.file_name().unwrap_or_default().to_string_lossy();
     camera.with_file_name(format!("{}.overlay.png", camera_stem(&name)))

@@ -45,8 +45,8 @@ pub(crate) fn run(args: &AblateArgs, global: &GlobalArgs) -> anyhow::Result<()> 
     for (name, config) in &datasets {
         write_recipe(&args.output.join(name), config)?;
     }
-    // All are opened before any is made: a switch that cannot work is told at once. One at a time,
-    // as each may keep a quarter of the memory.
+    // All are opened before any is generated, so that an invalid switch is reported at once. One at
+    // a time, since each may take a quarter of the memory.
     for (name, _) in &datasets {
         args.opened(name)?;
     }
@@ -68,7 +68,7 @@ fn dataset_in(folder: &Path) -> PathBuf {
     folder.join("dataset")
 }
 
-/// Fails where a dataset was begun with another recipe than would be written beside it.
+/// Fails if a dataset was started with another recipe than the one to be written next to it.
 fn check_recipe(folder: &Path, config: &DatasetConfig) -> petcomp::Result<()> {
     let (recipe, dataset) = (recipe_in(folder), dataset_in(folder));
     if !dataset.exists() || !recipe.exists() || config.is_written(&recipe)? {
@@ -87,7 +87,7 @@ fn write_recipe(folder: &Path, config: &DatasetConfig) -> petcomp::Result<()> {
 }
 
 impl AblateArgs {
-    /// Names, as of their folders, and recipes.
+    /// Names, which are those of the folders, and recipes.
     fn datasets(&self) -> anyhow::Result<Vec<(String, DatasetConfig)>> {
         let base = self.recipe.read_config()?;
         if self.switches.is_empty() {
@@ -107,7 +107,7 @@ impl AblateArgs {
             .collect()
     }
 
-    /// What makes the dataset of this name; none where only recipes are written.
+    /// The pipeline and plan of the dataset with this name; none if only recipes are written.
     fn opened(&self, name: &str) -> anyhow::Result<Option<(Pipeline, Plan)>> {
         let planned = (self.count > 0).then(|| self.planned(&self.output.join(name)));
         planned.transpose().with_context(|| name.to_owned())
@@ -121,7 +121,7 @@ impl AblateArgs {
     }
 }
 
-/// Fails where two switches would have one folder.
+/// Fails if two switches would have the same folder.
 fn check_folders(switches: &[Override]) -> petcomp::Result<()> {
     let mut known = BTreeMap::new();
     for switch in switches {
@@ -134,11 +134,11 @@ fn check_folders(switches: &[Override]) -> petcomp::Result<()> {
     Ok(())
 }
 
-/// Most bytes of a switch in its folder's name, of which file systems take 255.
+/// Maximum number of bytes of a switch in its folder's name; file systems allow 255.
 const MAX_NAME: usize = 100;
 
-/// The switch without what file names cannot have everywhere; one that is long, or has other
-/// letters, ends in its hash.
+/// The switch without characters that file names cannot have everywhere; if it is long, or has
+/// other characters, it ends in its hash.
 fn folder_name(switch: &Override) -> String {
     let switch = switch.to_string();
     let short = switch.replace(", ", ",").replace('"', "");
@@ -150,7 +150,7 @@ fn folder_name(switch: &Override) -> String {
     format!("{}-{hash:016x}", &name[..name.len().min(MAX_NAME)])
 }
 
-/// In ASCII.
+/// Replaces everything but plain ASCII characters.
 fn plain_name(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "._-=,[]".contains(c);
     text.chars()

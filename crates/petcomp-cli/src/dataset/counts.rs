@@ -1,10 +1,10 @@
-//! What is in a dataset that was just made.
+//! The contents of a newly generated dataset.
 
 use crate::print;
 use petcomp::dataset::{ClassCount, DatasetCounts, Obstructed};
 use std::path::{Path, PathBuf};
 
-/// Prints what is in the folder: a result, so also where quiet is asked for.
+/// Prints what is in the folder: it is a result, so it is printed with `--quiet`, too.
 pub(crate) fn print_counts(counts: &DatasetCounts) {
     print::line(images_line(counts));
     if counts.counted == 0 && counts.images > 0 {
@@ -16,7 +16,7 @@ pub(crate) fn print_counts(counts: &DatasetCounts) {
     }
 }
 
-/// Prints what a dataset's trainers are given.
+/// Prints the files to give to trainers.
 pub(super) fn print_trainer_inputs(counts: &DatasetCounts, folder: &Path) {
     for path in trainer_inputs(counts, folder) {
         print::line(path.display());
@@ -47,7 +47,7 @@ fn objects_line(counts: &DatasetCounts) -> String {
     )
 }
 
-/// Which images the objects are in, where it is not all of them.
+/// Which images the objects are in, if not all of them.
 fn counted_in(counts: &DatasetCounts) -> String {
     match counts.counted {
         all if all == counts.images => String::new(),
@@ -58,7 +58,7 @@ fn counted_in(counts: &DatasetCounts) -> String {
 const WITHOUT_LABEL: &str = "without a label";
 const TO_BE_IGNORED: &str = "ignored, unlabelled in YOLO";
 
-/// What became of the labels of obstructed objects.
+/// What happened to the labels of obstructed objects.
 fn obstructed_labels(policy: Obstructed) -> &'static str {
     match policy {
         Obstructed::Drop => WITHOUT_LABEL,
@@ -68,7 +68,7 @@ fn obstructed_labels(policy: Obstructed) -> &'static str {
     }
 }
 
-/// Objects that were left out, where there are any, and what became of their labels.
+/// Objects that were left out, if any, and what happened to their labels.
 fn left_out(counts: &DatasetCounts) -> String {
     let labels = match counts.policy {
         Obstructed::Ignore => "ignored or without a label",
@@ -80,8 +80,7 @@ fn left_out(counts: &DatasetCounts) -> String {
     }
 }
 
-/// What a dataset's trainers are given: the files that name all others, or the folder where there
-/// are none.
+/// The files to give to trainers: those that name all others, or the folder if there are none.
 pub(crate) fn trainer_inputs(counts: &DatasetCounts, folder: &Path) -> Vec<PathBuf> {
     match counts.for_trainers.as_slice() {
         [] => vec![folder.into()],

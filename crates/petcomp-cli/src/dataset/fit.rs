@@ -1,4 +1,4 @@
-//! `petcomp dataset fit`: a recipe comes nearer to the real place.
+//! `petcomp dataset fit`: fits a recipe to the real place.
 
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
@@ -55,8 +55,8 @@ impl FitArgs {
         }
     }
 
-    /// Fails where something that is read would be written over, or a folder to write into is
-    /// missing: the work in between takes long.
+    /// Fails if an input would be overwritten, or a folder to write into is missing: the work in
+    /// between takes long.
     fn check_targets(&self) -> petcomp::Result<()> {
         let targets = [self.output.clone(), self.page_path()];
         let mut read = vec![self.recipe.clone()];
@@ -75,7 +75,7 @@ impl FitArgs {
     }
 }
 
-/// Prints what was fitted, and what stays.
+/// Prints what was fitted, and what stays unchanged.
 fn print_keys(fitted: &Fit) {
     for FittedKey {
         key, fitted, why, ..

@@ -59,7 +59,7 @@ pub(crate) struct GenerateArgs {
 }
 
 pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    // In pictures of the recipe's own size.
+    // For pictures of the recipe's own size.
     let whole = args.recipe.read_config_at(args.quality)?;
     let range = args.sample_range()?;
     let (whole_px, config) = (whole.scene.image, args.reduced(whole));
@@ -83,7 +83,7 @@ pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()
 }
 
 impl GenerateArgs {
-    /// Has what is damaged made again.
+    /// Marks damaged samples and archives to be generated again.
     fn repair(&self, folder: &Path, range: SampleRange, archives: bool) -> petcomp::Result<()> {
         match &self.output {
             Output::Folder(_) if archives => repair_archives(folder, range),
@@ -95,7 +95,7 @@ impl GenerateArgs {
         }
     }
 
-    /// The recipe for the pictures that are asked for.
+    /// The recipe for the requested pictures.
     fn reduced(&self, whole: DatasetConfig) -> DatasetConfig {
         match self.preview {
             Some(_) => whole.preview(),

@@ -83,7 +83,7 @@ fn check_dataset(args: &CheckArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints what is wrong, which is an error, or how much was checked.
+/// Prints the findings, which make an error, or how much was checked.
 fn print_findings(checked: &Checked, folder: &Path) -> anyhow::Result<()> {
     let (folder, errors) = (folder.display(), checked.findings.len());
     checked.findings.iter().for_each(print::line);
@@ -108,17 +108,17 @@ fn page_folder(page: &Path) -> &Path {
     folder.unwrap_or(Path::new("."))
 }
 
-/// Folders of what is joined from the files of many samples, which the journal does not list.
+/// Folders of files joined from those of many samples, which the journal does not list.
 const JOINED: [&str; 4] = ["annotations", "mot", "voc", "webdataset"];
 
-/// Fails where a file of the dataset would be written over.
+/// Fails if a file of the dataset would be overwritten.
 fn check_dataset_stays(folder: &Path, output: &Path) -> petcomp::Result<()> {
-    // A file that is not there yet is none of the dataset's.
+    // A file that does not exist yet is none of the dataset's.
     let Ok(real) = output.canonicalize() else {
         return Ok(());
     };
     let own = ["data.yaml", "dataset.json", JOURNAL].map(|file| folder.join(file));
-    // What is wrong with the journal is said when it is read for the page or the sheet.
+    // Errors in the journal are reported when it is read for the page or the sheet.
     let listed = dataset::listed_files(folder).unwrap_or_default();
     let listed = listed.into_iter();
     let alike = listed.filter(|file| file.file_name() == real.file_name());
@@ -145,7 +145,7 @@ fn write_report(args: &ReportArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 }
 
 impl ReportArgs {
-    /// Fails where a file of the user's own pictures would be written over.
+    /// Fails if a file of the user's own pictures would be overwritten.
     fn check_beside_stays(&self, output: &Path) -> petcomp::Result<()> {
         match &self.beside {
             Some(beside) => io::check_distinct(YoloSet::files_like(beside, output)?, [output]),
@@ -169,7 +169,7 @@ impl ReportArgs {
     }
 }
 
-/// Draws so many pictures of a dataset, evenly spread.
+/// Draws this many pictures of a dataset, evenly spread.
 pub(crate) fn write_contact_sheet(
     dataset: &Path,
     count: usize,

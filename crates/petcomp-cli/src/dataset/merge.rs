@@ -1,4 +1,4 @@
-//! `petcomp dataset merge`: the shards of several machines become one dataset.
+//! `petcomp dataset merge`: joins the shards of several machines into one dataset.
 
 use super::{print_counts, print_trainer_inputs};
 use crate::global::GlobalArgs;

@@ -1,4 +1,4 @@
-//! `petcomp dataset init` and `explain`: recipes to write and to understand.
+//! `petcomp dataset init` and `explain`: writes and explains recipes.
 
 use crate::documents::RecipeArgs;
 use crate::global::GlobalArgs;
@@ -58,7 +58,8 @@ fn init_recipe(args: &InitRecipeArgs, global: &GlobalArgs) -> anyhow::Result<()>
     Ok(())
 }
 
-/// Makes the image to know which of its scenes came to rest, and prints the draws of that one.
+/// Generates the image, in order to know which of its scenes came to rest, and prints the draws of
+/// that one.
 fn explain_draws(args: &ExplainArgs) -> anyhow::Result<()> {
     let sample = args.recipe.open_pipeline()?.sample(args.seed, args.index)?;
     if let Some(provenance) = &sample.provenance {
@@ -80,7 +81,7 @@ fn print_rejected(provenance: &Provenance) {
     }
 }
 
-/// Prints path, distribution, value and the name of what a choice chose, in columns.
+/// Prints path, distribution, value and the name of the selected item, in columns.
 fn print_draws(provenance: &Provenance) {
     let draws = &provenance.draws;
     let froms: Vec<String> = draws.iter().map(|draw| draw.from.to_string()).collect();
@@ -94,7 +95,7 @@ fn print_draws(provenance: &Provenance) {
     }
 }
 
-/// The name of what a choice chose.
+/// The name of the item selected by a draw.
 fn chosen_name<'a>(draw: &Drawn, scene: &'a Scene) -> &'a str {
     match chosen_asset(&draw.path) {
         Some((role, i)) => asset_name(scene, role, i),

@@ -59,7 +59,7 @@ pub(crate) struct SubsetArgs {
     output: PathBuf,
 }
 
-/// Most near duplicates that are listed.
+/// Maximum number of near-duplicates that are listed.
 const MAX_LISTED_PAIRS: usize = 10;
 
 pub(super) fn run(command: &SelectCommand, global: &GlobalArgs) -> anyhow::Result<()> {
@@ -93,7 +93,7 @@ impl SplitArgs {
         })
     }
 
-    /// Fails where a guard or a group is given that belongs to another way to split.
+    /// Fails if a guard or a group is given that belongs to another split method.
     fn check_companions(&self) -> petcomp::Result<()> {
         let (guard, consecutive) = (self.guard.is_some(), self.by == SplitMethod::Consecutive);
         check_companion("--guard", guard, "--by consecutive", consecutive)?;
@@ -102,13 +102,13 @@ impl SplitArgs {
     }
 }
 
-/// Fails where a list or the data.yaml would replace one that they are made from.
+/// Fails if a list or the data.yaml would replace one that it is made from.
 fn check_sources_stay(folder: &Path, output: &Path) -> petcomp::Result<()> {
     let written = ["train.txt", "val.txt", "data.yaml"].map(|file| output.join(file));
     io::check_distinct(YoloSet::choosing_files(folder)?, written)
 }
 
-/// Of what there may be too few, for which options.
+/// What there may be too few of, and for which options.
 fn scarce(how: Partition, ratio: f64) -> String {
     match how {
         Partition::Grouped(_) => format!("groups for --ratio {ratio}"),
@@ -136,7 +136,7 @@ fn write_subset(args: &SubsetArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     write_lists(&subset, &args.output, global)
 }
 
-/// Fails where nothing is left of a part that has images.
+/// Fails if nothing is left of a part that has images.
 fn check_no_part_is_lost(head: f64, set: &YoloSet, subset: &YoloSet) -> petcomp::Result<()> {
     let parts = [
         ("training", &set.train, &subset.train),

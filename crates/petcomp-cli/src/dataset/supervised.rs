@@ -1,5 +1,5 @@
-//! A run under supervision: it shows its progress, stops when interrupted, and asks before it takes
-//! hours.
+//! A supervised run: it shows its progress, stops when interrupted, and needs confirmation before
+//! it takes hours.
 
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
@@ -10,7 +10,7 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How often the time that the rest will take is estimated.
+/// How often the remaining time is estimated.
 const ESTIMATE_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Whether a job may take very long.
@@ -22,8 +22,8 @@ pub(crate) struct LongRunConsent {
     yes: bool,
 }
 
-/// Makes the dataset, showing progress, and stops between two pictures when interrupted, or when
-/// the first ones show that it takes longer than an hour and nobody has agreed to that.
+/// Generates the dataset, showing progress; stops between two pictures when interrupted, or when
+/// the first ones show that it will take longer than an hour without the user's consent.
 pub(crate) fn generate_supervised(
     pipeline: &Pipeline,
     plan: &Plan,
@@ -54,10 +54,11 @@ pub(crate) fn generate_supervised(
     }
 }
 
-/// Estimates beside a run how long it will take.
+/// Estimates during a run how long it will take.
 struct RunWatch {
     threads: usize,
-    /// None before the run is about to make pictures: opening a large folder is none of their time.
+    /// None until the run is about to generate pictures: the time for opening a large folder does
+    /// not count.
     pace: Mutex<Option<RunPace>>,
 }
 
@@ -80,11 +81,11 @@ impl RunWatch {
         self.pace.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Runs the job and, where that is asked for, stops it when it would take too long; returns the
-    /// estimate, too.
+    /// Runs the job and, if `is_limited`, stops it when it would take too long; also returns the
+    /// estimate.
     fn over<T>(&self, is_limited: bool, job: impl FnOnce() -> T) -> (T, Option<LongRun>) {
         std::thread::scope(|scope| {
-            // Dropped when the job ends, also where it panics.
+            // Dropped when the job ends, even by a panic.
             let (running, end) = mpsc::channel();
             let watching = is_limited.then(|| scope.spawn(move || self.stop_long_run(&end)));
             let made = job();
@@ -94,7 +95,7 @@ impl RunWatch {
         })
     }
 
-    /// Until the run's end: stops it when it is going to take longer than an hour, and returns how
+    /// Runs until the job ends; stops the job if it will take longer than an hour, and returns how
     /// long.
     fn stop_long_run(&self, end: &Receiver<()>) -> Option<LongRun> {
         while end.recv_timeout(ESTIMATE_INTERVAL) == Err(RecvTimeoutError::Timeout) {

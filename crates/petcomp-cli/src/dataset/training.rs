@@ -1,4 +1,4 @@
-//! What trainings need of a dataset: batches, anchors, the kit for PyTorch.
+//! What training needs from a dataset: batches, anchors, the kit for PyTorch.
 
 use crate::global::GlobalArgs;
 use crate::output::folder_parser;
@@ -118,7 +118,7 @@ fn plan_batches(args: &BatchesArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 }
 
 impl BatchesArgs {
-    /// Fails where a file of the sets would be written over.
+    /// Fails if a file of the sets would be overwritten.
     fn check_sets_stay(&self) -> petcomp::Result<()> {
         let folders = [&self.sets.real, &self.sets.synthetic].into_iter();
         let files = folders.map(|folder| YoloSet::files_like(folder, &self.output));
@@ -127,7 +127,7 @@ impl BatchesArgs {
     }
 }
 
-/// Two datasets that are trained on together.
+/// Two datasets to be combined for training.
 struct MixedSets {
     real: YoloSet,
     synthetic: YoloSet,

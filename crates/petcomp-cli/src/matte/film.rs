@@ -12,7 +12,7 @@ use petcomp::matte::{
 use petcomp::{Coverage, Film, Image, LinearRgb};
 use std::path::{Path, PathBuf};
 
-/// What both commands read and write.
+/// Inputs and outputs of both commands.
 #[derive(clap::Args)]
 pub(crate) struct FilmOptionArgs {
     /// Film to write, an EXR: R G B A (the object alone), transmittance TR TG TB (as measured) and
@@ -103,7 +103,7 @@ impl TriangulateArgs {
         Ok(())
     }
 
-    /// Photos of one size.
+    /// Photos of equal size.
     fn read_photos(&self) -> Result<Vec<Image<LinearRgb>>> {
         let photos: petcomp::Result<Vec<Image<LinearRgb>>> =
             self.photos.iter().map(io::read).collect();
@@ -140,8 +140,8 @@ impl TriangulateArgs {
 }
 
 impl FilmOptionArgs {
-    /// No other format holds the channels of film, plates are there for all photos or none, and what
-    /// is read is not written over.
+    /// Checks that the output is an EXR, since no other format holds the channels of film, that plates are given for
+    /// all photos or none, and that no input is overwritten.
     fn check(&self, photos: &[PathBuf]) -> Result<()> {
         anyhow::ensure!(
             is_exr(&self.output),
@@ -159,7 +159,7 @@ impl FilmOptionArgs {
         Ok(())
     }
 
-    /// The mask that is given, or that of the object that is found.
+    /// The given mask, or that of the detected object.
     fn object_mask(&self, path: &Path, photo: &Image<LinearRgb>) -> Result<Image<Coverage>> {
         if let Some(mask) = &self.mask {
             let mask: Image<Coverage> = io::read(mask)?;
@@ -171,7 +171,7 @@ impl FilmOptionArgs {
         Ok(found.tight)
     }
 
-    /// From the photo of the empty screen or, where there is none, around the object.
+    /// From the photo of the empty screen or, without one, fitted around the object.
     fn screen_plate(
         &self,
         i: usize,

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::Ordering;
 
-/// Memory that a frame takes for each of its pixels while it is keyed: 78 to 88 bytes, measured.
+/// Memory per pixel of a frame while it is keyed: 78 to 88 bytes, measured.
 const BYTES_PER_PIXEL: u64 = 100;
 
 /// Keys pictures against a screen colour or plate, as Blender's Keying node does.
@@ -64,7 +64,7 @@ pub(crate) struct KeyArgs {
 }
 
 impl KeyArgs {
-    /// The input and its mattes, those that there are.
+    /// The input and its mattes, if any.
     fn read_input(&self, frame: &Path, plate: Option<&Image<LinearRgb>>) -> Result<KeyerInput> {
         if self.auto_mattes {
             return with_found_mattes(frame, plate);
@@ -76,7 +76,7 @@ impl KeyArgs {
         })
     }
 
-    /// What goes where.
+    /// The output files of each frame.
     fn files(&self) -> Result<Vec<FrameFiles>> {
         self.targets()
             .try_for_each(|path| self.check_folder(path))?;
@@ -86,19 +86,19 @@ impl KeyArgs {
         Ok(files)
     }
 
-    /// Everything that is read.
+    /// All input files.
     fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
         let common = [&self.plate, &self.garbage, &self.core];
         self.frames.iter().chain(common.into_iter().flatten())
     }
 
-    /// Files or folders.
+    /// The given outputs, files or folders.
     fn targets(&self) -> impl Iterator<Item = &PathBuf> {
         let optional = [&self.matte, &self.edges];
         std::iter::once(&self.output).chain(optional.into_iter().flatten())
     }
 
-    /// Several frames do not go into one file.
+    /// Several frames cannot go into one file.
     fn check_folder(&self, path: &Path) -> Result<()> {
         let count = self.frames.len();
         anyhow::ensure!(
@@ -109,12 +109,12 @@ impl KeyArgs {
         Ok(())
     }
 
-    /// Of several frames, everything goes into folders.
+    /// With several frames, everything goes into folders.
     fn is_folder(&self, path: &Path) -> bool {
         self.frames.len() > 1 || is_named_folder(path)
     }
 
-    /// None where no frame is a picture, from which something could come to lie there.
+    /// Creates none if no frame is a picture, since then nothing would be written to them.
     fn create_folders(&self) -> petcomp::Result<()> {
         let mut frames = self.frames.iter();
         if !frames.any(|frame| io::read_format(frame).is_ok()) {
@@ -134,7 +134,7 @@ impl KeyArgs {
         })
     }
 
-    /// The file that was asked for, or one of the frame's name in a folder.
+    /// The given file, or one with the frame's name in the given folder.
     fn place(&self, path: &Path, frame: &Path) -> Result<PathBuf> {
         if !self.is_folder(path) {
             return Ok(path.to_owned());
@@ -146,8 +146,8 @@ impl KeyArgs {
     }
 }
 
-/// A picture's name with the ending `.exr` in place of its own: no other format keeps all that a
-/// cut-out has, alpha, colours of any gamut, floats. What follows the last dot may be a number.
+/// A picture's name with the extension `.exr` instead of its own: no other format keeps everything
+/// in a cut-out (alpha, colours of any gamut, floats). What follows the last dot may be a number.
 fn exr_name(name: &Path) -> PathBuf {
     if Format::from_extension(name).is_some() {
         return name.with_extension("exr");
@@ -157,7 +157,7 @@ fn exr_name(name: &Path) -> PathBuf {
     whole.into()
 }
 
-/// A folder that is there, or that is meant by its last character.
+/// A folder that exists, or that is marked as one by its last character.
 fn is_named_folder(path: &Path) -> bool {
     path.is_dir() || path.to_string_lossy().ends_with(std::path::is_separator)
 }
@@ -168,7 +168,7 @@ fn is_picture_name(path: &Path) -> bool {
     is_written && !is_named_folder(path)
 }
 
-/// A frame, and where what is made of it goes.
+/// A frame, and the output files for it.
 struct FrameFiles {
     frame: PathBuf,
     cutout: PathBuf,
@@ -193,7 +193,7 @@ fn with_found_mattes(frame: &Path, plate: Option<&Image<LinearRgb>>) -> Result<K
     })
 }
 
-/// Garbage and core matte around and inside the object that is found in a photo.
+/// Garbage and core matte around and inside the object detected in a photo.
 fn find_mattes(
     path: &Path,
     photo: &Image<LinearRgb>,
@@ -214,7 +214,7 @@ fn find_mattes(
     })
 }
 
-/// What is keyed, and where it is sure not to be foreground, or to be foreground.
+/// The picture to key, and where it is certainly not foreground, or certainly foreground.
 struct KeyerInput {
     photo: Image<PremulRgba>,
     garbage: Option<Image<Coverage>>,
@@ -237,12 +237,12 @@ pub(crate) fn run(args: &KeyArgs, global: &GlobalArgs) -> Result<()> {
 
 impl KeyArgs {
     /// # Errors
-    /// Where `--profile` names another keyer than the settings.
+    /// If `--profile` names a different keyer from the settings.
     fn options(&self) -> Result<KeyOptions> {
         let Some(profile) = self.profile else {
             return Ok(io::from_overrides("key", &self.settings)?);
         };
-        // Settings that name one replace it.
+        // Settings that name a profile override it.
         let named: Override = format!("key.profile={profile}").parse()?;
         let settings = [&[named], &self.settings[..]].concat();
         let options: KeyOptions = io::from_overrides("key", &settings)?;
@@ -263,9 +263,9 @@ struct KeyerWork<'a> {
 }
 
 impl KeyerWork<'_> {
-    /// Frames side by side, as many as memory holds: while some are read or written, others are
+    /// Keys as many frames in parallel as fit in memory: while some are read or written, others are
     /// keyed. A frame that cannot be keyed does not stop the others; after an interruption no more
-    /// are begun.
+    /// are started.
     fn key_sequence(&self, frames: &[FrameFiles], global: &GlobalArgs) -> Result<()> {
         let progress = global.start_progress("frames");
         let (stop, count) = (interruption(), frames.len() as u64);
@@ -294,7 +294,7 @@ impl KeyerWork<'_> {
         })
     }
 
-    /// One frame, into pictures that are already there.
+    /// Keys one frame into existing pictures.
     fn key(&self, files: &FrameFiles, keyed: &mut Keyed) -> Result<()> {
         let input = self.args.read_input(&files.frame, self.plate.as_ref())?;
         let color = Screen::Color(self.args.screen.unwrap_or_default());

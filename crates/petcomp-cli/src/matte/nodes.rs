@@ -13,7 +13,7 @@ use petcomp::matte::{
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba, io};
 use std::path::{Path, PathBuf};
 
-/// A picture in, a picture out, settings in between.
+/// An input picture, an output picture, and settings.
 #[derive(clap::Args, Debug)]
 pub(crate) struct NodePicture {
     /// Image to key; alpha is treated as premultiplied
@@ -62,7 +62,7 @@ pub(crate) enum NodeCommand {
     KeyingScreen(KeyingScreenArgs),
 }
 
-/// A plate from a few points.
+/// A plate from points.
 #[derive(clap::Args, Debug)]
 pub(crate) struct KeyingScreenArgs {
     /// Image to sample; the plate gets its size
@@ -113,7 +113,7 @@ impl NodePicture {
         write_picture(&self.output, &spilled, canvas_of(&self.input)?)
     }
 
-    /// Not where it would be written over, or where the matte goes to the same file.
+    /// Fails if the input would be overwritten, or the matte has the same path as the output.
     fn read_photo(&self, matte: &Option<PathBuf>) -> Result<Image<PremulRgba>> {
         io::check_distinct([&self.input], matte.iter().chain([&self.output]))?;
         Ok(io::read(&self.input)?)
@@ -137,7 +137,7 @@ impl KeyerPictures {
         })
     }
 
-    /// Writes the picture seen through a matte.
+    /// Writes the picture multiplied by a matte.
     fn write_cut_out(
         &self,
         matte: impl Fn(&Image<PremulRgba>, &[Override]) -> Result<Image<Coverage>>,
@@ -154,7 +154,7 @@ impl KeyerPictures {
     }
 }
 
-/// The screen where it is seen.
+/// The colour of the screen at a point where it is visible.
 fn screen_point(photo: &Image<PremulRgba>, [x, y]: [usize; 2]) -> Result<ScreenPoint> {
     let (width, height) = photo.size();
     anyhow::ensure!(

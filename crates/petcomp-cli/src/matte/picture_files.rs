@@ -1,4 +1,4 @@
-//! Pictures of the keyers' commands, with all their bits.
+//! Files of the keyers' commands, in full precision.
 
 use anyhow::Result;
 use petcomp::Image;
@@ -7,7 +7,7 @@ use petcomp::matte::CutOut;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-/// Writes a picture, in an EXR with all its bits.
+/// Writes a picture, in full precision if it is an EXR.
 pub(super) fn write_picture<P: ToFile>(
     path: &Path,
     image: &Image<P>,
@@ -21,18 +21,18 @@ pub(super) fn write_picture<P: ToFile>(
     Ok(io::write_with(path, image, &options)?)
 }
 
-/// The file is called `.exr`.
+/// Whether the file has the extension `.exr`.
 pub(super) fn is_exr(path: &Path) -> bool {
     io::has_extension(path, "exr")
 }
 
-/// Where a photo's picture lies, for what is made of it; warns of what that does not keep.
+/// The canvas of a photo, for pictures made from it; warns of stored pixels that they do not keep.
 pub(super) fn canvas_of(photo: &Path) -> petcomp::Result<Canvas> {
     Ok(canvas_of_exr(photo)?.unwrap_or_default())
 }
 
-/// The same for a cut-out of the photo, which stays in the photo's display window. One that was
-/// reduced has no place there.
+/// The same for a cut-out of the photo, which stays in the photo's display window. A reduced
+/// cut-out has no position there.
 pub(super) fn canvas_of_cut_out(
     photo: &Path,
     (width, height): (usize, usize),
@@ -55,7 +55,7 @@ pub(super) fn canvas_of_cut_out(
     })
 }
 
-/// None of a photo in another format.
+/// None for a photo in another format.
 fn canvas_of_exr(photo: &Path) -> petcomp::Result<Option<Canvas>> {
     if io::read_format(photo)? != Format::Exr {
         return Ok(None);
@@ -78,7 +78,7 @@ fn stores_more_than_shown(header: &Header) -> bool {
     })
 }
 
-/// Fails where a picture has not the size of a photo; both are named as the user does.
+/// Fails if a picture does not have the size of a photo; both are named as the user does.
 pub(super) fn check_same_size(
     name: impl Display,
     (w, h): (usize, usize),
@@ -93,7 +93,7 @@ pub(super) fn check_same_size(
     Ok(())
 }
 
-/// Writes a picture where one was asked for.
+/// Writes a picture if it was requested.
 pub(super) fn write_optional<P: ToFile>(
     path: &Option<PathBuf>,
     image: &Image<P>,

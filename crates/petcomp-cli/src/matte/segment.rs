@@ -39,7 +39,7 @@ pub(crate) fn run(args: &SegmentArgs, global: &GlobalArgs) -> anyhow::Result<()>
     Ok(())
 }
 
-/// Tells how the object was found.
+/// Logs how the object was found.
 pub(super) fn log_search(photo: &Path, found: &Segmentation) {
     log::info!(
         "{}: segmented at level {} of the Laplacian pyramid; a pixel of the search is {:.2} of the photo",
@@ -49,7 +49,7 @@ pub(super) fn log_search(photo: &Path, found: &Segmentation) {
     );
 }
 
-/// Where each picture goes.
+/// The file of each picture.
 fn numbered(pictures: Vec<NamedPicture>, folder: &Path) -> Vec<(PathBuf, Image<f32>)> {
     let pictures = pictures.into_iter().enumerate();
     let placed = pictures.map(|(i, (name, picture))| {
@@ -61,7 +61,7 @@ fn numbered(pictures: Vec<NamedPicture>, folder: &Path) -> Vec<(PathBuf, Image<f
 
 type NamedPicture = (&'static str, Image<f32>);
 
-/// The steps of the search and its outcome, in order.
+/// The steps of the search and its result, in order.
 fn search_pictures(found: &Segmentation) -> Vec<NamedPicture> {
     let steps = found.steps.iter().map(|step| (step.name, step.shown()));
     let outcome = [("hull", &found.mask), ("outline", &found.tight)];
@@ -70,8 +70,8 @@ fn search_pictures(found: &Segmentation) -> Vec<NamedPicture> {
         .collect()
 }
 
-/// The mattes for a keyer. An object that leaves no screen has no plate, and what is opaque of it
-/// is unknown.
+/// The mattes for a keyer. If the object leaves no screen free, there is no plate, and its opaque
+/// parts are unknown.
 fn keyer_mattes(photo: &Image<LinearRgb>, found: &Segmentation) -> Vec<NamedPicture> {
     let plate = ScreenPlate::fit_outside(photo, &found.mask, &PlateOptions::default());
     let Ok(plate) = plate else {
