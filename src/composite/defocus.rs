@@ -313,7 +313,8 @@ impl Shadows {
     }
 }
 
-/// Adds the samples of a picture, or for a picture with a margin around it, only those in the margin.
+/// Adds the samples of a picture, or for a picture with a margin around it, only those in the
+/// margin.
 fn add_samples(objects: &mut Objects, deep: &DeepImage, margin: usize) {
     let inside = [deep.width(), deep.height()].map(|side| margin..side - margin);
     let is_inside = |x: usize, y: usize| inside[0].contains(&x) && inside[1].contains(&y);

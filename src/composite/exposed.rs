@@ -1,7 +1,8 @@
 //! A shot as lens and shutter show it, and as labels use it.
 //!
-//! The holdout belongs to the photo, which has its own blur: it hides objects after they have been defocused and moved,
-//! not before. Parts of the photo that are displaced by objects that bend light stay as sharp as the rest of it.
+//! The holdout belongs to the photo, which has its own blur: it hides objects after they have been
+//! defocused and moved, not before. Parts of the photo that are displaced by objects that bend
+//! light stay as sharp as the rest of it.
 
 use crate::composite::defocus::defocus;
 use crate::composite::effect::Effect;
@@ -25,8 +26,8 @@ pub(crate) struct Exposed {
 }
 
 impl Exposed {
-    /// From samples before the holdout is applied. What spreads into the picture from beyond its border is rendered
-    /// with the same `options`.
+    /// From samples before the holdout is applied. What spreads into the picture from beyond its
+    /// border is rendered with the same `options`.
     pub(crate) fn new(free: DeepImage, shot: &Shot, options: &RenderOptions) -> Self {
         let straight = free.undisplaced();
         let soft = defocus(straight.as_ref().unwrap_or(&free), shot, options);

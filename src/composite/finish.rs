@@ -19,15 +19,15 @@ const SHARPENING_SIGMA_PX: f32 = 1.0;
 /// Finishes a frame of deep samples over `plate`; scene-linear, premultiplied.
 /// [`PostProcess::default`] returns the same bits.
 ///
-/// Cards and shadows get the blur and the noise that a photograph of them would have: the visible plate already has its
-/// own, so a pixel far from cards and shadows keeps its bits. The camera's colour fringes, blur and noise, exposure,
-/// white balance and sharpening apply to the whole frame.
+/// Cards and shadows get the blur and the noise that a photograph of them would have: the visible
+/// plate already has its own, so a pixel far from cards and shadows keeps its bits. The camera's
+/// colour fringes, blur and noise, exposure, white balance and sharpening apply to the whole frame.
 ///
 /// # Method
-/// The light of the cards and the transmittance of cards and shadows are blurred, the plate is not. Noise is Gaussian
-/// (by the ziggurat of Marsaglia and Tsang, 2000), with variance `shot * value + read^2` minus what the visible plate
-/// contributes. It depends only on the seed, the pixel and the channel. Noise still to be matched
-/// ([`Noise::MatchPlate`]) counts as none.
+/// The light of the cards and the transmittance of cards and shadows are blurred, the plate is not.
+/// Noise is Gaussian (by the ziggurat of Marsaglia and Tsang, 2000), with variance `shot * value +
+/// read^2` minus what the visible plate contributes. It depends only on the seed, the pixel and the
+/// channel. Noise still to be matched ([`Noise::MatchPlate`]) counts as none.
 pub fn finish(
     frame: Image<PremulRgba>,
     deep: &DeepImage,

@@ -49,7 +49,8 @@ pub(super) fn over_nothing(film: Film) -> PremulRgba {
     Film { color, ..film }.to_rgba()
 }
 
-/// Light clamped at 0: refraction removes light from behind an object, and lens and shutter may bring less of it there.
+/// Light clamped at 0: refraction removes light from behind an object, and lens and shutter may
+/// bring less of it there.
 fn at_least_none(light: LinearRgb) -> LinearRgb {
     light.map(|v| if v < 0.0 { 0.0 } else { v })
 }

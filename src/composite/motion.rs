@@ -1,11 +1,12 @@
 //! Motion blur of what moves while the shutter is open.
 //!
 //! # Method
-//! A pixel is `light + through * plate`, where `through` is what objects and their shadows leave of the plate. Plate
-//! and camera stand still, so the mean over time is that of `light` and of `through` alone. Cards and shadows move
-//! together along the surface: what a pixel shows at another time is what was next to it on the surface, and both are
-//! averaged along that path. What is high above the surface would move a little farther in the picture. Cards and
-//! shadows beyond the border move into the picture, too: they are rendered as far as paths reach.
+//! A pixel is `light + through * plate`, where `through` is what objects and their shadows leave of
+//! the plate. Plate and camera stand still, so the mean over time is that of `light` and of
+//! `through` alone. Cards and shadows move together along the surface: what a pixel shows at
+//! another time is what was next to it on the surface, and both are averaged along that path. What
+//! is high above the surface would move a little farther in the picture. Cards and shadows beyond
+//! the border move into the picture, too: they are rendered as far as paths reach.
 
 use crate::camera::{Camera, RadialDistortion};
 use crate::deep::{DeepImage, HoldoutSample};
@@ -28,11 +29,11 @@ const MOST_BEYOND_PX: usize = 256;
 /// Pixels next to a position that a cubic curve reads.
 const CURVE_PX: f64 = 2.0;
 
-/// The mean effect of objects and their shadows on the plate while the shutter is open, behind the holdout, which does
-/// not move; none if nothing moves.
+/// The mean effect of objects and their shadows on the plate while the shutter is open, behind the
+/// holdout, which does not move; none if nothing moves.
 ///
-/// `free` are samples before the holdout is applied; what moves in from beyond the border is rendered with the same
-/// `options`.
+/// `free` are samples before the holdout is applied; what moves in from beyond the border is
+/// rendered with the same `options`.
 pub(super) fn moved(free: &DeepImage, shot: &Shot, options: &RenderOptions) -> Option<Image<Film>> {
     if shot.motion_m == [0.0; 2] {
         return None;

@@ -22,12 +22,13 @@ const MAX_SWEEPS: usize = 48;
 /// scene-linear.
 ///
 /// # Method
-/// The composite keeps the gradients of the object and takes the values of what is behind at its outline ([Pérez,
-/// Gangnet and Blake 2003]). It departs from that by a screening term ([Bhat et al. 2008]), so that the object keeps
-/// its own colours farther inside: a bottle does not take on the tray's. The correction `c` of a pixel solves `sum (c -
-/// c_q) + sum (s + c - b_q) + c / reach^2 = 0`, the first sum over neighbours of the same object, the second over those
-/// behind, where `b_q` is their value and `s` the object's; by Gauss-Seidel, alternately forwards and backwards, in the
-/// band where it is not 0.
+/// The composite keeps the gradients of the object and takes the values of what is behind at its
+/// outline ([Pérez, Gangnet and Blake 2003]). It departs from that by a screening term
+/// ([Bhat et al. 2008]), so that the object keeps its own colours farther inside: a bottle does not
+/// take on the tray's. The correction `c` of a pixel solves
+/// `sum (c - c_q) + sum (s + c - b_q) + c / reach^2 = 0`, the first sum over neighbours of the same
+/// object, the second over those behind, where `b_q` is their value and `s` the object's; by
+/// Gauss-Seidel, alternately forwards and backwards, in the band where it is not 0.
 ///
 /// [Pérez, Gangnet and Blake 2003]: https://doi.org/10.1145/882262.882269
 /// [Bhat et al. 2008]: https://doi.org/10.1007/978-3-540-88688-4_9

@@ -1,4 +1,5 @@
-//! A dataset of archives only: each holds a fixed span of numbers, and is present whole or not at all.
+//! A dataset of archives only: each holds a fixed span of numbers, and is present whole or not at
+//! all.
 //!
 //! The samples of an archive are generated in a hidden folder, as a dataset of their own, so a run
 //! that was interrupted in the middle of an archive resumes there. When all are finished, the

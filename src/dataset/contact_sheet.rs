@@ -89,7 +89,8 @@ fn contact_sheet(tiles: &[ContactTile], classes: &[String]) -> Image<Srgb8> {
 ///
 /// # Errors
 /// If the folder is no dataset or one of archives only, or was written without the
-/// [`Pictures`](crate::dataset::Pictures) or the [`Sidecar`](crate::dataset::Sidecar) that the sheet is made from.
+/// [`Pictures`](crate::dataset::Pictures) or the [`Sidecar`](crate::dataset::Sidecar) that the
+/// sheet is made from.
 pub fn contact_sheet_of(folder: &Path, most: usize) -> Result<Image<Srgb8>> {
     let identity = folder::identity_of_files(folder)?;
     let classes = folder::known_classes(&identity);

@@ -54,9 +54,9 @@ impl DatasetCounts {
         self.objects.saturating_sub(self.labelled)
     }
 
-    /// Objects that got no label, or under `ignore` one to be ignored, for a reason other than obstruction: too much of
-    /// them is outside the picture, or nothing of them is visible. If obstructed ones are labelled (`keep`, `class`),
-    /// they may be among them.
+    /// Objects that got no label, or under `ignore` one to be ignored, for a reason other than
+    /// obstruction: too much of them is outside the picture, or nothing of them is visible. If
+    /// obstructed ones are labelled (`keep`, `class`), they may be among them.
     pub fn left_out(&self) -> u64 {
         let accounted = match self.policy {
             Obstructed::Drop | Obstructed::Ignore => self.labelled + self.obstructed,

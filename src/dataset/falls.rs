@@ -70,8 +70,8 @@ impl Falls {
     }
 }
 
-/// Everything in a scene that decides how it falls, and the process: a fork has none of the threads that compute its
-/// parent's falls, and would wait for them forever.
+/// Everything in a scene that decides how it falls, and the process: a fork has none of the threads
+/// that compute its parent's falls, and would wait for them forever.
 fn what_falls(scene: &Scene, options: &SettleOptions) -> String {
     let mut scene = scene.clone().unlit();
     for object in &mut scene.objects {

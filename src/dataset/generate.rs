@@ -112,11 +112,11 @@ impl Plan {
 /// those of this run; [`Plan::store`] receives them as they are finished.
 ///
 /// # Errors
-/// [`Error::Interrupted`] after a stop; the first error of `make` or of a writer, in order of `k` among the samples in
-/// progress; a single sample outside the plan's; a folder that is a file, holds something else, was made from another
-/// plan (the message names the field), or is being written by another run; a full disk. In every case the folder stays
-/// valid, and the same call resumes it.
-/// case the folder stays valid, and the same call continues it.
+/// [`Error::Interrupted`] after a stop; the first error of `make` or of a writer, in order of `k`
+/// among the samples in progress; a single sample outside the plan's; a folder that is a file,
+/// holds something else, was made from another plan (the message names the field), or is being
+/// written by another run; a full disk. In every case the folder stays valid, and the same call
+/// resumes it.
 pub fn generate(
     plan: &Plan,
     make: impl Fn(u64) -> Result<Sample> + Sync,

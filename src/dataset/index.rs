@@ -153,8 +153,8 @@ impl DatasetIndex {
         }
     }
 
-    /// Everything that petcomp recorded about a picture; none for one from elsewhere. Objects with a label have the
-    /// label's class and, as `amodal_box`, the label's box.
+    /// Everything that petcomp recorded about a picture; none for one from elsewhere. Objects with
+    /// a label have the label's class and, as `amodal_box`, the label's box.
     ///
     /// # Errors
     /// A record that cannot be read.

@@ -114,7 +114,8 @@ impl Journal {
         Ok(self.lines.into_values().collect())
     }
 
-    /// Syncs the files of all samples. After a loss, lines stay in the order in which they were added.
+    /// Syncs the files of all samples. After a loss, lines stay in the order in which they were
+    /// added.
     fn sync(&mut self) -> Result<()> {
         if self.has_lost {
             let what = "the disk lost some of the last samples";

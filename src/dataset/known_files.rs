@@ -18,8 +18,8 @@ impl KnownFiles {
     /// Reads a picture and makes something of it. A file that `make` fails on is not recorded: it
     /// may be repaired.
     ///
+    /// # Errors
     /// As [`io::read`], and those of `make`; a file whose bytes differ from those recorded.
-    /// As [`io::read`], and those of `make`; other bytes than the file is known by.
     pub(crate) fn read<P: FromFile, T>(
         &self,
         path: &Path,

@@ -26,10 +26,10 @@ use std::path::{Path, PathBuf};
 /// | `object003.Z`, `amodal003.A` | its depth, and its coverage as if alone (`cards`) |
 ///
 /// Objects are called `object003_CLASS` in the Cryptomatte's list, distractors
-/// `object003_distractor`; what is too faint for a label is among them. Without film, `RGB = sum of
-/// object RGB + background * shadow * (1 - sum of object A)`: all but the picture is of the sharp
-/// objects at rest, before Poisson blending, blur, depth of field, a belt's exposure and finish;
-/// with those the sum does not give the picture.
+/// `object003_distractor`; what is too faint for a label is among them. Without film,
+/// `RGB = sum of object RGB + background * shadow * (1 - sum of object A)`: all but the picture is
+/// of the sharp objects at rest, before Poisson blending, blur, depth of field, a belt's exposure
+/// and finish; with those the sum does not give the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Layers {

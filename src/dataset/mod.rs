@@ -3,9 +3,10 @@
 //! A [`Pipeline`] opens what a recipe file ([`DatasetConfig`]) names and generates sample `k` from
 //! it: draws the scene, lets it settle, lights, renders and labels it.
 //!
-//! [`generate`] generates samples, many at a time, and hands each to [`Writer`]s: [`Pictures`] writes the images,
-//! [`Sidecar`] everything that was drawn, [`Yolo`], [`Coco`], [`Voc`], [`Mot`], [`WebDataset`] and [`Layers`] the
-//! labels. Sample `k` has the same files, to the byte, whatever the number of threads, and after any interruption:
+//! [`generate`] generates samples, many at a time, and hands each to [`Writer`]s: [`Pictures`]
+//! writes the images, [`Sidecar`] everything that was drawn, [`Yolo`], [`Coco`], [`Voc`], [`Mot`],
+//! [`WebDataset`] and [`Layers`] the labels. Sample `k` has the same files, to the byte, whatever
+//! the number of threads, and after any interruption:
 //!
 //! ```text
 //! data.yaml                      what trainers are given

@@ -15,9 +15,9 @@ use std::path::{Path, PathBuf};
 /// `seqinfo.ini`, and the pictures as `img1/NNNNNN.png` (links to those in `images/`, which take no
 /// space, if the disk supports links); joined from `mot_frames/{train,val}/NNNNNN.json`.
 ///
-/// A line of `gt.txt` is an object in a picture: picture, object, left, top, width, height, 1 (0 for objects to be
-/// ignored), class, visible share. Pictures, objects, pixels and classes are counted from 1; an object keeps its number
-/// throughout the sequence.
+/// A line of `gt.txt` is an object in a picture: picture, object, left, top, width, height, 1 (0
+/// for objects to be ignored), class, visible share. Pictures, objects, pixels and classes are
+/// counted from 1; an object keeps its number throughout the sequence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mot {

@@ -14,8 +14,8 @@ pub(crate) const OBSTRUCTED: &str = "obstructed";
 /// What happens to the labels of obstructed objects, those that are not
 /// [topmost](ObjectLabel::is_topmost).
 ///
-/// Objects that are [too truncated](ObjectLabel::is_too_truncated) have no label, obstructed or not; under `ignore`
-/// they are labelled as objects to be ignored.
+/// Objects that are [too truncated](ObjectLabel::is_too_truncated) have no label, obstructed or
+/// not; under `ignore` they are labelled as objects to be ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Obstructed {
@@ -139,8 +139,8 @@ impl Labelling {
     }
 }
 
-/// What the boxes of a dataset are around, as `LabelConfig::extent` for a recipe: those of YOLO, else of its first
-/// format with boxes.
+/// What the boxes of a dataset are around, as `LabelConfig::extent` for a recipe: those of YOLO,
+/// else of its first format with boxes.
 fn extent_of(identity: &Value) -> Extent {
     let writers = identity["writers"].as_array().into_iter().flatten();
     let formats = writers.filter_map(Value::as_object).flatten();

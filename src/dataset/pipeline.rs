@@ -437,11 +437,12 @@ impl Pipeline {
         label::label(&deep, &plain, &options)
     }
 
-    /// Labels a scene without rendering its picture: nothing is lit, and neither plate nor environment is read.
+    /// Labels a scene without rendering its picture: nothing is lit, and neither plate nor
+    /// environment is read.
     ///
-    /// The labels are those of [`take`](Self::take) except for rounding: without light, coverage is summed in another
-    /// order, so numbers (`visible_fraction`, `depth`) agree to 1e-6. Masks and boxes are the same unless a pixel is
-    /// that close to the threshold.
+    /// The labels are those of [`take`](Self::take) except for rounding: without light, coverage is
+    /// summed in another order, so numbers (`visible_fraction`, `depth`) agree to 1e-6. Masks and
+    /// boxes are the same unless a pixel is that close to the threshold.
     ///
     /// # Errors
     /// As [`take`](Self::take).

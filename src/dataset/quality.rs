@@ -65,8 +65,8 @@ impl Quality {
         config
     }
 
-    /// The recipe values that a quality replaces, if one is given, followed by those that are replaced by name, which
-    /// take precedence.
+    /// The recipe values that a quality replaces, if one is given, followed by those that are
+    /// replaced by name, which take precedence.
     pub fn overrides_at(
         quality: Option<Self>,
         named: impl IntoIterator<Item = Override>,

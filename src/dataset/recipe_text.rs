@@ -31,7 +31,6 @@ impl KeyEdit {
 /// as in [the template](crate::dataset::DatasetConfig::template), or the end of its table; a key
 /// that is reset becomes such a line again. `scene.lights[0]` set to `{}` is a new light with the
 /// default values.
-/// light with the default values.
 ///
 /// # Errors
 /// A text or value that is not TOML; a key that cannot exist.

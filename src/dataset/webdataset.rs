@@ -9,8 +9,9 @@ use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes `webdataset/{train,val}-NNNNNN.tar`, each with the files of a span of numbers: at the default of 500, number
-/// 2 holds the samples 1000 to 1499; those for training and those for validation are separate.
+/// Writes `webdataset/{train,val}-NNNNNN.tar`, each with the files of a span of numbers: at the
+/// default of 500, number 2 holds the samples 1000 to 1499; those for training and those for
+/// validation are separate.
 ///
 /// Files of a sample are named by its number: `000000012.png`, `000000012.json`; if two writers
 /// have one of the same kind, the later one's is named `000000012.FOLDER.json` after its folder.

@@ -253,8 +253,8 @@ fn list_of(images: &[PathBuf], folder: &Path) -> Result<String> {
     lines.collect()
 }
 
-/// Trainers replace `./` by the list's folder, older ones every `./` in a line, even that of `../`: so images elsewhere
-/// have an absolute path.
+/// Trainers replace `./` by the list's folder, older ones every `./` in a line, even that of `../`:
+/// so images elsewhere have an absolute path.
 fn list_line(image: &Path, folder: &Path) -> Result<String> {
     Ok(match image.strip_prefix(folder) {
         Ok(below) => format!("./{}\n", io::path_text(below)?),

@@ -63,7 +63,8 @@ impl DataYaml {
         Self::write_with(classes, &[], |part| format!("images/{part}"))
     }
 
-    /// The text of a `data.yaml` whose parts are at the paths that `place` returns, with these test paths.
+    /// The text of a `data.yaml` whose parts are at the paths that `place` returns, with these test
+    /// paths.
     pub(crate) fn write_with(
         classes: &[String],
         test: &[String],

@@ -80,8 +80,8 @@ pub struct Labels {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub distractors: Vec<Distractor>,
     /// Objects that the picture shows too faintly for a box, no pixel being above
-    /// [`alpha_threshold`](LabelOptions::alpha_threshold), with their class (none for a distractor), in order of id;
-    /// not written to files.
+    /// [`alpha_threshold`](LabelOptions::alpha_threshold), with their class (none for a
+    /// distractor), in order of id; not written to files.
     #[serde(skip)]
     pub faint: Vec<(ObjectId, Option<u32>)>,
 }
@@ -96,9 +96,10 @@ pub struct ObjectLabel {
     pub id: ObjectId,
     /// Index into the class list.
     pub class: u32,
-    /// Outline in the picture, pixels, according to [`LabelOptions::outline`]: one ring per part (a convex outline has
-    /// one after clipping), none for a card seen edge-on. The outline of a mask is simplified by up to 1 pixel; which
-    /// object covers which is decided by the mask itself, to the pixel.
+    /// Outline in the picture, pixels, according to [`LabelOptions::outline`]: one ring per part (a
+    /// convex outline has one after clipping), none for a card seen edge-on. The outline of a mask
+    /// is simplified by up to 1 pixel; which object covers which is decided by the mask itself, to
+    /// the pixel.
     pub outline_px: Vec<Vec<Point2<f64>>>,
     /// Box around the whole object.
     pub amodal_box: BBox,
@@ -119,8 +120,9 @@ pub struct ObjectLabel {
     /// with [`ObstructionRule::Overlap`], which does not need it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uncovered_fraction: Option<f64>,
-    /// With [`ObstructionRule::Visibility`], whether that share is too small. With [`ObstructionRule::Overlap`], true
-    /// if the holdout hides more than the rule's share of the object, otherwise none: `covered_by` decides.
+    /// With [`ObstructionRule::Visibility`], whether that share is too small. With
+    /// [`ObstructionRule::Overlap`], true if the holdout hides more than the rule's share of the
+    /// object, otherwise none: `covered_by` decides.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstructed: Option<bool>,
     /// How far it extends beyond the picture; none unless
@@ -154,11 +156,12 @@ pub struct LabelOptions {
     /// What is used as the outline of an object. Default: `hull`.
     #[serde(skip_serializing_if = "OutlineKind::is_hull")]
     pub outline: OutlineKind,
-    /// A pixel belongs to an object if more than this share of it is covered, 0 to less than 1; applies to masks, not
-    /// to sums of coverage. Default: 0.1, below which thin film and the noise of a matte look alike.
+    /// A pixel belongs to an object if more than this share of it is covered, 0 to less than 1;
+    /// applies to masks, not to sums of coverage. Default: 0.1, below which thin film and the noise
+    /// of a matte look alike.
     pub alpha_threshold: f32,
-    /// An object has no label if more than this share of its outline is outside the picture, 0 to
-    /// 1. Default: none: labelled however little of it is inside; truncation is then not measured.
+    /// An object has no label if more than this share (0 to 1) of its outline is outside the picture.
+    /// Default: none: labelled however little of it is inside; truncation is then not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_truncation: Option<f64>,
     /// When an object is obstructed. Default: when another covers it, with any overlap.

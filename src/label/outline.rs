@@ -21,12 +21,13 @@ use geo::{Area, BoundingRect, Coord, MapCoords, MultiPolygon, Polygon, Rect};
 /// rounding errors.
 const NEAR_PLANE_M: f64 = 1e-4;
 
-/// Parts of an outline smaller than this are rounding errors, square pixels: `i_overlay` snaps to a grid of 2^-30 of
-/// the extent, which along the sides of a picture of 32,768 pixels makes slivers of a hundredth of this.
+/// Parts of an outline smaller than this are rounding errors, square pixels: `i_overlay` snaps to a
+/// grid of 2^-30 of the extent, which along the sides of a picture of 32,768 pixels makes slivers
+/// of a hundredth of this.
 pub(crate) const SLIVER_AREA_PX2: f64 = 1e-2;
 
-/// Length of the sides that a lens bends, pixels: over this length, a line that k1 = 0.1 bends is straight to a
-/// hundredth of a pixel.
+/// Length of the sides that a lens bends, pixels: over this length, a line that k1 = 0.1 bends is
+/// straight to a hundredth of a pixel.
 const BENT_SIDE_PX: f64 = 8.0;
 /// Maximum number of pieces of a side, which may be arbitrarily long outside the picture.
 const MAX_PIECES: f64 = 4096.0;
@@ -327,7 +328,8 @@ mod tests {
                 prop_assert_eq!(holds(&found, p), is_inside, "{:?}", p);
                 count += f64::from(u8::from(is_inside));
             }
-            // A raster of one point per pixel is off by less than half a pixel for each pixel of border.
+            // A raster of one point per pixel is off by less than half a pixel for each pixel of
+            // border.
             let border = 2.0 * SIDE * corners.len() as f64;
             prop_assert!((found.unsigned_area() - count).abs() <= 0.5 * border);
             // All of it is in the picture.

@@ -1,11 +1,12 @@
 //! Which object covers which.
 //!
 //! # Method
-//! The topmost rule of "Synthetic Data Generation for Visual Detection of Flattened PET Bottles": outlines that overlap
-//! are a pair, the one nearer the camera covers the other, and an object that nothing covers is unobstructed. The paper
-//! compares one altitude per object; here a pair is compared *over its overlap*, which is right for tilted cards too.
-//! The inverse depth of a plane is an affine function of the pixel position, so its mean over the overlap is its value
-//! at the overlap's centroid: one comparison, exact, whatever the shape.
+//! The topmost rule of "Synthetic Data Generation for Visual Detection of Flattened PET Bottles":
+//! outlines that overlap are a pair, the one nearer the camera covers the other, and an object that
+//! nothing covers is unobstructed. The paper compares one altitude per object; here a pair is
+//! compared *over its overlap*, which is right for tilted cards too. The inverse depth of a plane
+//! is an affine function of the pixel position, so its mean over the overlap is its value at the
+//! overlap's centroid: one comparison, exact, whatever the shape.
 
 use crate::camera::Camera;
 use crate::geom::Point2;

@@ -22,7 +22,6 @@ const STEPS: [[i64; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
 /// Corners that the tolerance makes unnecessary are dropped: no point of the border is then farther
 /// than `tolerance_px` from the polygons, and no side crosses another. 0 keeps all corners; parts
 /// and holes are kept at any tolerance.
-/// holes are kept at any tolerance.
 pub fn polygons(mask: &RleMask, tolerance_px: f64) -> Vec<Vec<Point2<f64>>> {
     as_polygons(simplified(Grid::new(mask).rings(), tolerance_px))
 }

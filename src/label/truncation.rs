@@ -1,9 +1,10 @@
 //! How far an object extends beyond the picture.
 //!
 //! # Method
-//! Truncation as defined by KITTI ("refers to the object leaving image boundaries", 0 to 1), by area: the share of the
-//! outline, as the camera sees it, that is beyond the picture's edges. Samples end at the edges, outlines do not. What
-//! a barrel lens cannot show is outside, at the scale of its fold.
+//! Truncation as defined by KITTI ("refers to the object leaving image boundaries", 0 to 1), by
+//! area: the share of the outline, as the camera sees it, that is beyond the picture's edges.
+//! Samples end at the edges, outlines do not. What a barrel lens cannot show is outside, at the
+//! scale of its fold.
 
 use crate::geom::BBox;
 use crate::label::outline::{self, SLIVER_AREA_PX2};

@@ -79,8 +79,8 @@ fn cluster_sizes(boxes: &[[f64; 2]], mut sizes: Vec<[f64; 2]>) -> Vec<[f64; 2]> 
     sizes
 }
 
-/// Starting points far from each other: each drawn with a probability in proportion to the square of
-/// its distance to the previous ones.
+/// Starting points far from each other: each drawn with a probability in proportion to the square
+/// of its distance to the previous ones.
 fn spread_sizes(boxes: &[[f64; 2]], count: usize, rng: &mut ChaCha8Rng) -> Vec<[f64; 2]> {
     let mut sizes = vec![boxes[(uniform_share(rng) * boxes.len() as f64) as usize]];
     while sizes.len() < count {

@@ -408,7 +408,8 @@ fn describe_size(record: &PhotoRecord) -> String {
 }
 
 impl AddPhotoArgs {
-    /// Clap does not enforce `requires` for options of a mutually exclusive group if another one of it is given.
+    /// Clap does not enforce `requires` for options of a mutually exclusive group if another one of
+    /// it is given.
     fn check_companions(&self) -> petcomp::Result<()> {
         let (scale, capture) = (&self.scale, &self.capture);
         let (corners, screen) = (self.screen_corners.is_some(), scale.screen_size.is_some());

@@ -100,7 +100,8 @@ impl SceneArgs {
         Ok(pipeline)
     }
 
-    /// The recipe's config or, without a recipe, the one contained in the scene; at the given quality, if any.
+    /// The recipe's config or, without a recipe, the one contained in the scene; at the given
+    /// quality, if any.
     fn config_for(&self, scene: &Scene, quality: Option<Quality>) -> Result<DatasetConfig> {
         let overrides = Quality::overrides_at(quality, self.overrides.iter().cloned());
         match &self.recipe {

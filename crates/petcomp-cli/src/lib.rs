@@ -1,5 +1,5 @@
-//! The `petcomp` program: reads arguments, calls the library, writes results. It is a library so that the Python
-//! package can include the program.
+//! The `petcomp` program: reads arguments, calls the library, writes results. It is a library so
+//! that the Python package can include the program.
 // Printing, without a panic if the output is closed, is in print.rs.
 #![warn(clippy::unwrap_used, clippy::print_stderr, clippy::print_stdout)]
 

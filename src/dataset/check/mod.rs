@@ -257,8 +257,8 @@ impl Checker<'_> {
         found.map(|path| io::relative(path, self.folder)).collect()
     }
 
-    /// Images with the same bytes as an earlier one, which is a training image if any of them is; images of an empty
-    /// scene may be identical.
+    /// Images with the same bytes as an earlier one, which is a training image if any of them is;
+    /// images of an empty scene may be identical.
     fn find_duplicates(&mut self, images: &[CheckedImage]) {
         let mut known: BTreeMap<(u64, u32), &CheckedImage> = BTreeMap::new();
         for image in images {

@@ -202,7 +202,8 @@ fn maximised(odds: &LabelOdds, times: &[f64], weights: &[f64]) -> Vec<f64> {
     explained
 }
 
-/// Weights averaged with their neighbours, except that of no objects; what would go beyond the ends stays.
+/// Weights averaged with their neighbours, except that of no objects; what would go beyond the ends
+/// stays.
 fn smoothed(weights: &[f64]) -> Vec<f64> {
     let last = weights.len() - 1;
     let at = |i: usize| weights[i.clamp(1, last)];

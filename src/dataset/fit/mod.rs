@@ -1,12 +1,14 @@
 //! Fits a recipe to the real place: by a few labelled pictures of it, or by its plates alone.
 //!
-//! Obstructed objects have no label, so the number of labels is not the number of objects. Therefore objects of the
-//! recipe fall and are labelled, without pixels, for several numbers of objects and several ways to start; the weights
-//! of those numbers are those that explain the real labels best (`counts`), and the spread is that whose labels lie as
-//! the real ones do (`starts`). Ranges of camera and light are fitted by the mean and the variance of what they add to
-//! measures (`knobs`), taken around the labels in the same way for pictures of the recipe and real ones. What the
-//! pictures do not decide, by a bootstrap over them and over the recipe's own, is left unchanged. Of a sequence on a
-//! belt one picture is used, and the recipe's own are made without a belt (`sequences`).
+//! Obstructed objects have no label, so the number of labels is not the number of objects.
+//! Therefore objects of the recipe fall and are labelled, without pixels, for several numbers of
+//! objects and several ways to start; the weights of those numbers are those that explain the real
+//! labels best (`counts`), and the spread is that whose labels lie as the real ones do (`starts`).
+//! Ranges of camera and light are fitted by the mean and the variance of what they add to measures
+//! (`knobs`), taken around the labels in the same way for pictures of the recipe and real ones.
+//! What the pictures do not decide, by a bootstrap over them and over the recipe's own, is left
+//! unchanged. Of a sequence on a belt one picture is used, and the recipe's own are made without a
+//! belt (`sequences`).
 
 mod camera;
 mod counts;

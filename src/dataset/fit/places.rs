@@ -1,4 +1,5 @@
-//! Where objects of a recipe come to rest, how many there are and how large they look: fitted to labels by falls.
+//! Where objects of a recipe come to rest, how many there are and how large they look: fitted to
+//! labels by falls.
 
 use super::counts::{self, LabelOdds, label_histogram, redrawn_histogram};
 use super::falls::{Fall, FallPlan, log_size};
@@ -22,14 +23,16 @@ pub(super) const OBJECT_COUNTS: [usize; 17] = [
 const MIN_SATURATED: usize = 8;
 const SATURATED_RATIO: f64 = 1.05;
 const MAX_FLAT: usize = 2;
-/// By chance a share of pictures is farther from its expectation, in standard deviations, in 2.5 % of cases.
+/// By chance a share of pictures is farther than this from its expectation, in standard deviations,
+/// in 2.5 % of cases.
 const CHANCE_SIGMAS: f64 = 2.24;
 /// How many times as many falls are made once it is known how objects fall.
 pub(super) const MORE_FALLS: u64 = 4;
 
 impl Fitting<'_> {
-    /// Fits scale, spread, friction, scale again (objects in a heap look another size) and number of objects (whose
-    /// share of 0 is that of negatives), in this order, and returns the weights of the numbers.
+    /// Fits scale, spread, friction, scale again (objects in a heap look another size) and number
+    /// of objects (whose share of 0 is that of negatives), in this order, and returns the weights
+    /// of the numbers.
     pub(super) fn fit_places(&mut self, real: &MeasuredSet) -> Result<Vec<f64>> {
         let boxes = real.boxes();
         let counts: Vec<usize> = boxes.iter().map(Vec::len).collect();
@@ -312,8 +315,8 @@ impl EmptyShare {
         }
     }
 
-    /// Whether a recipe's share differs significantly: by a bootstrap, and by the random variation of that share, since
-    /// all rounds agree if no picture is empty.
+    /// Whether a recipe's share differs significantly: by a bootstrap, and by the random variation
+    /// of that share, since all rounds agree if no picture is empty.
     fn is_decided_against(&self, before: f64) -> bool {
         let rounds = self.rounds.iter().map(|share| share - before);
         let sigma = (before * (1.0 - before) / self.pictures as f64).sqrt();

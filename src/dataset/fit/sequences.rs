@@ -5,8 +5,8 @@ use crate::dataset::page::labelled_pictures::{LabelledPicture, LabelledSet};
 use crate::scene::BeltRanges;
 use rayon::prelude::*;
 
-/// The picture in the middle of each sequence, where objects are as they came to rest; if any have a label file, the
-/// middle one of those.
+/// The picture in the middle of each sequence, where objects are as they came to rest; if any have
+/// a label file, the middle one of those.
 pub(super) fn one_of_each(set: &LabelledSet, belt: &BeltRanges) -> LabelledSet {
     let pictures = set.pictures.par_iter().enumerate();
     let placed = pictures.map(|(k, picture)| (sequence_of(picture, k as u64, belt), picture));

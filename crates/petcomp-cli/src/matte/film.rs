@@ -140,8 +140,8 @@ impl TriangulateArgs {
 }
 
 impl FilmOptionArgs {
-    /// Checks that the output is an EXR, since no other format holds the channels of film, that plates are given for
-    /// all photos or none, and that no input is overwritten.
+    /// Checks that the output is an EXR, since no other format holds the channels of film, that
+    /// plates are given for all photos or none, and that no input is overwritten.
     fn check(&self, photos: &[PathBuf]) -> Result<()> {
         anyhow::ensure!(
             is_exr(&self.output),
