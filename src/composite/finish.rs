@@ -25,9 +25,9 @@ const SHARPENING_SIGMA_PX: f32 = 1.0;
 ///
 /// # Method
 /// The light of the cards and the transmittance of cards and shadows are blurred, the plate is not.
-/// Noise is Gaussian (by the ziggurat of Marsaglia and Tsang, 2000), with variance `shot * value +
-/// read^2` minus what the visible plate contributes. It depends only on the seed, the pixel and the
-/// channel. Noise still to be matched ([`Noise::MatchPlate`]) counts as none.
+/// Noise is Gaussian (by the ziggurat of Marsaglia and Tsang, 2000), with variance
+/// `shot * value + read^2` minus what the visible plate contributes. It depends only on the seed,
+/// the pixel and the channel. Noise still to be matched ([`Noise::MatchPlate`]) counts as none.
 pub fn finish(
     frame: Image<PremulRgba>,
     deep: &DeepImage,

@@ -82,8 +82,8 @@ impl Pipeline {
     }
 
     /// As [`open`](Self::open), for pictures that may be smaller than the recipe's own of `whole`
-    /// pixels: only in those must objects be large enough. Paths, including those in messages, stay
-    /// as the config has them: the working folder must not change.
+    /// pixels: objects must be large enough only at that size. Paths, including those in messages,
+    /// stay as the config has them: the working folder must not change.
     ///
     /// # Errors
     /// As [`open`](Self::open).

@@ -234,7 +234,7 @@ impl Summary {
         self.rejected.extend(rejected);
     }
 
-    /// Whether a sample does not share its draws with an earlier one, as pictures of a sequence do.
+    /// Whether a sample has draws of its own: pictures of a sequence share those of the first one.
     fn is_drawn_anew(&self, sample: &ReadSample) -> bool {
         let belt = sample.record.drawn.belt;
         let frames = belt.map_or(1, |belt| belt.frames.max(1));

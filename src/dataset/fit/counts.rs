@@ -286,7 +286,7 @@ pub(super) fn count_of(weights: &[f64]) -> Count {
     }
 }
 
-/// The deciles 1, 5 and 9 of the number of objects.
+/// First, fifth and ninth decile of the number of objects.
 pub(super) fn deciles(weights: &[f64]) -> [usize; 3] {
     [0.1, 0.5, 0.9].map(|share| {
         let mut sum = 0.0;

@@ -10,7 +10,7 @@ use crate::plot::Table;
 use crate::quantile;
 use crate::scene::{Blur, Noise, Range};
 
-/// Fewer photos do not give a spread.
+/// With fewer photos there is no spread.
 const MIN_PLATES: usize = 3;
 /// Noise (codes of 8 bits) and blur (pixels) below which objects need none.
 const LEAST_NOISE: f64 = 0.3;

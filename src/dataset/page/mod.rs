@@ -20,8 +20,8 @@ use std::path::{Path, PathBuf};
 /// Options of the page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DatasetReportOptions {
-    /// Maximum number of pictures on the page itself: outliers, then others evenly spread. Default:
-    /// 32.
+    /// Maximum number of pictures on the page itself: outliers, then others evenly spread.
+    /// Default: 32.
     pub most: usize,
     /// Folder that the page will be written into, for links to the pictures; by default the
     /// dataset's.
