@@ -6,24 +6,24 @@ use crate::scene::bounds::{BELT_SPEED, EXPOSURE_TIME, FRAME_RATE, FRAMES, TURN, 
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 
-/// What the belt of a recipe is drawn from: pictures `n frames` to `n frames + frames - 1` are
-/// sequence `n`, whose objects fall once and are carried on from picture to picture. In the middle
-/// of the sequence they are where they came to rest.
+/// Ranges of a recipe's belt: pictures `n frames` to `n frames + frames - 1` are sequence `n`,
+/// whose objects fall once and are then carried along from picture to picture. In the middle of the
+/// sequence they are where they came to rest.
 ///
-/// Plate and camera stand still: a belt whose pattern would show it is to be photographed running.
+/// Plate and camera do not move: photograph a belt with a visible pattern while it is running.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeltRanges {
-    /// Pictures of a sequence.
+    /// Pictures per sequence.
     pub frames: u64,
-    /// Pictures in a second.
+    /// Pictures per second.
     pub frame_rate: f64,
-    /// Metres in a second.
+    /// Metres per second.
     pub speed: Range,
-    /// Where it runs to, degrees from the surface's width towards its height. Default: 0.
+    /// Direction of motion, degrees from the surface's width towards its height. Default: 0.
     #[serde(default)]
     pub direction_deg: Range,
-    /// Time that the shutter is open, seconds: objects are blurred along the belt. Default: 0.
+    /// Exposure time, seconds: objects are blurred along the belt. Default: 0.
     #[serde(default)]
     pub exposure_s: Range,
 }
@@ -36,9 +36,9 @@ pub struct Belt {
     pub sequence: u64,
     /// Number of the picture in the sequence, from 0.
     pub frame: u64,
-    /// Pictures of the sequence.
+    /// Pictures in the sequence.
     pub frames: u64,
-    /// Pictures in a second.
+    /// Pictures per second.
     pub frame_rate: f64,
     /// How far the objects are from where they came to rest, along x and y, metres.
     pub offset_m: [f64; 2],
@@ -61,14 +61,14 @@ impl Belt {
     }
 }
 
-/// Which picture of a dataset, and where in its sequence.
+/// A picture's place in its sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct SequencePlace {
     /// Number of the sequence.
     pub(crate) sequence: u64,
     /// Number of the sequence's first picture.
     pub(crate) first: u64,
-    /// Number in the sequence.
+    /// Number of the picture in the sequence.
     pub(crate) frame: u64,
 }
 
@@ -84,7 +84,7 @@ impl BeltRanges {
         }
     }
 
-    /// The belt at a picture; `draws` are those of its sequence.
+    /// The belt at one picture; `draws` are those of its sequence.
     pub(super) fn draw(&self, draws: &Draws, place: SequencePlace) -> Belt {
         let angle = self.direction_deg.draw(draws, "belt.direction_deg");
         let speed = self.speed.draw(draws, "belt.speed");

@@ -9,17 +9,17 @@ use serde::{Deserialize, Serialize};
 
 /// Most that an outline turns between two of its points, radians.
 const OUTLINE_STEP: f64 = 0.02;
-/// Least height of the eye over a card, as a share of the card's reach, from which it is seen as a
-/// curved one. From lower down it is almost edge-on, and a bend of 60 degrees reaches halfway up.
+/// Lowest eye, as a share of the card's reach, that sees a card as curved. From lower down the card
+/// is almost edge-on, and a bend of 60 degrees reaches halfway up to the eye.
 const LEAST_EYE_HEIGHT_RATIO: f64 = 0.5;
 
-/// How a card is curved: a part of a cylinder whose axis is parallel to the card. A card that the
-/// camera sees almost edge-on is flat in the picture and in its outline.
+/// Curvature of a card: part of a cylinder whose axis is parallel to the card. A card that the
+/// camera sees almost edge-on is treated as flat in the picture and in its outline.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Bend {
-    /// Degrees that the card turns by from one end to the other; above 0 the ends are on the side
-    /// that its front looks to. Default: 0.
+    /// Degrees between the tangents at the two ends; positive if the ends are on the side that the
+    /// front faces. Default: 0.
     pub deg: f64,
     /// Direction of the axis in the card, degrees from its width towards its upper side. Default:
     /// 0.
@@ -38,7 +38,7 @@ impl Bend {
         TURN.check(&field(at, "axis_deg"), self.axis_deg)
     }
 
-    /// The cylinder of a card of this size; none for a flat one.
+    /// The cylinder of a card of this size; none if it is flat.
     fn cylinder(&self, [w, h]: [f64; 2]) -> Option<Cylinder> {
         if self.is_flat() {
             return None;
@@ -57,7 +57,7 @@ impl Bend {
     }
 }
 
-/// A curved card in the frame of the flat one: x right, y up, z towards whoever looks at its front.
+/// A curved card in the frame of the flat one: x right, y up, z towards a viewer of its front.
 ///
 /// Its mean height over the flat card is 0, and its middle line keeps its place.
 #[derive(Clone, Copy, Debug)]
@@ -66,19 +66,19 @@ pub(crate) struct Cylinder {
     along: Vector2<f64>,
     /// From the middle to either end, along the card, metres.
     pub(crate) reach: f64,
-    /// Radians in a metre.
+    /// Radians per metre.
     curvature: f64,
-    /// What the middle line is below the mean.
+    /// Mean height of the arc over its middle line.
     mean_height: f64,
 }
 
 impl Cylinder {
-    /// How far along the bend a point of the flat card is, from the middle, metres.
+    /// Position of a point of the flat card along the bend, metres from the middle.
     pub(crate) fn arc_of(&self, p: &Point2<f64>) -> f64 {
         self.along.dot(&p.coords)
     }
 
-    /// Where a point of the flat card comes to lie.
+    /// Where the bend moves a point of the flat card to.
     pub(crate) fn point(&self, p: &Point2<f64>) -> Point3<f64> {
         let arc = self.arc_of(p);
         let across = p.coords - self.along * arc;
@@ -96,18 +96,18 @@ impl Cylinder {
         (self.along * -libm::sin(turn)).push(libm::cos(turn))
     }
 
-    /// The point of the flat card's plane on the ray of an eye to a place.
+    /// Where the ray from an eye through a point meets the flat card's plane.
     pub(crate) fn on_plane(&self, eye: &Point3<f64>, place: &Point3<f64>) -> Point2<f64> {
         (eye + (place - eye) * (eye.z / (eye.z - place.z))).xy()
     }
 
-    /// The point of the flat card that an eye sees where it sees `p` of the flat card's plane; not
-    /// finite where it sees past the cylinder.
+    /// The point of the card, in flat coordinates, that an eye sees at `p` of the flat card's
+    /// plane; not finite where the ray misses the cylinder.
     ///
     /// # Method
-    /// The ray meets the circle of the bend at the roots of a quadratic equation. What is seen is the
-    /// one that goes to `p` as the bend goes to nothing: the far side of a trough, the near one of a
-    /// ridge.
+    /// The ray meets the circle of the bend at the roots of a quadratic equation. The visible point
+    /// is the root that tends to `p` as the bend tends to zero: the far side of a trough, the near
+    /// one of a ridge.
     pub(crate) fn seen_point(&self, eye: &Point3<f64>, p: &Point2<f64>) -> Point2<f64> {
         let start = self.arc_of(p);
         let step = self.arc_of(&eye.xy()) - start;
@@ -122,14 +122,14 @@ impl Cylinder {
         met + self.along * (self.arc_at(&met, share * eye.z) - self.arc_of(&met))
     }
 
-    /// How far along the bend a place of the cylinder is.
+    /// Position along the bend of a point of the cylinder.
     fn arc_at(&self, place: &Point2<f64>, height: f64) -> f64 {
         let sine = self.curvature * self.arc_of(place);
         let cosine = 1.0 - self.curvature * (height + self.mean_height);
         libm::atan2(sine, cosine) / self.curvature
     }
 
-    /// The way from one point of the flat card towards another, without the last one.
+    /// Points from one point of the flat card towards another, without the last one.
     fn edge(self, a: Point2<f64>, b: Point2<f64>) -> impl Iterator<Item = Point3<f64>> {
         let turn = self.curvature * (self.arc_of(&b) - self.arc_of(&a));
         let count = (turn.abs() / OUTLINE_STEP).ceil().max(1.0) as usize;
@@ -146,8 +146,8 @@ impl Card {
         }
     }
 
-    /// Its cylinder as an eye sees it; none of a flat card, and of one that it sees from so low down
-    /// that it takes it for flat.
+    /// Its cylinder as an eye sees it; none for a flat card and for one seen at such a low angle
+    /// that it is treated as flat.
     pub(crate) fn cylinder_seen_from(&self, eye: &Point3<f64>) -> Option<Cylinder> {
         let height = self.quad.world_from_card.inverse_transform_point(eye).z;
         let cylinder = self.bend.cylinder(self.quad.size)?;
@@ -159,8 +159,8 @@ impl Card {
         Point2::new((u - 0.5) * w, (0.5 - v) * h)
     }
 
-    /// Its outline in space as an eye sees it, in order; that of a curved card has points between
-    /// the corners.
+    /// Its outline in space as an eye sees it, in order; a curved card has points between the
+    /// corners.
     pub(crate) fn outline(&self, eye: &Point3<f64>) -> Vec<Point3<f64>> {
         let corners = self.outline_uv.iter();
         let Some(cylinder) = self.cylinder_seen_from(eye) else {

@@ -1,20 +1,20 @@
-//! The bounds of numbers in recipes and scenes, with the reasons: all in one place.
+//! Bounds of the numbers in recipes and scenes, with the reasons: all in one place.
 //!
-//! The bounds of a recipe are those of photographs of things; a scene may come from any program and
-//! is only held to what the arithmetic of the stages bears.
+//! The bounds of a recipe are those of real photographs; a scene may come from any program and is
+//! only bounded by what the arithmetic of the stages can handle.
 
 use crate::bounds::Bounds;
 
-/// Most objects in one scene: heaps of some hundreds are what comes to rest.
+/// Maximum number of objects in a scene: heaps of some hundreds still come to rest.
 pub(crate) const MAX_OBJECTS: usize = 1_000;
-/// Most lights in one scene: each asks every card for its shadow.
+/// Maximum number of lights in a scene: each needs a shadow from every card.
 pub(crate) const MAX_LIGHTS: usize = 64;
 
 pub(super) const SHARE: Bounds = Bounds::new(0.0, 1.0, "a share");
 pub(super) const SCALE: Bounds = Bounds::new(0.01, 100.0, "a factor on objects of 5 mm to 5 m");
 pub(super) const EV: Bounds = Bounds::new(-32.0, 32.0, "the range of 32-bit pictures");
-/// The exposure of a scene, which is solved from light of any brightness: more than what people
-/// type.
+/// Exposure of a scene, which is solved from light of any brightness: a wider range than for typed
+/// values.
 pub(super) const SOLVED_EV: Bounds = Bounds::new(-100.0, 100.0, "the range of single precision");
 pub(super) const TURN: Bounds = Bounds::new(-3600.0, 3600.0, "degrees; a turn is 360");
 pub(super) const TILT: Bounds = Bounds::new(-180.0, 180.0, "degrees");
@@ -23,8 +23,8 @@ pub(super) const SHIFT: Bounds = Bounds::new(-1.0, 1.0, "the photo's edges");
 pub(super) const GAP: Bounds = Bounds::metres(1e-6, 1.0, "objects are stacked before they fall");
 pub(super) const GRADE: Bounds = Bounds::new(0.0, 100.0, "a factor");
 pub(super) const WEIGHT: Bounds = Bounds::new(0.0, 1e6, "likelihood relative to the others");
-/// Degrees that a card turns from one end to the other. Beyond 60 it hides parts of itself from a
-/// camera that looks down on it by 45 degrees, and its body would no longer fall as a flat one.
+/// Degrees between the ends of a card. Beyond 60 it hides parts of itself from a camera that looks
+/// down at 45 degrees, and its body would no longer fall like a flat one.
 pub(super) const BEND: Bounds = Bounds::new(-60.0, 60.0, "degrees from end to end");
 pub(super) const LIGHT_HEIGHT: Bounds =
     Bounds::metres(0.001, 1000.0, "a light farther away is a sun");
@@ -32,10 +32,10 @@ pub(super) const LIGHT_OFFSET: Bounds =
     Bounds::metres(0.0, 1000.0, "a light farther away is a sun");
 pub(super) const LIGHT_SIZE: Bounds = Bounds::metres(1e-4, 1000.0, "from a point to a sky");
 pub(super) const RADIANCE: Bounds = Bounds::new(0.0, 1e9, "what single precision can sum");
-/// Temperatures that [`planckian`](crate::color::planckian) knows.
+/// Temperatures supported by [`planckian`](crate::color::planckian).
 pub(super) const KELVIN: Bounds =
     Bounds::new(1667.0, 25_000.0, "kelvin, from a candle to a blue sky");
-/// Whites of a camera: below, the light has hardly any blue that a gain could bring back.
+/// White points of a camera: below, the light has hardly any blue for a gain to bring back.
 pub(super) const WHITE: Bounds =
     Bounds::new(2000.0, 25_000.0, "kelvin, from a sunset to a blue sky");
 pub(super) const GAIN: Bounds = Bounds::new(1e-6, 1e6, "a factor");
@@ -78,7 +78,7 @@ pub(super) const NOISE: Bounds = Bounds::new(0.0, 1e3, "scene-linear; 1 is white
 
 /// Time step of a fall, seconds. Of 150 heaps of 5 to 30 cards, 81 failed at 1/120 s (cards that
 /// had passed through each other, 23 mm deep), and none overlapped by more than 0.3 mm at 1/240 s;
-/// at 1/10000 s nothing changes any more that a picture shows.
+/// at 1/10000 s nothing visible changes any more.
 pub(super) const STEP: Bounds = Bounds::new(
     1e-4,
     0.0042,
@@ -95,11 +95,11 @@ pub(super) const OVERLAP: Bounds = Bounds::new(1e-6, 1.0, "a share of the longer
 pub(super) const ENERGY: Bounds = Bounds::new(1e-6, 1e3, "a share of the drop's");
 pub(super) const GRAVITY: Bounds = Bounds::new(0.01, 1e4, "m/s^2; the Earth's is 9.81");
 
-/// Lengths in a scene, metres: what the stages' arithmetic bears, from dust to a town.
+/// Lengths in a scene, metres: what the stages' arithmetic can handle, from dust to a town.
 pub(super) const LENGTH: Bounds = Bounds::new(1e-9, 1e6, "metres");
-/// Places in a scene, metres.
+/// Positions in a scene, metres.
 pub(super) const PLACE: Bounds = Bounds::new(-1e6, 1e6, "metres");
-/// Places and focal lengths in a picture, pixels.
+/// Positions and focal lengths in a picture, pixels.
 pub(super) const PIXEL: Bounds = Bounds::new(-1e9, 1e9, "pixels");
 /// Sides of a photo, pixels.
 pub(super) const PHOTO_SIDE: Bounds = Bounds::new(1.0, 1e6, "pixels");

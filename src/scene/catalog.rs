@@ -8,17 +8,16 @@ use crate::scene::hull::prism_outline;
 use crate::scene::{Appearance, CameraSource, Object, Wall};
 use std::sync::Arc;
 
-/// An asset as a recipe sees it: what may be chosen, without its pictures.
+/// An asset as a recipe sees it, without its pictures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AssetVariant {
     /// Name of the asset.
     pub asset: String,
-    /// Which part of the catalog it belongs to: objects or distractors.
+    /// Whether it is drawn as an object or as a distractor.
     pub role: Role,
     /// Width and height of the card of each of its photos, metres; at least one.
     pub photo_sizes: Vec<[f64; 2]>,
-    /// Corners of the object's hull in each photo, as in [`Object::outline`]; empty where they are
-    /// not known.
+    /// Corners of the object's hull in each photo, as in [`Object::outline`]; empty if unknown.
     pub photo_outlines: Vec<Vec<[f64; 2]>>,
     /// Thickness, metres.
     pub thickness: f64,
@@ -33,15 +32,15 @@ pub struct Background {
     pub name: String,
     /// Width and height of the labelled rectangle, metres.
     pub size: [f64; 2],
-    /// The camera that took it, or what that can be found from.
+    /// The camera that took it, or what it can be solved from.
     pub camera: CameraSource,
-    /// OpenCV's first coefficient of that camera's radial distortion; 0 where it has none.
+    /// OpenCV's first coefficient of that camera's radial distortion; 0 for none.
     pub k1: f64,
-    /// Longer side of the part of the photo that pictures show, over that of the photo.
+    /// Longer side of the part of the photo that pictures show, as a share of the photo's.
     pub shown_share: f64,
-    /// Share of the light that its surface reflects, where that is known.
+    /// Share of the light that its surface reflects, if known.
     pub albedo: Option<Albedo>,
-    /// The walls on the edges of that rectangle, where there are any.
+    /// The walls on the edges of that rectangle, if any.
     pub wall: Option<Wall>,
 }
 
@@ -66,7 +65,7 @@ fn collider_outline(photo: &Photo) -> Vec<[f64; 2]> {
 }
 
 impl Appearance {
-    /// What an object looks like by a library; none where it lacks the asset or the photo.
+    /// Appearance of an object, from a library; none if the library lacks the asset or the photo.
     ///
     /// # Errors
     /// Those of [`Photo::pixels`].

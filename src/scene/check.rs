@@ -1,4 +1,4 @@
-//! Is a scene possible? Checked once, before any work.
+//! Validation of a scene, once, before any work.
 
 use crate::bounds::{ALBEDO, Bounds, LONGEST_SIDE_PX, MASS, MOST_PIXELS};
 use crate::camera::Camera;
@@ -17,16 +17,16 @@ use crate::scene::{
 };
 use std::fmt::{Debug, Display};
 
-/// How far the norm of a quaternion may be from 1: what six written decimals leave.
+/// Tolerance for the norm of a quaternion, as left by six written decimals.
 const UNIT_TOLERANCE: f64 = 1e-5;
-/// How far a corner may be outside its card, as a share of the card: the same decimals.
+/// How far a corner may be outside its card, as a share of the card: from the same rounding.
 const OUTLINE_TOLERANCE: f64 = 1e-5;
-/// Most corners of an outline: contacts are sought between all of them.
+/// Maximum number of corners of an outline: contacts are searched between all of them.
 const MAX_OUTLINE_CORNERS: usize = 256;
 
 impl Scene {
-    /// Fails on the first impossible value, by its path: `objects[3].size: [0.0, 0.1], expected
-    /// within 1e-9 to 1000000 (metres)`.
+    /// Fails on the first invalid value, named by its path:
+    /// `objects[3].size: [0.0, 0.1], expected within 1e-9 to 1000000 (metres)`.
     pub fn check(&self) -> Result<()> {
         self.check_view()?;
         self.check_objects()?;
@@ -90,7 +90,7 @@ pub(super) fn check_each<T>(
         .try_for_each(|(i, item)| check(item, &format!("{name}[{i}]")))
 }
 
-/// All of some numbers within bounds.
+/// Checks that all numbers are within bounds.
 fn check_within(numbers: &[f64], at: &str, bounds: &Bounds) -> Result<()> {
     expect(
         numbers.iter().all(|&x| bounds.contains(x)),
@@ -100,7 +100,7 @@ fn check_within(numbers: &[f64], at: &str, bounds: &Bounds) -> Result<()> {
     )
 }
 
-/// A picture that can be held in memory.
+/// Checks that a picture of this size can be held in memory.
 pub(super) fn check_image(image: [u32; 2]) -> Result<()> {
     let [w, h] = image;
     expect(w > 0 && h > 0, "image", image, "two numbers above 0")?;
@@ -109,7 +109,7 @@ pub(super) fn check_image(image: [u32; 2]) -> Result<()> {
     expect(fits, "image", image, expected)
 }
 
-/// No more of something than scenes may have.
+/// Checks that there are no more of something than a scene may have.
 pub(super) fn check_count(count: usize, at: &str, most: usize) -> Result<()> {
     expect(count <= most, at, count, format_args!("at most {most}"))
 }
@@ -165,10 +165,10 @@ pub(super) fn check_cast(cast: &LightTint) -> Result<()> {
     }
 }
 
-/// Most rows and columns of a grid over the surface.
+/// Maximum number of rows and of columns of a grid over the surface.
 pub(super) const MAX_CELLS: usize = 64;
 
-/// Whether rows are a grid: as many cells in each, and not too many; no rows are one too.
+/// Whether rows form a grid: equally many cells in each, and not too many; an empty list does, too.
 pub(super) fn is_grid<T>(rows: &[Vec<T>]) -> bool {
     let columns = rows.first().map_or(1, Vec::len);
     let sizes = 1..=MAX_CELLS;
@@ -208,7 +208,7 @@ fn check_camera(camera: &CameraSource) -> Result<()> {
     }
 }
 
-/// The corners of a rectangle in a photo of this size.
+/// Checks the corners of a rectangle in a photo of this size.
 fn check_label(corners_px: &[[f64; 2]; 4], photo: [u32; 2]) -> Result<()> {
     let corners = corners_px.as_flattened();
     check_within(corners, "camera.rectangle.corners_px", &PIXEL)?;
@@ -262,7 +262,7 @@ fn check_placement(placement: &Placement, at: &str) -> Result<()> {
     }
 }
 
-/// A convex polygon inside its card, or nothing.
+/// Checks that an outline is empty or a convex polygon inside its card.
 fn check_outline(outline: &[[f64; 2]], size: [f64; 2], at: &str) -> Result<()> {
     check_count(outline.len(), at, MAX_OUTLINE_CORNERS)?;
     let is_polygon = outline.len() != 1 && outline.len() != 2;

@@ -1,4 +1,4 @@
-//! A number of things, as recipes have it: uniform, or by a histogram.
+//! An integer count in a recipe: uniform, or from a histogram.
 
 use crate::bounds::Bounds;
 use crate::error::{Error, Result};
@@ -6,7 +6,7 @@ use crate::scene::draw::weighted_place;
 use crate::scene::{Distribution, Draws, Range};
 use serde::{Deserialize, Serialize};
 
-/// A number of things, drawn anew for every scene.
+/// A count, drawn anew for every scene.
 ///
 /// In files an integer, `[min, max]` for integers that are equally likely, or a histogram:
 /// `{ values = [5, 6, 8], weights = [3, 12, 1] }`.
@@ -19,8 +19,8 @@ use serde::{Deserialize, Serialize};
 pub enum Count {
     /// Every integer of a range is equally likely.
     Uniform(Range),
-    /// Each value is as likely as its weight says, against the sum of all: counts of a histogram
-    /// will do as they are.
+    /// Each value has a probability of its weight over the sum of all weights; counts of a
+    /// histogram can be used unchanged.
     Weighted {
         /// The numbers that occur, in ascending order.
         values: Vec<u32>,
@@ -81,7 +81,7 @@ impl Count {
     }
 }
 
-/// The largest value that has a weight; 0 where none has.
+/// The largest value with a positive weight; 0 if there is none.
 fn last_weighted(values: &[u32], weights: &[f64]) -> u32 {
     let pairs = values.iter().zip(weights);
     let weighted = pairs.filter(|(_, weight)| **weight > 0.0);
@@ -114,7 +114,7 @@ fn check_values(at: &str, values: &[u32], bounds: &Bounds) -> Result<()> {
     }
 }
 
-/// How large a weight may be: sums of such weights are exact enough.
+/// Bounds of a weight: sums of such weights are exact enough.
 const WEIGHT: Bounds = Bounds::new(0.0, 1e15, "a share or a count");
 
 fn check_weights(at: &str, weights: &[f64], expected: usize) -> Result<()> {

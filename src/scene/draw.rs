@@ -1,4 +1,4 @@
-//! Random draws that know their own name.
+//! Random draws, each keyed by its name.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::fmt;
 
-/// Variation of every random number of one scene: a draw is a pure function of `(seed, k, path)`.
+/// Random numbers of one scene: a draw is a pure function of `(seed, k, path)`.
 ///
 /// No draw depends on how many were made before it, so a new object or a changed range changes no
 /// other draw.
@@ -14,8 +14,8 @@ use std::fmt;
 /// # Method
 /// ChaCha with 8 rounds, whose 32-byte key is the seed, the index `k` (both little-endian `u64`)
 /// and the 128-bit FNV-1a hash of the path's UTF-8 bytes (little-endian); the draw is the stream's
-/// first `u64`. [FNV] is not cryptographic, which does not matter: paths are few and it only has to
-/// keep them apart.
+/// first `u64`. [FNV] is not cryptographic, which does not matter: paths are few and the hash only
+/// has to tell them apart.
 ///
 /// [FNV]: http://www.isthe.com/chongo/tech/comp/fnv/
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +25,7 @@ pub struct Draws<'a> {
     log: Option<&'a DrawLog>,
 }
 
-/// Every draw that was logged, in order: where a scene's numbers came from.
+/// Log of every draw, in order: where a scene's numbers came from.
 #[derive(Clone, Debug, Default)]
 pub struct DrawLog(RefCell<Vec<Drawn>>);
 
@@ -36,11 +36,11 @@ pub struct Drawn {
     pub path: String,
     /// What it was drawn from.
     pub from: Distribution,
-    /// The value; of a choice, its place in the list, from 0.
+    /// The value; for a choice, its index in the list, from 0.
     pub value: f64,
 }
 
-/// What a value is drawn from, every part of it equally likely but for a histogram's.
+/// Distribution that a value is drawn from; uniform, except for a histogram's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Distribution {
@@ -48,9 +48,9 @@ pub enum Distribution {
     Uniform([f64; 2]),
     /// Integers from the first to the second, both included.
     Whole([f64; 2]),
-    /// Integers from the first to the second, as likely as the weights of a histogram say.
+    /// Integers from the first to the second, weighted by a histogram.
     Weighted([f64; 2]),
-    /// The places in a list of this length.
+    /// An index into a list of this length.
     Choice(usize),
 }
 
@@ -86,7 +86,7 @@ impl<'a> Draws<'a> {
         Self { seed, k, log: None }
     }
 
-    /// The same draws, each entered in a log.
+    /// The same draws, each recorded in a log.
     pub fn logged(self, log: &'a DrawLog) -> Self {
         Self {
             log: Some(log),
@@ -94,7 +94,7 @@ impl<'a> Draws<'a> {
         }
     }
 
-    /// Enters a draw in the log, if there is one.
+    /// Records a draw in the log, if there is one.
     pub(super) fn note(&self, path: &str, from: Distribution, value: f64) {
         if let Some(DrawLog(log)) = self.log {
             log.borrow_mut().push(Drawn {
@@ -122,16 +122,16 @@ impl<'a> Draws<'a> {
     /// Uniform in `0..n`, from the high bits of the product; its bias is below `n / 2^64`.
     ///
     /// # Panics
-    /// When `n` is 0.
+    /// If `n` is 0.
     pub fn below(&self, path: &str, n: usize) -> usize {
         assert!(n > 0, "{path}: a choice from nothing");
         ((u128::from(self.bits(path)) * n as u128) >> 64) as usize
     }
 
-    /// A place in a list of `n`, as [`below`](Self::below), noted in the log.
+    /// An index into a list of `n`, as [`below`](Self::below), recorded in the log.
     ///
     /// # Panics
-    /// When `n` is 0.
+    /// If `n` is 0.
     pub fn choose(&self, path: &str, n: usize) -> usize {
         let place = self.below(path, n);
         self.note(path, Distribution::Choice(n), place as f64);
@@ -139,8 +139,8 @@ impl<'a> Draws<'a> {
     }
 }
 
-/// The place in a list of weights at which their sum comes above a number; the last one that has a
-/// weight where rounding leaves a number that is the whole sum.
+/// The index at which the cumulative sum of weights exceeds a number; the last one with a positive
+/// weight if rounding makes the number equal to the whole sum.
 pub(super) fn weighted_place(weights: &[f64], number: f64) -> usize {
     let mut sums = weights.iter().scan(0.0, |sum, weight| {
         *sum += weight;

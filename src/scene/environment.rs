@@ -1,4 +1,5 @@
-//! Light from all around: an equirectangular picture, as a scene names it and as a shot holds it.
+//! Light from all around: an equirectangular environment map, as a scene names it and as a shot
+//! holds it.
 
 use crate::asset::Panorama;
 use crate::error::{Error, Result};
@@ -9,13 +10,13 @@ use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// An environment map as a scene names it; its light comes on top of the constant `ambient`.
+/// An environment map as a scene names it; its light is added to the constant `ambient`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Environment {
     /// The picture: HDR or EXR, equirectangular, `+z` up.
     pub file: String,
-    /// Turn about `+z`: at 90 the world's `+x` shows what lies at `+y` in the picture, degrees.
+    /// Rotation about `+z`, degrees: at 90 the world's `+x` shows what is at `+y` in the picture.
     /// Default: 0.
     #[serde(default)]
     pub rotation_deg: f64,
@@ -44,20 +45,20 @@ impl Environment {
     }
 }
 
-/// An environment map in memory: a shared picture and how it is turned.
+/// An environment map in memory: a shared picture and its rotation.
 #[derive(Clone, Debug)]
 pub struct EnvironmentMap {
     /// The picture.
     pub panorama: Arc<Panorama>,
-    /// Turn about `+z`, radians: a direction of the world is turned by this before it is looked
-    /// up.
+    /// Rotation about `+z`, radians: a direction of the world is rotated by this before it is
+    /// looked up.
     pub rotation: f64,
     /// Factor on its values.
     pub strength: f32,
 }
 
 impl EnvironmentMap {
-    /// A picture as it is.
+    /// A picture, not rotated, at its own strength.
     pub fn new(panorama: Arc<Panorama>) -> Self {
         Self {
             panorama,
@@ -73,14 +74,14 @@ impl EnvironmentMap {
             .scale(self.strength)
     }
 
-    /// Irradiance on a receiver with this unit normal, nothing in the way.
+    /// Unobstructed irradiance of a receiver with this unit normal.
     pub(crate) fn irradiance(&self, normal: &Vector3<f64>) -> LinearRgb {
         let all = self.panorama.irradiance(&turned(normal, self.rotation));
         LinearRgb::from(all.map(|e| e as f32)).scale(self.strength)
     }
 }
 
-/// A direction turned about `+z`, counterclockwise as seen from above.
+/// A direction rotated about `+z`, counterclockwise as seen from above.
 pub(crate) fn turned(direction: &Vector3<f64>, angle: f64) -> Vector3<f64> {
     let (sin, cos) = libm::sincos(angle);
     let d = direction;
@@ -91,14 +92,14 @@ fn unnamed_picture(at: &str) -> Error {
     Error::value(at, "\"\", expected the name of a picture")
 }
 
-/// What a scene's environment map is drawn from.
+/// Ranges of a scene's environment map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EnvironmentRanges {
-    /// Pictures to choose from, relative to the recipe; none gives scenes without a map. Default:
+    /// Pictures to choose from, relative to the recipe; without any, scenes have no map. Default:
     /// none.
     pub files: Vec<String>,
-    /// Turn about the vertical, degrees. Default: `[-180, 180]`.
+    /// Rotation about the vertical, degrees. Default: `[-180, 180]`.
     pub rotation_deg: Range,
     /// Factor on the picture's values. Default: 1.
     pub strength: Range,
@@ -115,7 +116,7 @@ impl Default for EnvironmentRanges {
 }
 
 impl EnvironmentRanges {
-    /// A map, its turn and its strength; none where there is none to choose from.
+    /// A map with its rotation and strength; none if there are no files to choose from.
     pub(super) fn draw(&self, draws: &Draws) -> Option<Environment> {
         if self.files.is_empty() {
             return None;

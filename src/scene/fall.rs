@@ -1,4 +1,4 @@
-//! How dropped objects come to rest: the options of the `settle` stage, which a recipe carries.
+//! How dropped objects come to rest: the options of the `settle` stage, which are part of a recipe.
 
 use crate::bounds::Bounds;
 use crate::error::{Error, Result};
@@ -14,38 +14,38 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SettleOptions {
-    /// How. Default: `fall`.
+    /// Simulation or flat layout. Default: `fall`.
     pub mode: SettleMode,
     /// Gravity in the frame of the surface, m/s^2. Its strength only sets how long a fall takes,
-    /// not where things come to lie; its direction tilts the box. Default: `[0, 0, -9.81]`.
+    /// not where objects come to rest; its direction tilts the surface. Default: `[0, 0, -9.81]`.
     pub gravity: [f64; 3],
-    /// Least thickness of a falling body, as a share of its longer side; thinner cards are drawn
+    /// Minimum thickness of a falling body, as a share of its longer side; thinner cards are drawn
     /// thin but fall as bodies of this thickness. Default: 0.01 (2 mm for 200 mm).
     pub thinnest: f64,
-    /// Deepest overlap of two bodies at rest that is accepted, as a share of the typical card's
-    /// longer side. Default: 0.0025 (0.5 mm for 200 mm).
+    /// Maximum accepted overlap of two bodies at rest, as a share of the typical card's longer
+    /// side. Default: 0.0025 (0.5 mm for 200 mm).
     pub max_overlap: f64,
-    /// Largest rise of energy, potential and kinetic, between two steps, as a share of the drop's;
+    /// Maximum rise of energy, potential and kinetic, between two steps, as a share of the drop's;
     /// more is [`SettleVerdict::Exploded`](crate::settle::SettleVerdict::Exploded). Default: 0.01.
     pub max_energy_rise: f64,
-    /// Longest fall, seconds of a world in which the typical card is 200 mm long, from when the
-    /// highest can have landed, 0.01 to 600. Default: 10.
+    /// Maximum duration of a fall from when the highest object can have landed, in seconds scaled
+    /// as if the typical card were 200 mm long, 0.01 to 600. Default: 10.
     pub time_limit: f64,
-    /// Attempts before giving up, 1 to 100; each starts from heights of its own. Default: 8.
+    /// Maximum number of attempts, 1 to 100, each from other starting heights. Default: 8.
     pub attempts: u32,
     /// Shortest time step in the same seconds, 0.0001 to 0.0042: with longer ones half of the heaps
-    /// fail. Steps last two or four times as long while low heaps creep. Default: 1/360.
+    /// fail. Steps are two or four times as long while low heaps creep. Default: 1/360.
     pub step: f64,
-    /// Iterations of the contact solver in the shortest step, 1 to 100; longer ones have up to twice
-    /// as many. Default: 4.
+    /// Iterations of the contact solver in the shortest step, 1 to 100; longer ones have up to
+    /// twice as many. Default: 4.
     pub iterations: u32,
-    /// Times in a step that a body may be stopped at an object that stands already, which it would
-    /// fly through, 0 to 100. Default: 1.
+    /// Continuous collision detection: times per step that a body may be stopped at a stationary
+    /// object that it would pass through, 0 to 100. Default: 1.
     pub ccd: u32,
-    /// Most work for one picture, all attempts and redraws together, before it is refused: objects
-    /// and pairs of objects near to each other, summed over time steps, 1 to 1e12. Heaps of 30
-    /// take 0.2 million, of 100 some 2 million, of 200 up to 40 million, of 300 up to 80
-    /// million; what is laid flat takes less than one. Default: 100 million.
+    /// Maximum work for one picture, over all attempts and redraws, before it is rejected: objects
+    /// and pairs of nearby objects, summed over time steps, 1 to 1e12. Heaps of 30 take 0.2
+    /// million, of 100 about 2 million, of 200 up to 40 million, of 300 up to 80 million; objects
+    /// laid flat take less than one. Default: 100 million.
     pub most_work: u64,
 }
 
@@ -56,7 +56,7 @@ pub enum SettleMode {
     /// They fall as rigid bodies.
     #[default]
     Fall,
-    /// They are laid level in their order, each on top of the highest it meets; no physics.
+    /// They are laid level in their order, each on top of the highest object below it; no physics.
     Flat,
 }
 
@@ -86,7 +86,7 @@ impl SettleOptions {
         Vector3::new(w, h, object.thickness.max(self.thinnest * w.max(h))) / 2.0
     }
 
-    /// Fails on the first impossible option.
+    /// Fails on the first invalid option.
     pub fn check(&self) -> Result<()> {
         for (name, value, bounds) in self.bounded_values() {
             bounds.check(&format!("settle.{name}"), value)?;
@@ -121,11 +121,11 @@ impl SettleOptions {
     }
 }
 
-/// The nearest rotation that leaves a card level, on the side it already is nearer to.
+/// The nearest rotation that leaves a card level, on the side that it is already closer to.
 ///
 /// # Method
-/// Every rotation is a turn about the vertical followed by a tilt about a horizontal axis; the
-/// quaternion of the turn is the part (w, z) of the whole, normalised. A card that faces down is
+/// Every rotation is a rotation about the vertical followed by a tilt about a horizontal axis; the
+/// quaternion of the former is the part (w, z) of the whole, normalised. A card that faces down is
 /// first turned over about its own `x`.
 pub(crate) fn level(rotation: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let over = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));
@@ -135,7 +135,7 @@ pub(crate) fn level(rotation: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     if faces_up { turn } else { turn * over }
 }
 
-/// Half lengths along the world's axes of a turned box.
+/// Half lengths of a rotated box along the world's axes.
 pub(crate) fn half_extent(rotation: &UnitQuaternion<f64>, half: &Vector3<f64>) -> Vector3<f64> {
     rotation.to_rotation_matrix().matrix().abs() * half
 }

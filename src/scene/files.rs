@@ -1,34 +1,34 @@
-//! What a scene needs beside its own file: folders, and settings that its picture is made with.
+//! What a scene needs besides its own file: folders, and the settings of its picture.
 
 use crate::error::Result;
 use crate::io;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Where the files of a scene lie, relative to the scene's own file: with it a scene is rendered
+/// Folders of a scene's files, relative to the scene's own file, so that a scene can be rendered
 /// without its recipe.
 ///
-/// As in a recipe, the folders may lie anywhere.
+/// As in a recipe, the folders may be anywhere.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SceneFiles {
-    /// Folder of the assets that objects name.
+    /// Folder of the objects' assets.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub assets: Option<PathBuf>,
-    /// Folder of the photo that the plate names, and of its label.
+    /// Folder of the plate's photo and its label.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub backgrounds: Option<PathBuf>,
     /// Folder that the name of the environment map is relative to. Default: that of the scene's
-    /// file, in which the map must then lie.
+    /// file, which must then contain the map.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub environments: Option<PathBuf>,
 }
 
 impl SceneFiles {
-    /// The same as they are named in another scene file.
+    /// The same folders, relative to another scene file.
     ///
     /// # Errors
-    /// Without a working folder.
+    /// If there is no working folder.
     pub fn moved(&self, from: &Path, to: &Path) -> Result<Self> {
         Ok(Self {
             assets: moved_path(self.assets.as_deref(), from, to)?,
@@ -38,14 +38,14 @@ impl SceneFiles {
     }
 }
 
-/// A path as it is named in a file.
+/// A path relative to a file.
 pub(crate) fn relative_to_file(path: &Path, file: &Path) -> Result<PathBuf> {
     let file = io::absolute(file)?;
     let folder = file.parent().unwrap_or(&file);
     io::relative_on_disk(or_working_folder(path), folder)
 }
 
-/// What older scenes name by an empty path.
+/// The working folder for an empty path, as older scenes name it.
 fn or_working_folder(path: &Path) -> &Path {
     if path.as_os_str().is_empty() {
         Path::new(".")
@@ -54,15 +54,15 @@ fn or_working_folder(path: &Path) -> &Path {
     }
 }
 
-/// A path that is named in one file as it is named in another.
+/// A path relative to one file, made relative to another.
 fn moved_path(path: Option<&Path>, from: &Path, to: &Path) -> Result<Option<PathBuf>> {
     let folder = from.parent().unwrap_or(Path::new(""));
     path.map(|path| relative_to_file(&folder.join(path), to))
         .transpose()
 }
 
-/// Values of a recipe that a scene's picture and labels are made with, by the recipe's keys
-/// (`render.subsamples`); what is not in it has the recipe's default.
+/// Settings of a recipe for a scene's picture and labels, by the recipe's keys
+/// (`render.subsamples`); missing ones have the recipe's defaults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct SceneSettings(pub(crate) toml::Table);

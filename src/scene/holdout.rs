@@ -1,10 +1,9 @@
-//! What of the place stands in front of objects: the near walls of the surface, or what a mask
-//! says.
+//! What stands in front of objects: the near walls of the surface, or what a mask marks.
 //!
 //! # Method
-//! An object between walls is hidden by one where the ray to it leaves the room through the wall's
-//! inner side, and not over the rim: that side, of the walls that turn their outer side to the
-//! camera, is projected, and what lies behind it is held out.
+//! A wall hides an object between the walls if the ray from the object to the camera leaves the
+//! room through the wall's inner side, and not over the rim: for walls that turn their outer side
+//! to the camera, the inner side is projected, and everything behind it is held out.
 
 use crate::camera::{Camera, RadialDistortion};
 use crate::deep::HoldoutSample;
@@ -15,16 +14,16 @@ use crate::pixel::{Coverage, Depth};
 use crate::scene::{Scene, Surface};
 use std::ops::Range;
 
-/// Least distance from the camera that is projected, metres: closer than any lens focuses.
+/// Near plane of the projection, metres: closer than any lens focuses.
 const NEAR_PLANE_M: f64 = 1e-4;
-/// Sub-samples a side of pixels on the outline of a wall.
+/// Sub-samples per side of a pixel on the outline of a wall.
 const SUBSAMPLES: usize = 8;
-/// Half the diagonal of a pixel: what an edge is farther away than does not pass through it.
+/// Half the diagonal of a pixel: an edge farther away than this does not pass through it.
 const PIXEL_RADIUS_PX: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 impl Scene {
-    /// The part of a mask of what hides objects that the picture shows; it is in front of all of
-    /// them. `photo` is the camera of the whole mask, which is as large as the picture or larger.
+    /// The visible part of a mask of what hides objects; it is in front of all of them. `photo` is
+    /// the camera of the whole mask, which is as large as the picture or larger.
     pub(crate) fn holdout_of_mask(
         &self,
         photo: &Camera,
@@ -49,7 +48,7 @@ impl Scene {
 }
 
 impl Surface {
-    /// What the walls hide from a camera; none where they hide nothing.
+    /// What the walls hide from a camera; none if they hide nothing.
     pub(crate) fn holdout(
         &self,
         camera: &Camera,
@@ -67,8 +66,7 @@ impl Surface {
         Some(picture)
     }
 
-    /// The inner sides of the walls that the camera sees from outside, as far as they are in the
-    /// picture.
+    /// The inner sides of the walls that the camera sees from outside, clipped to the picture.
     fn hiding_faces(&self, camera: &Camera, lens: &RadialDistortion) -> Vec<ProjectedFace> {
         let faces = self.wall.map(|wall| wall.inner_faces(self.size));
         faces
@@ -79,7 +77,7 @@ impl Surface {
     }
 }
 
-/// The inner side of a wall, in the picture of a camera that sees it from behind.
+/// The inner side of a wall in the picture, seen from behind.
 struct ProjectedFace {
     plane: Plane,
     /// Lines around it, each with its unit normal inwards and its distance, pixels.
@@ -89,9 +87,9 @@ struct ProjectedFace {
 }
 
 impl ProjectedFace {
-    /// None for one that is seen from the front, edge-on or not at all.
+    /// None for one seen from the front, edge-on or not at all.
     fn new(face: &[Vector3<f64>; 4], camera: &Camera, lens: &RadialDistortion) -> Option<Self> {
-        // Its corners turn clockwise as seen from inside of the room.
+        // Its corners run clockwise as seen from inside the room.
         let outward = (face[1] - face[0]).cross(&(face[3] - face[0]));
         let normal = outward.try_normalize(0.0)?;
         if normal.dot(&(camera.center().coords - face[0])) <= 0.0 {
@@ -190,9 +188,9 @@ fn pixel_of(p: &Point3<f64>, camera: &Camera) -> Point2<f64> {
     camera.principal_px + seen
 }
 
-/// The pixels of a picture's side that the box around a ring touches.
+/// The pixels along one side of the picture that the box around a ring touches.
 ///
-/// Through a lens any of them: where it shows the ring is not asked.
+/// With a lens, all of them: the ring is not distorted for this.
 fn pixels_around(
     ring: &[Point2<f64>],
     axis: usize,
@@ -248,7 +246,8 @@ mod tests {
         Camera::look_at(eye, Point3::origin(), 160.0, [160, 120])
     }
 
-    /// Of a point in the room: whether the ray to the camera leaves it through a wall, found by
+    /// Reference: whether the ray from a point in the room to the camera leaves the room through a
+    /// wall, found by walking along the ray.
     /// walking along the ray.
     fn is_hidden(point: Vector3<f64>, eye: Vector3<f64>, surface: &Surface) -> bool {
         let wall = surface.wall.unwrap();

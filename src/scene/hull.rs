@@ -1,22 +1,23 @@
-//! The corners of the convex prism that falls in place of a cut-out: few, so that contacts are
-//! cheap and calm.
+//! Corners of the convex prism that falls in place of a cut-out: few, so that contacts are cheap
+//! and stable.
 
 use crate::geom::Point2;
 
-/// Most corners of a prism. Of bottles a hexagon has 0.95 to 1 times the area of their hull; falls
-/// of octagons take 1.6 times as long.
+/// Maximum number of corners of a prism. A hexagon has 0.95 to 1 times the area of a bottle's hull;
+/// falls of octagons take 1.6 times as long.
 pub(super) const MAX_CORNERS: usize = 6;
-/// Twice the area of a corner's triangle below which it is straight, as a share of the card's area.
+/// Twice the area of a corner's triangle below which the corner counts as straight, as a share of
+/// the card's area.
 const MIN_CORNER_AREA_RATIO: f64 = 1e-6;
 
-/// Corners of a convex outline in texture coordinates (right and down, 0 to 1) as those of a prism
-/// on a card of this size, counter-clockwise with y up, metres; empty where the outline has no
+/// Converts a convex outline in texture coordinates (right and down, 0 to 1) to the corners of a
+/// prism on a card of this size, counter-clockwise with y up, metres; empty if the outline has no
 /// area.
 ///
 /// # Method
-/// What changes the area least goes first, until [`MAX_CORNERS`] are left: a corner (Visvalingam and
-/// Whyatt 1993), or a side, between whose neighbours the outline then reaches to where they meet.
-/// What is larger than the outline at the end shrinks to its area.
+/// Removes whatever changes the area least until [`MAX_CORNERS`] are left: a corner (Visvalingam
+/// and Whyatt 1993), or a side, whose neighbours are then extended to where they meet. If the
+/// result is larger than the outline, it is shrunk to the outline's area.
 pub(super) fn prism_outline(outline_uv: &[Point2<f64>], size: [f64; 2]) -> Vec<[f64; 2]> {
     let mut ring: Vec<[f64; 2]> = outline_uv.iter().map(|p| on_card(p, size)).collect();
     if doubled_area(&ring) < 0.0 {
@@ -31,7 +32,7 @@ pub(super) fn prism_outline(outline_uv: &[Point2<f64>], size: [f64; 2]) -> Vec<[
     ring
 }
 
-/// Removes corners and sides until [`MAX_CORNERS`] are left, and those that change next to nothing.
+/// Removes corners and sides until [`MAX_CORNERS`] are left, and negligible ones even then.
 fn simplify(ring: &mut Vec<[f64; 2]>, size: [f64; 2]) {
     let negligible = MIN_CORNER_AREA_RATIO * size[0] * size[1];
     while let Some(cut) = least_cut(ring, size) {
@@ -42,9 +43,9 @@ fn simplify(ring: &mut Vec<[f64; 2]>, size: [f64; 2]) {
     }
 }
 
-/// A way to have one corner less.
+/// A way to remove one corner.
 struct Cut {
-    /// The corner that goes, and that takes the place of the next one where a side goes.
+    /// The corner to remove; if a side is removed, its first corner.
     corner: usize,
     /// Where the neighbours of a side meet.
     meeting: Option<[f64; 2]>,
@@ -69,7 +70,8 @@ impl Cut {
         }
     }
 
-    /// Of the side from a corner to the next one; none where its neighbours do not meet on the card.
+    /// Cut of the side from a corner to the next one; none if its neighbours do not meet on the
+    /// card.
     fn of_side(ring: &[[f64; 2]], corner: usize, size: [f64; 2]) -> Option<Self> {
         let [a, b, c, d] = [ring.len() - 1, 0, 1, 2].map(|k| ring[(corner + k) % ring.len()]);
         let meeting = meeting_point([a, b], [d, c]).filter(|p| is_on_card(*p, size))?;
@@ -81,7 +83,7 @@ impl Cut {
     }
 }
 
-/// The cut that changes the area least; none for no corners.
+/// The cut that changes the area least; none if there are no corners.
 fn least_cut(ring: &[[f64; 2]], size: [f64; 2]) -> Option<Cut> {
     let corners = (0..ring.len()).map(|i| Cut::of_corner(ring, i));
     let sides = (0..ring.len()).filter_map(|i| Cut::of_side(ring, i, size));

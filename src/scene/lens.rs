@@ -1,4 +1,4 @@
-//! What a lens does that a pinhole does not: it bends straight lines, and is sharp at one distance.
+//! What distinguishes a lens from a pinhole: distortion, and limited depth of field.
 
 use crate::camera::{self, Camera, RadialDistortion};
 use crate::error::{Error, Result};
@@ -16,18 +16,17 @@ const FULL_FRAME_MM: f64 = 36.0;
 pub struct Lens {
     /// OpenCV's first coefficient of radial distortion, negative for a barrel. Default: 0.
     pub k1: f64,
-    /// The plate was taken without distortion and is bent as cards are. Default: no, the plate
-    /// shows `k1` already.
+    /// Whether the plate was taken without distortion and is distorted like the cards. Default: no,
+    /// the plate already shows `k1`.
     pub bends_plate: bool,
-    /// Focal length over the diameter of the aperture. Default: none, all is sharp.
+    /// Focal length over the diameter of the aperture. Default: none, everything is sharp.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub f_number: Option<f64>,
-    /// Depth that is in focus, metres along the optical axis. Default: that of the surface's
-    /// centre.
+    /// Depth in focus, metres along the optical axis. Default: that of the surface's centre.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focus_m: Option<f64>,
-    /// Longer side of the part of the sensor that took what the whole picture shows, millimetres.
-    /// Default: 36.
+    /// Longer side of the part of the sensor that the whole picture shows, millimetres. Default:
+    /// 36.
     pub sensor_mm: f64,
 }
 
@@ -43,18 +42,18 @@ impl Default for Lens {
     }
 }
 
-/// A lens of an aperture that is in focus at one depth.
+/// A lens with an aperture, in focus at one depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThinLens {
     /// Diameter of its aperture, metres.
     pub aperture_m: f64,
-    /// Depth that is in focus, metres.
+    /// Depth in focus, metres.
     pub focus_m: f64,
 }
 
 impl ThinLens {
-    /// Radius of the circle of confusion of a point at a depth, in pixels of a camera of this focal
-    /// length.
+    /// Radius of the circle of confusion of a point at a depth, in pixels of a camera with this
+    /// focal length.
     ///
     /// # Method
     /// Rays from the point through the aperture's rim meet the plane in focus in a circle of
@@ -72,17 +71,17 @@ impl Lens {
         *self == Self::default()
     }
 
-    /// It changes the plate.
+    /// Whether it distorts the plate.
     pub(super) fn moves_plate(&self) -> bool {
         self.bends_plate && self.k1 != 0.0
     }
 
-    /// The camera of the whole photo as this lens takes it: longer where a barrel would see more
-    /// than the photo shows.
+    /// The camera of the whole photo with this lens: its focal length is longer where barrel
+    /// distortion would show more than the photo does.
     ///
     /// # Method
-    /// Farthest out is a corner, at a radius of R focal lengths: it stays in the corner if the
-    /// focal length grows as much as the lens shortens R.
+    /// The farthest point is a corner, at a radius of R focal lengths: it stays in the corner if
+    /// the focal length grows by the factor by which the lens shortens R.
     pub(super) fn camera(&self, photo: &Camera) -> Camera {
         if !self.moves_plate() || self.k1 > 0.0 {
             return *photo;
@@ -95,12 +94,12 @@ impl Lens {
         }
     }
 
-    /// How many times larger than the photo the middle of the whole picture is.
+    /// Magnification of the middle of the whole picture relative to the photo.
     pub(super) fn zoom(&self, photo: &Camera) -> f64 {
         self.camera(photo).focal_px.x / photo.focal_px.x
     }
 
-    /// Where the photo shows what the whole picture taken by this lens shows at a position.
+    /// The photo's position of what the whole picture shows at a position with this lens.
     pub(super) fn photo_px(&self, photo: &Camera, px: Point2<f64>) -> Point2<f64> {
         if !self.moves_plate() {
             return px;
@@ -111,7 +110,7 @@ impl Lens {
         photo.principal_px + focal_lengths.component_mul(&photo.focal_px)
     }
 
-    /// The distortion that a plate has before anything is done to it.
+    /// The distortion of a plate as it was photographed.
     pub(crate) fn distortion_of_plate(&self, photo: &Camera) -> RadialDistortion {
         RadialDistortion::new(photo, self.k1_of_plate())
     }
@@ -121,7 +120,7 @@ impl Lens {
         if self.bends_plate { 0.0 } else { self.k1 }
     }
 
-    /// The aperture and the focus for a photo's camera; none where all is sharp.
+    /// The aperture and the focus for a photo's camera; none if everything is sharp.
     pub(super) fn thin_lens(&self, photo: &Camera) -> Option<ThinLens> {
         let f_number = self.f_number?;
         let longer_px = f64::from(photo.image[0].max(photo.image[1]));
@@ -143,7 +142,7 @@ impl Lens {
             .map_or(Ok(()), |focus| FOCUS.check("lens.focus_m", focus))
     }
 
-    /// Fails on a barrel that folds the corners of a camera's pictures over, or nearly.
+    /// Fails if barrel distortion folds over the corners of a camera's pictures, or nearly does.
     pub(super) fn check_fold(&self, photo: &Camera) -> Result<()> {
         camera::check_fold("lens.k1", self.k1, self.least_k1(photo))
     }
@@ -157,7 +156,7 @@ impl Lens {
     }
 }
 
-/// An error that names the background too.
+/// An error that also names the background.
 fn told_of(error: Error, background: &str) -> Error {
     match error {
         Error::Value { at, what } => Error::value(at, format!("{what} (background {background})")),
@@ -165,17 +164,17 @@ fn told_of(error: Error, background: &str) -> Error {
     }
 }
 
-/// What the lens is drawn from.
+/// Ranges of the lens.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LensRanges {
-    /// OpenCV's k1 for photos whose label and camera have none: photo and objects are bent alike.
-    /// Default: 0.
+    /// OpenCV's k1 for photos whose label and camera have none: photo and objects are distorted
+    /// alike. Default: 0.
     pub k1: Range,
-    /// Focal length over the diameter of the aperture. Default: none, all is sharp.
+    /// Focal length over the diameter of the aperture. Default: none, everything is sharp.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub f_number: Option<Range>,
-    /// Depth that is in focus, metres. Default: that of the surface's centre.
+    /// Depth in focus, metres. Default: that of the surface's centre.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focus_m: Option<Range>,
     /// Longer side of the sensor, millimetres. Default: 36.
@@ -194,7 +193,7 @@ impl Default for LensRanges {
 }
 
 impl LensRanges {
-    /// Fails where the strongest barrel folds the pictures of a background over.
+    /// Fails if the strongest barrel distortion folds over the pictures of a background.
     pub(super) fn check_folds(&self, background: &Background) -> Result<()> {
         let CameraSource::Known(camera) = &background.camera else {
             return Ok(());
@@ -213,12 +212,12 @@ impl LensRanges {
             .map_err(|e| told_of(e, &background.name))
     }
 
-    /// A photo that has no distortion of its own is bent.
+    /// Whether the plate is distorted: if its photo has no distortion of its own.
     fn bends_plate(&self, photo_k1: f64) -> bool {
         photo_k1 == 0.0 && !self.k1.is_zero()
     }
 
-    /// The lens before a background.
+    /// The lens for a background.
     pub(super) fn draw(&self, draws: &Draws, background: &Background) -> Lens {
         let photo_k1 = background.k1;
         let bends_plate = self.bends_plate(photo_k1);

@@ -17,7 +17,7 @@ pub struct AreaLight {
     pub shape: LightShape,
     /// Centre, metres.
     pub position: [f64; 3],
-    /// The point its face is turned to. Default: the origin.
+    /// The point that it faces. Default: the origin.
     #[serde(default)]
     pub target: [f64; 3],
     /// Side lengths (diameters of an ellipse), metres.
@@ -63,7 +63,7 @@ pub enum Exposure {
     /// Found by the `light` stage: a matte white card on the surface becomes as bright as the
     /// plate's own white, times `2^gain_ev`.
     MatchPlate {
-        /// Brighter (positive) or darker than the match.
+        /// EV, relative to the match.
         gain_ev: f64,
     },
     /// Found by the `light` stage: a matte card of this albedo on the surface becomes as bright as
@@ -71,23 +71,23 @@ pub enum Exposure {
     MatchSurface {
         /// Share of light that the surface reflects.
         albedo: Albedo,
-        /// Brighter (positive) or darker than the match.
+        /// EV, relative to the match.
         gain_ev: f64,
     },
 }
 
-/// Colour that all lights and the constant environment are multiplied with.
+/// Colour by which all lights and the constant environment are multiplied.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LightTint {
     /// This one.
     Known(LinearRgb),
-    /// Found by the `light` stage: that of the surface in the plate over its albedo, to the power
-    /// of `share`.
+    /// Found by the `light` stage: the colour of the surface in the plate over its albedo, to the
+    /// power of `share`.
     MatchSurface {
         /// 0 keeps white light, 1 takes all of the colour.
         share: f64,
-        /// What the surface reflects. Default: of all colours the same.
+        /// Albedo of the surface. Default: neutral.
         #[serde(default = "default_color", skip_serializing_if = "is_white")]
         albedo: LinearRgb,
     },

@@ -1,4 +1,4 @@
-//! Where light comes from that no recipe knows.
+//! Direction of the light, if the recipe does not give it.
 
 use crate::bounds::Bounds;
 use crate::error::Result;
@@ -7,27 +7,27 @@ use serde::{Deserialize, Serialize};
 
 const DEVIATION: Bounds = Bounds::new(-10.0, 10.0, "standard deviations of the estimate");
 
-/// Evenly spread numbers of this range have a standard deviation of 1.
+/// Factor that gives uniform numbers in this range a standard deviation of 1.
 const UNIT_DEVIATION: f64 = 1.732_050_807_568_877_2;
 
-/// Where a scene's first light stands.
+/// Position of a scene's first light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LightDirection {
-    /// Where the scene says.
+    /// As the scene gives it.
     #[default]
     Known,
-    /// Found by the `light` stage: by which of the surface's walls the plate shows bright. The light
-    /// keeps its height and size; what comes from all around is found with it.
+    /// Found by the `light` stage from which of the surface's walls are bright in the plate. The
+    /// light keeps its height and size; the ambient light is found with it.
     MatchWalls {
-        /// How far from the estimate it stands, standard deviations: about the vertical, and in the
-        /// tilt from it.
+        /// Deviation from the estimate, in standard deviations: in azimuth, and in the tilt from
+        /// the vertical.
         deviations: [f64; 2],
     },
 }
 
 impl LightDirection {
-    /// Whether nothing is to be found.
+    /// Whether there is nothing to find.
     pub fn is_known(&self) -> bool {
         *self == Self::Known
     }
@@ -42,16 +42,16 @@ impl LightDirection {
     }
 }
 
-/// What the direction of a recipe's first light is drawn from.
+/// Source of the direction of a recipe's first light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LightDirectionSource {
     /// The ranges of the light.
     #[default]
     Drawn,
-    /// What the walls in the photo tell of it, within the error of that.
+    /// Estimated from the walls in the photo, within the error of the estimate.
     MatchWalls,
-    /// The same, as if it had no error.
+    /// The same, without the error.
     MatchWallsExactly,
 }
 
@@ -61,7 +61,7 @@ impl LightDirectionSource {
         *self == Self::Drawn
     }
 
-    /// The direction that does not vary beyond the ranges of the light.
+    /// The direction without variation beyond the ranges of the light.
     pub(super) fn at_middle(self) -> Self {
         match self {
             Self::Drawn => Self::Drawn,

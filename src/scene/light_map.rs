@@ -1,4 +1,4 @@
-//! How light is spread over the surface.
+//! Distribution of the light over the surface.
 
 use crate::bounds::Bounds;
 use crate::error::{Error, Result};
@@ -10,21 +10,21 @@ use serde::{Deserialize, Serialize};
 
 const FACTOR: Bounds = Bounds::new(0.0, 1000.0, "light a thousand times as bright as elsewhere");
 
-/// Factors on the light that falls on objects, by where over the surface they lie: what lamps that
-/// no scene knows make of a place.
+/// Factors on the light that falls on objects, by their position over the surface: the effect of
+/// lamps that the scene does not contain.
 ///
-/// The surface itself stays as its plate shows it.
+/// The surface itself stays as in its plate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LightMap {
-    /// Of each cell of a grid over the surface, rows from its upper edge to its lower one, each
-    /// from left to right; bilinear between the middles of cells, and as at the nearest of them
-    /// beyond. Empty: the same everywhere.
+    /// One factor per cell of a grid over the surface, in rows from its upper edge to its lower
+    /// one, each from left to right; bilinear between the centres of cells, and clamped to the
+    /// nearest cell beyond. Empty: the same everywhere.
     Known(Vec<Vec<f32>>),
     /// Found by the `light` stage: the brightness of the surface in the plate over its median, as
-    /// far as the scene's own lights do not give it, to the power of `share`.
+    /// far as the scene's own lights do not explain it, to the power of `share`.
     MatchSurface {
-        /// 0 is the same everywhere, 1 takes all that the plate shows.
+        /// 0 is the same everywhere, 1 takes all of the plate's gradients.
         share: f64,
     },
 }
@@ -41,7 +41,7 @@ impl LightMap {
         *self == Self::default()
     }
 
-    /// Fails on what is not a grid of factors, and on a share that is none.
+    /// Fails on rows that are not a grid of factors, and on an invalid share.
     pub(super) fn check(&self) -> Result<()> {
         match self {
             Self::Known(rows) => check_rows(rows),
@@ -68,7 +68,7 @@ pub struct LightGrid {
 }
 
 impl LightGrid {
-    /// None for rows that hold nothing.
+    /// None for empty rows.
     pub(crate) fn new(rows: &[Vec<f32>], size: [f64; 2]) -> Option<Self> {
         let columns = rows.first()?.len();
         Some(Self {

@@ -1,13 +1,13 @@
-//! The pipeline stage: a scene's camera becomes known.
+//! The pipeline stage that solves a scene's camera.
 
 use crate::camera::{Camera, Label, SolveOptions, solve};
 use crate::error::Result;
 use crate::scene::{CameraSource, Scene};
 
-/// Solves a scene's camera where it is still a labelled rectangle, and brings it to the scene's
+/// Solves a scene's camera if it is still a labelled rectangle, and scales it to the scene's
 /// picture size.
 ///
-/// A scene whose camera is known stays as it is: `locate(locate(s)) == locate(s)`.
+/// A scene whose camera is known is unchanged: `locate(locate(s)) == locate(s)`.
 ///
 /// # Errors
 /// [`Error::Camera`](crate::Error::Camera) for corners that no camera can have seen, or that none

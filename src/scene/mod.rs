@@ -1,13 +1,13 @@
-//! Scene: everything that is known of one picture, unknowns included.
+//! Scene: everything known about one picture, unknowns included.
 //!
 //! A [`Scene`] is plain data that reads and writes as TOML or JSON; any generator may write one and
 //! enter the pipeline here. What is not known yet is an enum variant ([`CameraSource::Rectangle`],
 //! [`Placement::Drop`], [`Exposure::MatchPlate`]); the stages `camera`, `settle` and `light` each
-//! turn their own unknown into the known one and leave the rest alone. [`Scene::resolve`] gives a
-//! [`Shot`], which has no unknowns. A [`Recipe`] draws scenes.
+//! replace their own unknown and leave the rest unchanged. [`Scene::resolve`] gives a [`Shot`],
+//! which has no unknowns. A [`Recipe`] draws scenes.
 //!
 //! # Examples
-//! A scene is drawn from a recipe, and is a pure function of it, the seed and the number:
+//! A scene drawn from a recipe is a pure function of the recipe, the seed and the scene's number:
 //! ```
 //! use petcomp::scene::{AssetVariant, Background, CameraSource, Recipe};
 //!
@@ -140,7 +140,7 @@ use crate::camera::Camera;
 use crate::pixel::LinearRgb;
 use serde::{Deserialize, Serialize};
 
-/// One picture to make: what is in it, where, seen by which camera, under which light.
+/// One picture to generate: its objects and their places, its camera and its light.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
@@ -149,12 +149,12 @@ pub struct Scene {
     /// Name of the background photo; empty for a transparent background.
     #[serde(default)]
     pub plate: String,
-    /// The camera, or what it can be found from.
+    /// The camera, or what it can be solved from.
     pub camera: CameraSource,
-    /// Which part of what that camera sees is shown.
+    /// The visible part of what that camera sees.
     #[serde(default, skip_serializing_if = "View::is_whole")]
     pub view: View,
-    /// What the camera's lens does that a pinhole does not.
+    /// Distortion and depth of field of the camera's lens.
     #[serde(default, skip_serializing_if = "Lens::is_pinhole")]
     pub lens: Lens,
     /// The surface `z = 0` that objects lie on.
@@ -162,52 +162,52 @@ pub struct Scene {
     /// Objects; the first has id 1.
     #[serde(default)]
     pub objects: Vec<Object>,
-    /// Area lights; none is a scene without shadows.
+    /// Area lights; without any, there are no shadows.
     #[serde(default)]
     pub lights: Vec<AreaLight>,
     /// Radiance of a constant environment, scene-linear.
     #[serde(default)]
     pub ambient: LinearRgb,
-    /// Light from a picture of the surroundings, on top of `ambient`.
+    /// Light from an environment map, in addition to `ambient`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub environment: Option<Environment>,
-    /// How bright rendered light is on the plate.
+    /// Brightness of rendered light on the plate.
     #[serde(default)]
     pub exposure: Exposure,
-    /// Colour of the light, on top of that of lights and `ambient`; pictures of the surroundings
-    /// bring their own.
+    /// Colour of the light, on top of that of `lights` and `ambient`; environment maps have their
+    /// own.
     #[serde(default, skip_serializing_if = "LightTint::is_white")]
     pub cast: LightTint,
-    /// Where the first light stands. Default: where `lights` says.
+    /// Position of the first light. Default: that in `lights`.
     #[serde(default, skip_serializing_if = "LightDirection::is_known")]
     pub light_direction: LightDirection,
-    /// How the light is spread over the surface, on top of what lights and environment do.
+    /// Distribution of the light over the surface, on top of `lights` and environment.
     #[serde(default, skip_serializing_if = "LightMap::is_even")]
     pub light_map: LightMap,
-    /// Albedo of the surface for light that goes to and fro between it and the objects over it, and
-    /// brightens it there. Default: black, which leaves that out.
+    /// Albedo of the surface for interreflection between it and the objects above it, which
+    /// brightens the surface. Default: black, no interreflection.
     #[serde(default, skip_serializing_if = "LinearRgb::is_black")]
     pub interreflection: LinearRgb,
-    /// Where a belt has carried the objects since they came to rest. Default: nowhere.
+    /// Displacement of the objects by a belt since they came to rest. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub belt: Option<Belt>,
-    /// How the edges of cut-outs are treated.
+    /// Treatment of the edges of cut-outs.
     #[serde(default, skip_serializing_if = "EdgeTreatment::are_as_is")]
     pub edges: EdgeTreatment,
-    /// What happens to the finished frame.
+    /// Post-processing of the finished frame.
     #[serde(default, skip_serializing_if = "PostProcess::is_identity")]
     pub finish: PostProcess,
-    /// Where the files that it names lie; without it, the recipe names the folders.
+    /// Folders of the files that it names; without it, the recipe names them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub files: Option<SceneFiles>,
-    /// How its picture and labels are made, where no recipe is given.
+    /// Settings of its picture and labels, if no recipe is given.
     #[serde(default, skip_serializing_if = "SceneSettings::is_empty")]
     pub settings: SceneSettings,
 }
 
 impl Scene {
-    /// An empty surface in the dark, seen by a camera in pictures of this size; without a plate, and all
-    /// else as files have it that do not say otherwise.
+    /// An empty surface in the dark, seen by a camera in pictures of this size, without a plate;
+    /// everything else has the defaults of scene files.
     pub fn new(image: [u32; 2], camera: CameraSource, surface: Surface) -> Self {
         Self {
             image,
@@ -233,8 +233,8 @@ impl Scene {
         }
     }
 
-    /// The same objects before the same camera in the dark, without a plate: what is left where
-    /// only labels are asked.
+    /// The same objects in front of the same camera in the dark, without a plate: enough if only
+    /// labels are needed.
     pub fn unlit(self) -> Self {
         Self {
             plate: String::new(),
@@ -259,15 +259,15 @@ impl Scene {
 pub struct Surface {
     /// Width (along x) and height (along y), metres.
     pub size: [f64; 2],
-    /// Coefficient of friction of everything that touches here, the cards among themselves too;
-    /// invisible walls are smooth. Default: 0.5.
+    /// Coefficient of friction of all contacts, including those between cards; invisible walls are
+    /// frictionless. Default: 0.5.
     #[serde(default = "Surface::default_friction")]
     pub friction: f64,
-    /// Share of the speed that a bounce gives back, 0 to 1. Default: 0.
+    /// Coefficient of restitution: share of the speed that is left after a bounce, 0 to 1. Default:
+    /// 0.
     #[serde(default)]
     pub restitution: f64,
-    /// The walls that stand on its edges. Default: invisible ones, upright, smooth and without a
-    /// top.
+    /// The walls on its edges. Default: invisible ones, upright, frictionless and infinitely high.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wall: Option<Wall>,
 }
@@ -301,7 +301,7 @@ pub enum CameraSource {
         corners_px: [[f64; 2]; 4],
         /// Width and height of the photo, pixels.
         photo: [u32; 2],
-        /// Focal length in pixels of the photo, where it is known from elsewhere.
+        /// Focal length in pixels of the photo, if known from another source.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         focal_px: Option<f64>,
     },

@@ -8,7 +8,7 @@ use crate::scene::draw::weighted_place;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 
-/// Colours that PET bottles have, by what their plastic lets pass beside clear plastic.
+/// Colours of PET bottles, as the transmittance of their plastic relative to clear plastic.
 ///
 /// # Method
 /// The mean transmittance of label-free plastic in the cut-outs of `tests/samples/bottles` (two
@@ -17,13 +17,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PlasticColor {
-    /// As it was photographed.
+    /// As photographed.
     Clear,
-    /// Of water.
+    /// Water bottles.
     LightBlue,
-    /// Of lemonade.
+    /// Lemonade bottles.
     Green,
-    /// Of beer and some juices.
+    /// Bottles of beer and some juices.
     Brown,
 }
 
@@ -39,20 +39,20 @@ impl PlasticColor {
     }
 }
 
-/// A colour to choose from: a name, red, green and blue, or a table with a weight.
+/// A colour to choose from: a name, its red, green and blue, or a table with a weight.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(
     untagged,
     expecting = "expected \"clear\", \"light_blue\", \"green\", \"brown\", three numbers, or { color = .., weight = .. }"
 )]
 pub enum PaletteEntry {
-    /// As likely as any other.
+    /// With a weight of 1.
     Plain(PaletteColor),
-    /// This many times as likely.
+    /// With a weight of its own.
     Weighted(WeightedColor),
 }
 
-/// A colour by its name or by what passes of red, green and blue.
+/// A colour by name or by the transmittance of red, green and blue.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum PaletteColor {
@@ -62,13 +62,13 @@ pub enum PaletteColor {
     Known(LinearRgb),
 }
 
-/// A colour and how likely it is.
+/// A colour and its weight.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WeightedColor {
     /// The colour.
     pub color: PaletteColor,
-    /// How likely it is beside the others.
+    /// Its weight relative to the others.
     pub weight: f64,
 }
 
@@ -94,7 +94,7 @@ impl PaletteEntry {
     }
 }
 
-/// Fails on the first colour that no plastic has, and where none has any weight.
+/// Fails on the first colour that is no transmittance, and if all weights are 0.
 pub(super) fn check_palette(palette: &[PaletteEntry], at: &str) -> Result<()> {
     check_each(palette, at, PaletteEntry::check)?;
     if palette.is_empty() || palette.iter().any(|entry| entry.weight() > 0.0) {
@@ -104,7 +104,7 @@ pub(super) fn check_palette(palette: &[PaletteEntry], at: &str) -> Result<()> {
     Err(Error::value(at, what))
 }
 
-/// The tint at a path; white, and nothing drawn, where there is nothing to choose from.
+/// The tint at a path; white, and nothing drawn, if the palette is empty.
 pub(super) fn draw_tint(palette: &[PaletteEntry], draws: &Draws, path: &str) -> LinearRgb {
     if palette.is_empty() {
         return LinearRgb::WHITE;

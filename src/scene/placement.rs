@@ -1,4 +1,4 @@
-//! Objects and where they are.
+//! Objects and their placement.
 
 use crate::asset::Role;
 use crate::geom::{Pose, UnitQuaternion};
@@ -13,38 +13,38 @@ use serde::{Deserialize, Serialize};
 pub struct Object {
     /// Name of the asset.
     pub asset: String,
-    /// What it is in the picture for: a distractor has no label, whatever its asset is; an asset
-    /// that is a distractor never has one. Default: `object`.
+    /// Its role in the picture: a distractor has no label, whatever its asset is; an asset that is
+    /// a distractor never has one. Default: `object`.
     #[serde(default, skip_serializing_if = "Role::is_object")]
     pub role: Role,
     /// Which of the asset's photos, from 0.
     #[serde(default)]
     pub photo: usize,
-    /// Which photo its back shows; by default the same one, seen through.
+    /// Photo that its back shows; by default its front, seen through.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub back: Option<usize>,
     /// Width and height of the card, metres.
     pub size: [f64; 2],
-    /// Thickness of the body that falls, metres.
+    /// Thickness of the falling body, metres.
     pub thickness: f64,
-    /// Corners of the convex prism that falls, counter-clockwise, in the card's plane (x right, y
-    /// up from its middle), metres; empty where the whole card falls as a box.
+    /// Corners of the falling convex prism, counter-clockwise, in the card's plane (x right, y up
+    /// from its middle), metres; empty if the whole card falls as a box.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outline: Vec<[f64; 2]>,
     /// Mass, kilograms.
     pub mass: f64,
-    /// Where the card is, or from where it falls.
+    /// Where the card is, or where it falls from.
     pub placement: Placement,
     /// Change of its colours.
     #[serde(default)]
     pub grade: Grade,
-    /// How its card is curved; its body falls as a flat one.
+    /// Bend of its card; its body falls like a flat one.
     #[serde(default, skip_serializing_if = "Bend::is_flat")]
     pub bend: Bend,
 }
 
 impl Object {
-    /// Makes it larger by a factor, its mass with its volume.
+    /// Scales it by a factor; the mass follows the volume.
     pub(super) fn scale_by(&mut self, factor: f64) {
         self.size = self.size.map(|length| length * factor);
         for corner in &mut self.outline {
@@ -55,8 +55,8 @@ impl Object {
     }
 }
 
-/// Paths of the draws of each object, distractors coming last: `objects[2]`, `distractors[0]`. Each
-/// role has numbers of its own, so that one more of either moves no draw of the other.
+/// Paths of the draws of each object: `objects[2]`, `distractors[0]`; distractors come last. Each
+/// role has its own numbering, so that one more of either changes no draw of the other.
 pub(super) fn draw_paths(objects: &[Object]) -> Vec<String> {
     let count = objects
         .iter()
@@ -71,7 +71,7 @@ pub(super) fn draw_paths(objects: &[Object]) -> Vec<String> {
         .collect()
 }
 
-/// Where an object is, or how it gets there.
+/// Where an object is, or where it starts to fall.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Placement {
@@ -86,25 +86,25 @@ pub enum Placement {
         /// Its orientation at the start.
         rotation: UnitQuaternion<f64>,
     },
-    /// Went over the rim: in no picture.
+    /// Went over the rim and is in no picture.
     Gone,
 }
 
-/// A change of colour: a dye in what is see-through, the strength of glints, then hue, saturation
-/// and value of the linear colour; the default changes nothing.
+/// Colour change: a dye in see-through plastic, the strength of glints, then hue, saturation and
+/// value of the linear colour; the default changes nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Grade {
-    /// Hue turned by this many degrees. Default: 0.
+    /// Hue shift, degrees. Default: 0.
     pub hue_deg: f32,
-    /// Saturation times this, then clamped to 0..1. Default: 1.
+    /// Factor on the saturation, which is then clamped to 0..1. Default: 1.
     pub saturation: f32,
-    /// Value times this. Default: 1.
+    /// Factor on the value. Default: 1.
     pub value: f32,
     /// Transmittance of a dye in see-through plastic, on top of its own colour. Default: 1, 1, 1.
     #[serde(skip_serializing_if = "is_white")]
     pub tint: LinearRgb,
-    /// Glints of the studio's light times this. Default: 1.
+    /// Factor on glints, which come from the studio's light. Default: 1.
     #[serde(skip_serializing_if = "is_one")]
     pub glints: f32,
 }

@@ -1,4 +1,4 @@
-//! What happens to a finished frame before it is written: the other half of a camera.
+//! Post-processing of a finished frame before it is written: the rest of the camera.
 
 use crate::color::planckian;
 use crate::error::Result;
@@ -8,23 +8,23 @@ use crate::scene::check::check_factors;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 
-/// Blur and noise that what is rendered lacks, then those of a camera, exposure, white balance and
-/// sharpening of the whole frame, plate included; the default leaves every bit alone.
+/// Blur and noise that rendered objects lack, then those of a camera, exposure, white balance and
+/// sharpening of the whole frame, plate included; the default leaves every bit unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PostProcess {
-    /// Brighter or darker by this many stops. Default: 0.
+    /// Exposure, stops. Default: 0.
     pub exposure_ev: f64,
     /// Factor on each channel. Default: 1, 1, 1.
     pub white_balance: LinearRgb,
-    /// Blur that rendered cards and shadows get, as the plate has it. Default: 0.
+    /// Blur of rendered cards and shadows, to match the plate. Default: 0.
     pub blur_px: Blur,
-    /// Noise that rendered cards get, as the plate has it. Default: none.
+    /// Noise of rendered cards, to match the plate. Default: none.
     pub noise: Noise,
-    /// Where in the noise: another number is another frame of it. Default: 0.
+    /// Seed of the noise: another number gives another frame of it. Default: 0.
     pub noise_seed: u64,
-    /// Lateral chromatic aberration of the camera that is to look at the place: in the frame's
-    /// corners red lies so many pixels farther out than green, and blue farther in. Default: 0.
+    /// Lateral chromatic aberration of the detector's camera: pixels by which red moves outwards
+    /// from green, and blue inwards, in the frame's corners. Default: 0.
     #[serde(skip_serializing_if = "is_zero")]
     pub chromatic_px: f64,
     /// Blur of the whole frame by that camera, pixels. Default: 0.
@@ -55,15 +55,15 @@ impl Default for PostProcess {
     }
 }
 
-/// Blur of a lens and a sensor: a Gaussian of this standard deviation, pixels; in files the number
-/// or `"match_plate"`.
+/// Blur of a lens and a sensor: standard deviation of a Gaussian, pixels; in files the number or
+/// `"match_plate"`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(
     rename_all = "snake_case",
     expecting = "expected pixels or \"match_plate\""
 )]
 pub enum Blur<Px = f64> {
-    /// Found by the `light` stage: as much as the plate has.
+    /// Found by the `light` stage: that of the plate.
     MatchPlate,
     /// This much.
     #[serde(untagged)]
@@ -71,7 +71,7 @@ pub enum Blur<Px = f64> {
 }
 
 impl Blur {
-    /// Nothing is blurred.
+    /// No blur.
     pub const NONE: Self = Self::Known(0.0);
 }
 
@@ -89,11 +89,11 @@ pub enum Noise {
         /// Standard deviation in the dark.
         read: f64,
     },
-    /// Found by the `light` stage: as much as the plate has.
+    /// Found by the `light` stage: that of the plate.
     MatchPlate,
 }
 
-/// Noise of a sensor as in [`Noise::Known`], or what that is drawn from; the default is none.
+/// Noise of a sensor as in [`Noise::Known`], or its ranges; the default is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CameraNoise<T: Default = f64> {
@@ -104,7 +104,7 @@ pub struct CameraNoise<T: Default = f64> {
 }
 
 impl PostProcess {
-    /// Whether it leaves the frame alone.
+    /// Whether it leaves the frame unchanged.
     pub fn is_identity(&self) -> bool {
         Self {
             noise_seed: 0,
@@ -129,7 +129,7 @@ impl PostProcess {
 }
 
 impl Noise {
-    /// Variance of a scene-linear value; 0 where it is not known.
+    /// Variance at a scene-linear value; 0 if it is not known.
     pub(crate) fn variance(&self, value: f64) -> f64 {
         match *self {
             Self::Known { shot, read } => shot * value.max(0.0) + read * read,
@@ -146,13 +146,13 @@ impl Noise {
     }
 }
 
-/// What the finish of a scene is drawn from; every default leaves the frame alone.
+/// Ranges of a scene's post-processing; the defaults leave the frame unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PostProcessRanges {
     /// Stops. Default: 0.
     pub exposure_ev: Range,
-    /// Temperature of the light that the camera treats as white, kelvin, 2000 to 25 000: below
+    /// White balance: temperature of the light that becomes white, kelvin, 2000 to 25 000; below
     /// 6504 the frame becomes bluer. Default: 6504.
     pub white_k: Range,
     /// Blur of rendered cards and shadows, pixels. Default: 0.
@@ -169,7 +169,7 @@ pub struct PostProcessRanges {
     pub sharpening: Range,
 }
 
-/// Temperature of the white of Rec. 709, kelvin: nothing is changed there.
+/// Temperature of the white of Rec. 709, kelvin, at which nothing changes.
 pub(super) const NEUTRAL_K: f64 = 6504.0;
 
 impl Default for PostProcessRanges {
@@ -188,8 +188,8 @@ impl Default for PostProcessRanges {
 }
 
 impl PostProcessRanges {
-    /// The same for pictures whose sides are `factor` times as long: what is said in pixels grows
-    /// or shrinks with them.
+    /// The same for pictures whose sides are `factor` times as long: values in pixels scale with
+    /// them.
     pub(crate) fn scaled(self, factor: f64) -> Self {
         Self {
             blur_px: match self.blur_px {
@@ -260,7 +260,7 @@ impl PostProcessRanges {
     }
 }
 
-/// Gains that make light of a temperature look like light of 6504 K, green left alone.
+/// Gains that make light of a temperature look like light of 6504 K; green is unchanged.
 pub fn white_balance(white_k: f64) -> LinearRgb {
     if white_k == NEUTRAL_K {
         return LinearRgb::WHITE;
@@ -273,7 +273,7 @@ pub fn white_balance(white_k: f64) -> LinearRgb {
     )
 }
 
-/// The gain of a channel, each beside its green.
+/// The gain of a channel relative to green.
 fn relative_gain([wanted, wanted_green]: [f32; 2], [seen, seen_green]: [f32; 2]) -> f32 {
     (wanted / wanted_green) / (seen / seen_green).max(f32::MIN_POSITIVE)
 }

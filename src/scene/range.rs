@@ -1,13 +1,13 @@
-//! A range of numbers, as recipes have it in place of a number.
+//! A range of numbers, which recipes have in place of a single number.
 
 use crate::bounds::{Bounds, number};
 use crate::error::{Error, Result};
 use crate::scene::{Distribution, Draws};
 use serde::{Deserialize, Serialize};
 
-/// A quantity that is drawn anew wherever it is used: uniform between two numbers.
+/// A quantity drawn anew for every use, uniformly between two numbers.
 ///
-/// In files `[min, max]`, or one number for a quantity that does not vary.
+/// In files `[min, max]`, or one number for a fixed quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "RangeInFile", into = "RangeInFile")]
 pub struct Range {
@@ -61,12 +61,12 @@ impl Range {
         Self { min: x, max: x }
     }
 
-    /// Its middle: the value where it is not to vary.
+    /// Its middle: the value of a quantity that is not to vary.
     pub fn middle(&self) -> Self {
         Self::fixed((self.min + self.max) / 2.0)
     }
 
-    /// All of it times a factor.
+    /// The range multiplied by a factor.
     pub(super) fn scaled(&self, factor: f64) -> Self {
         Self::new(self.min * factor, self.max * factor)
     }
@@ -78,23 +78,22 @@ impl Range {
         value
     }
 
-    /// Whether something happens that happens in this share of the cases; nothing is drawn where it
-    /// never does.
+    /// Whether an event of this probability happens; nothing is drawn if it never does.
     pub(super) fn chance(share: f64, draws: &Draws, path: &str) -> bool {
         share > 0.0 && Self::new(0.0, 1.0).draw(draws, path) < share
     }
 
-    /// Whether nothing but 0 is in it.
+    /// Whether it contains only 0.
     pub(super) fn is_zero(&self) -> bool {
         *self == Self::fixed(0.0)
     }
 
-    /// The value at a path; nothing is drawn where no range is given.
+    /// The value at a path; nothing is drawn if there is no range.
     pub(super) fn draw_optional(range: Option<Self>, draws: &Draws, path: &str) -> Option<f64> {
         range.map(|range| range.draw(draws, path))
     }
 
-    /// Fails as [`check`](Self::check) where a range is given.
+    /// As [`check`](Self::check), if there is a range.
     pub(super) fn check_optional(range: Option<Self>, at: &str, bounds: &Bounds) -> Result<()> {
         range.map_or(Ok(()), |range| range.check(at, bounds))
     }

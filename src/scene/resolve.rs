@@ -1,4 +1,4 @@
-//! From a scene with nothing unknown to a shot.
+//! From a scene without unknowns to a shot.
 
 use crate::asset::{Panorama, SurfaceCache, Texture};
 use crate::camera::{Camera, RadialDistortion};
@@ -14,27 +14,27 @@ use crate::scene::{
 };
 use std::sync::Arc;
 
-/// What an object looks like: all that a shot needs from its asset.
+/// Appearance of an object: everything that a shot needs from its asset.
 #[derive(Clone, Debug)]
 pub struct Appearance {
-    /// Index into the class list; none of a distractor.
+    /// Index into the class list; none for a distractor.
     pub class: Option<u32>,
     /// The cut-out, premultiplied, scene-linear.
     pub texture: Texture,
-    /// What its back shows; none where that is the front seen through.
+    /// What its back shows; none for its front, seen through.
     pub back: Option<Texture>,
     /// Its outline in texture coordinates (0 to 1, right and down), in order.
     pub outline_uv: Arc<[Point2<f64>]>,
-    /// How its front and its back bend what is seen through them.
+    /// How its front and its back displace what is seen through them.
     #[doc(hidden)]
     pub flows: [Option<Arc<Flow>>; 2],
-    /// What the texels of its front and of its back are of.
+    /// Which surface each texel of its front and of its back shows.
     #[doc(hidden)]
     pub surfaces: [SurfaceCache; 2],
 }
 
 impl Appearance {
-    /// An object that looks so, at rest at this pose (`world_from_card`).
+    /// A card with this appearance, at rest at the object's pose (`world_from_card`).
     fn into_card(self, id: ObjectId, object: &Object, world_from_card: Pose) -> Card {
         Card {
             id,
@@ -58,17 +58,18 @@ impl Appearance {
 }
 
 impl Scene {
-    /// The shot that this scene describes, once nothing is unknown in it.
+    /// The shot that this scene describes, once it has no unknowns.
     ///
-    /// `look` finds an object's asset and photo, or nothing; for a library that is
-    /// [`Appearance::from_library`]. `plate` is the background at the picture's size, or larger where
-    /// view or lens zooms in; none leaves it transparent. `panorama` is the picture that the scene's environment names. Object `i`
-    /// gets id `i + 1`; the shadow catcher is the whole plane of the labelled surface.
+    /// `look` returns an object's appearance, or none if its asset or photo is missing; for a
+    /// library that is [`Appearance::from_library`]. `plate` is the background at the picture's
+    /// size, or larger if view or lens zooms in; without one, the background is transparent.
+    /// `panorama` is the picture that the scene's environment names. Object `i` gets id `i + 1`;
+    /// the shadow catcher is the whole plane of the labelled surface.
     ///
     /// # Errors
     /// The first unknown that is left (`objects[3].placement: still falling; settle it first`); an
-    /// impossible value ([`check`](Self::check)); an asset or photo that `look` does not find; a
-    /// plate of another size; an environment without its picture.
+    /// invalid value ([`check`](Self::check)); an asset or photo that `look` does not find; a plate
+    /// of the wrong size; an environment without its picture.
     pub fn resolve(
         &self,
         look: impl Fn(&Object) -> Result<Option<Appearance>>,
@@ -103,7 +104,7 @@ impl Scene {
         })
     }
 
-    /// The part of the plate that is seen.
+    /// The visible part of the plate.
     fn shown_plate(&self, camera: &Camera, plate: Arc<Image<LinearRgb>>) -> Arc<Image<LinearRgb>> {
         let [across, down] = self.detail_of(&plate);
         if self.lens.moves_plate() {
@@ -119,18 +120,18 @@ impl Scene {
         }))
     }
 
-    /// Columns and rows of a plate, or of a mask beside it, for one of the picture.
+    /// Columns and rows of a plate (or of its mask) per pixel of the picture.
     pub(super) fn detail_of<P: Copy>(&self, plate: &Image<P>) -> [f64; 2] {
         let ([width, height], (w, h)) = (self.image.map(f64::from), plate.size());
         [w as f64 / width, h as f64 / height]
     }
 
-    /// Pixels of the picture along a pixel of a plate, as it is shown.
+    /// Pixels of the picture per pixel of a plate, as shown.
     pub(crate) fn plate_px(&self, plate: &Image<LinearRgb>) -> f64 {
         self.zoom_used() / self.detail_of(plate)[0]
     }
 
-    /// How many times larger it shows its photo.
+    /// Magnification relative to the photo.
     pub(crate) fn zoom_used(&self) -> f64 {
         match &self.camera {
             CameraSource::Known(camera) => self.view.zoom_used(camera) * self.lens.zoom(camera),
@@ -138,8 +139,8 @@ impl Scene {
         }
     }
 
-    /// What the view and the lens show of something that is known all over the photo; `camera` is
-    /// that of the whole photo.
+    /// What the view and the lens show of values known all over the photo; `camera` is that of the
+    /// whole photo.
     pub(crate) fn shown<P: Copy + Send + Sync>(
         &self,
         camera: &Camera,
@@ -162,7 +163,7 @@ impl Scene {
             .collect()
     }
 
-    /// A card where the belt has brought it.
+    /// A card where the belt has moved it.
     fn carried(&self, mut card: Card) -> Card {
         if let Some(belt) = &self.belt {
             let [x, y] = belt.offset_m;
@@ -245,7 +246,7 @@ impl Scene {
     fn check_plate(&self, plate: &Image<LinearRgb>) -> Result<()> {
         let ((w, h), [width, height]) = (plate.size(), self.image);
         let [across, down] = self.detail_of(plate);
-        // Half a pixel of either side is rounding.
+        // Half a pixel on either side is rounding.
         let tolerance = 1.0 / f64::from(width.min(height));
         if across >= 1.0 && down >= 1.0 && (across - down).abs() < tolerance {
             return Ok(());
@@ -275,7 +276,7 @@ fn resting_card(
         return Err(Error::value(at, "still falling; settle it first"));
     };
     let look = look(object)?.ok_or_else(|| unknown_asset(i, object))?;
-    // A scene has few objects: that was checked.
+    // A scene has few objects, as checked.
     Ok(look.into_card(ObjectId(i as u32 + 1), object, pose))
 }
 

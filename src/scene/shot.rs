@@ -1,4 +1,4 @@
-//! A scene with nothing left to find out: what the renderer takes.
+//! A scene without unknowns: what the renderer takes.
 
 use crate::asset::{SurfaceCache, Texture};
 use crate::camera::{Camera, RadialDistortion};
@@ -11,19 +11,19 @@ use crate::scene::{
 };
 use std::sync::Arc;
 
-/// Everything a picture is made of, in memory and known.
+/// Everything that a picture consists of, in memory and known.
 ///
-/// A generator that does not want files may build one in code:
+/// A generator that needs no files may build one in code:
 /// `Shot::new(camera).with_plate(plate).with_card(card).with_light(light)`.
 #[derive(Clone, Debug)]
 pub struct Shot {
     /// The camera; its `image` is the size of the picture.
     pub camera: Camera,
-    /// OpenCV's first coefficient of its lens's radial distortion; the plate shows it.
+    /// OpenCV's first coefficient of its lens's radial distortion, which the plate already has.
     pub k1: f64,
-    /// Its aperture and focus; none where all is sharp.
+    /// Its aperture and focus; none if everything is sharp.
     pub thin_lens: Option<ThinLens>,
-    /// Background, of the picture's size; none is transparent.
+    /// Background, of the picture's size; none for a transparent one.
     pub plate: Option<Arc<Image<LinearRgb>>>,
     /// Width and height of the part of `z = 0` that receives shadows, metres, centred.
     pub catcher: [f64; 2],
@@ -33,22 +33,20 @@ pub struct Shot {
     pub lights: Vec<AreaLight>,
     /// Radiance of a constant environment.
     pub ambient: LinearRgb,
-    /// Light from a picture of the surroundings, on top of `ambient`.
+    /// Light from an environment map, in addition to `ambient`.
     pub environment: Option<EnvironmentMap>,
-    /// Factors on the light that falls on cards, by where they are over the surface.
+    /// Factors on the light that falls on cards, by their position over the surface.
     pub light_grid: Option<LightGrid>,
-    /// Albedo of the surface for light that goes to and fro between it and the cards; black leaves
-    /// that out.
+    /// Albedo of the surface for interreflection between it and the cards; black for none.
     pub interreflection: LinearRgb,
     /// Factor from rendered radiance to plate values.
     pub exposure: f32,
-    /// What of the place stands in front of objects, of the picture's size; none where nothing
-    /// does.
+    /// What stands in front of objects, of the picture's size; none for nothing.
     pub holdout: Option<Arc<Image<HoldoutSample>>>,
-    /// How far cards move while the shutter is open, along x and y, metres.
+    /// How far cards move during the exposure, along x and y, metres.
     #[doc(hidden)]
     pub motion_m: [f64; 2],
-    /// How the edges of cards are treated; labels are made from those that are left as they are.
+    /// Treatment of the edges of cards; labels are made from untreated ones.
     pub edges: EdgeTreatment,
 }
 
@@ -57,27 +55,27 @@ pub struct Shot {
 pub struct Card {
     /// Its name in labels; not 0.
     pub id: ObjectId,
-    /// Index into the class list; none of a distractor, which is drawn like any other but has no
-    /// label.
+    /// Index into the class list; none for a distractor, which is rendered like any other card but
+    /// has no label.
     pub class: Option<u32>,
-    /// Where it lies and how large it is.
+    /// Position and size.
     pub quad: Quad,
     /// The cut-out, premultiplied, scene-linear.
     pub texture: Texture,
-    /// What the side that looks along `-z` of the card shows, right way round as seen from there;
-    /// none where it is the front seen through. Whoever looks through a card (the eye, or a
+    /// Texture of the back, the side that faces along `-z` of the card, the right way round as seen
+    /// from there; none for the front, seen through. Whoever looks through a card (the eye, or a
     /// receiver of light) looks through the side that faces it.
     pub back: Option<Texture>,
     /// Its outline in texture coordinates (0 to 1, right and down), in order.
     pub outline_uv: Arc<[Point2<f64>]>,
     /// Change of its colours.
     pub grade: Grade,
-    /// How it is curved.
+    /// Its bend.
     pub bend: Bend,
-    /// How it bends what is seen through it.
+    /// How it displaces what is seen through it.
     #[doc(hidden)]
     pub refraction: Refraction,
-    /// What the texels of its front and of its back are of.
+    /// Which surface each texel of its front and of its back shows.
     #[doc(hidden)]
     pub surfaces: [SurfaceCache; 2],
 }
@@ -110,7 +108,7 @@ impl Card {
 }
 
 impl Shot {
-    /// How much of its light a card at a point gets.
+    /// Factor on the light of a card at a point.
     pub(crate) fn light_factor_at(&self, point: &Vector3<f64>) -> f32 {
         let grid = self.light_grid.as_ref();
         grid.map_or(1.0, |grid| grid.factor_at(point.x, point.y))
@@ -140,7 +138,7 @@ impl Shot {
     /// With a background.
     ///
     /// # Panics
-    /// When its size is not the camera's.
+    /// If its size is not the camera's.
     pub fn with_plate(mut self, plate: Arc<Image<LinearRgb>>) -> Self {
         let size = (self.camera.image[0] as usize, self.camera.image[1] as usize);
         assert_eq!(plate.size(), size, "plate and camera differ in size");
@@ -148,14 +146,14 @@ impl Shot {
         self
     }
 
-    /// With a lens of this k1, which the plate shows.
+    /// With a lens of this k1, which the plate already has.
     #[doc(hidden)]
     pub fn with_k1(mut self, k1: f64) -> Self {
         self.k1 = k1;
         self
     }
 
-    /// From where the camera would see a point without its lens to where the picture shows it.
+    /// Maps where the camera would see a point without its lens to where the picture shows it.
     #[doc(hidden)]
     pub fn distortion(&self) -> RadialDistortion {
         RadialDistortion::new(&self.camera, self.k1)
@@ -179,7 +177,7 @@ impl Shot {
         self
     }
 
-    /// With light from a picture of the surroundings.
+    /// With light from an environment map.
     pub fn with_environment(mut self, environment: EnvironmentMap) -> Self {
         self.environment = Some(environment);
         self

@@ -10,12 +10,12 @@ use nalgebra::Unit;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// Times that the direction of a card is drawn until it fits between the walls.
+/// Maximum number of draws of a card's direction until it fits between the walls.
 const MAX_YAW_DRAWS: u32 = 64;
 /// How much longer than the space between the walls a card may be, as a share: rounding.
 const FIT_TOLERANCE: f64 = 1e-12;
 
-/// How objects start: each over the one before it.
+/// Positions and rotations in which objects start, each over the one before it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DropRanges {
@@ -25,26 +25,27 @@ pub struct DropRanges {
     /// Position along the surface's height: -1 at the lower wall, 1 at the upper one. Default:
     /// `[-1, 1]`.
     pub y: Range,
-    /// How far objects start from each other, drawn once for a scene, 0 to 1: 0 is a heap, all over
-    /// the middle of `x` and `y`; 1 covers all of them evenly, and what would reach through a wall
-    /// starts along it. Default: each anywhere that it is between the walls, whatever the others do.
+    /// How far apart objects start, drawn once for a scene, 0 to 1: at 0 all start over the middle
+    /// of `x` and `y`, in a heap; at 1 they cover the ranges evenly, and those that would reach
+    /// through a wall start along it. Default: none, each starts anywhere between the walls,
+    /// independently of the others.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spread: Option<Range>,
-    /// How often objects start in each cell of a grid over `x` and `y`, as weights: rows from the
-    /// upper wall to the lower one, each from left to right; what would reach through a wall starts
-    /// along it. Default: none, everywhere as often.
+    /// Weights of the cells of a grid over `x` and `y` in which objects start: rows from the upper
+    /// wall to the lower one, each from left to right; objects that would reach through a wall
+    /// start along it. Default: none, uniform.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub positions: Vec<Vec<f64>>,
-    /// Turn about the vertical, degrees. Default: `[-180, 180]`.
+    /// Rotation about the vertical, degrees. Default: `[-180, 180]`.
     pub yaw_deg: Range,
-    /// Tilt from level, degrees. Default: `[0, 15]`.
+    /// Tilt from horizontal, degrees. Default: `[0, 15]`.
     pub tilt_deg: Range,
-    /// Direction of the horizontal axis that it tilts about, degrees. Default: `[-180, 180]`.
+    /// Direction of the horizontal tilt axis, degrees. Default: `[-180, 180]`.
     pub tilt_axis_deg: Range,
-    /// Free height between an object and the highest point below it, metres. Default: `[0.005,
-    /// 0.02]`.
+    /// Vertical clearance between an object and the highest point below it, metres. Default:
+    /// `[0.005, 0.02]`.
     pub gap: Range,
-    /// Share of the objects that start turned over, 0 to 1: their backs are seen, which are the
+    /// Share of the objects that start face down, 0 to 1: they show their backs, which are the
     /// fronts seen through. Default: 0.
     pub face_down: f64,
 }
@@ -66,7 +67,7 @@ impl Default for DropRanges {
 }
 
 impl DropRanges {
-    /// What an object has before it is stacked.
+    /// Placement of an object before it is stacked.
     pub(super) fn unplaced() -> Placement {
         Placement::Drop {
             above: [0.0; 2],
@@ -98,14 +99,14 @@ pub(super) struct DropColumn<'a> {
 }
 
 impl DropColumn<'_> {
-    /// Places objects one over the other: between the walls over the edges of the surface, with a
-    /// gap under each. Distractors fall among them.
+    /// Stacks objects between the walls over the edges of the surface, with a gap under each.
+    /// Distractors fall among them.
     ///
-    /// Gaps are between the bodies that fall ([`SettleOptions::half_body`]), by their true extents
-    /// as they are turned.
+    /// Gaps are between the falling bodies ([`SettleOptions::half_body`]), by their true extents as
+    /// rotated.
     ///
     /// # Errors
-    /// An object that fits between the walls in no direction.
+    /// An object that does not fit between the walls in any direction.
     pub(super) fn stack(&self, objects: &mut [Object]) -> Result<()> {
         let paths = draw_paths(objects);
         let places = self.start.places(self.draws);
@@ -128,8 +129,8 @@ impl DropColumn<'_> {
         Ok(())
     }
 
-    /// Indices from the lowest to the highest: objects as they come, each distractor at a place
-    /// among those before it that is drawn.
+    /// Indices from the lowest to the highest: objects in their order, each distractor at a drawn
+    /// position among those before it.
     fn drop_order(&self, objects: &[Object], paths: &[String]) -> Vec<usize> {
         let mut order = Vec::with_capacity(objects.len());
         for (i, object) in objects.iter().enumerate() {
@@ -158,9 +159,9 @@ impl DropColumn<'_> {
         range.draw_field(self.draws, path, name)
     }
 
-    /// The first rotation drawn with which the body fits between the walls, tilted as it starts and
-    /// level as it may end: what starts across a room that is too narrow for it never lies down
-    /// there. Where none does, one that fits level.
+    /// The first drawn rotation at which the body fits between the walls, both tilted as it starts
+    /// and level as it may end: a body that starts across a room too narrow for it never lies down
+    /// there. If none does, one that fits level.
     fn fitting_rotation(&self, half: &Vector3<f64>, path: &str) -> Option<UnitQuaternion<f64>> {
         let room = self.surface.size;
         (0..MAX_YAW_DRAWS)
@@ -169,20 +170,20 @@ impl DropColumn<'_> {
             .or_else(|| self.draw_level_rotation(half, path))
     }
 
-    /// One of the level rotations with which the body fits, if there is any.
+    /// One of the level rotations at which the body fits, if there is any.
     fn draw_level_rotation(&self, half: &Vector3<f64>, path: &str) -> Option<UnitQuaternion<f64>> {
         let turns: Vec<_> = self.start.level_turns(self.surface.size, half).collect();
         (!turns.is_empty()).then(|| turns[self.draws.choose(&format!("{path}.turn"), turns.len())])
     }
 
-    /// First it is turned over or not, then about the vertical, drawn for this object for the
-    /// `number`-th time, then the tilt.
+    /// Turned over or not, then rotated about the vertical by the `number`-th draw for this object,
+    /// then tilted.
     fn draw_rotation(&self, path: &str, number: u32) -> UnitQuaternion<f64> {
         let yaw = self.draw(&self.start.yaw_deg, path, &yaw_field(number));
         self.draw_tilt(path) * level_turn(yaw) * self.draw_side(path)
     }
 
-    /// Half a turn about its width for what starts face down.
+    /// Half a turn about its width for an object that starts face down.
     fn draw_side(&self, path: &str) -> UnitQuaternion<f64> {
         let path = format!("{path}.face_down");
         if Range::chance(self.start.face_down, self.draws, &path) {
@@ -201,14 +202,14 @@ impl DropColumn<'_> {
 }
 
 impl DropRanges {
-    /// Whether a card of this size, as thick as it may be, fits between walls in some direction
-    /// that it may start in.
+    /// Whether a card of this size, with the maximum thickness, fits between the walls in some
+    /// direction in which it may start.
     pub(super) fn has_room(&self, surface: [f64; 2], [w, h]: [f64; 2]) -> bool {
         let half = Vector3::new(w, h, 0.0) / 2.0;
         self.level_turns(surface, &half).next().is_some()
     }
 
-    /// Turns with which a level body fits between the walls: the ends of the range, and whole
+    /// Rotations at which a level body fits between the walls: the ends of the range, and whole
     /// degrees.
     fn level_turns(
         &self,
@@ -230,7 +231,7 @@ fn yaw_field(number: u32) -> String {
     }
 }
 
-/// The ends of a range, then the whole degrees in it, of one turn at most.
+/// The ends of a range, then the whole degrees in it, over at most one turn.
 fn whole_degrees(Range { min, max }: Range) -> impl Iterator<Item = f64> {
     let whole = (0..360)
         .map(move |i| min.ceil() + f64::from(i))
@@ -247,12 +248,12 @@ fn level_turn(degrees: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians())
 }
 
-/// How far from the middle an object of this half extent may be, in both directions.
+/// Maximum distance from the middle of an object with this half extent, in both directions.
 fn free_offsets(surface: [f64; 2], extent: &Vector3<f64>) -> [f64; 2] {
     [0, 1].map(|axis| surface[axis] / 2.0 - extent[axis])
 }
 
-/// Whether a body turned so fits between the walls.
+/// Whether a body with this rotation fits between the walls.
 fn fits(surface: [f64; 2], half: &Vector3<f64>, rotation: &UnitQuaternion<f64>) -> bool {
     let free = free_offsets(surface, &half_extent(rotation, half));
     free.iter()
@@ -305,7 +306,7 @@ mod tests {
         Ok(objects)
     }
 
-    /// Corners of the body as it starts, one by one.
+    /// Corners of the body as it starts.
     fn corners(object: &Object) -> Vec<Vector3<f64>> {
         let Placement::Drop {
             above: [x, y],
@@ -408,7 +409,7 @@ mod tests {
         assert_eq!(reported, expected);
     }
 
-    /// Half extents of the level body, turned as it would lie down.
+    /// Half extents of the level body, rotated as it would come to rest.
     fn lying(object: &Object) -> Vector3<f64> {
         let Placement::Drop { rotation, .. } = object.placement else {
             panic!("not dropped")
@@ -435,7 +436,7 @@ mod tests {
     #[test]
     fn a_card_as_long_as_the_room_starts_level_and_along_it() {
         for k in 0..20 {
-            // So wide that it does not fit along the diagonal, which a narrow one does.
+            // So wide that it does not fit along the diagonal, unlike a narrow one.
             let objects = stacked(k, &DropRanges::default(), cards(3, [0.4, 0.28])).unwrap();
             objects
                 .iter()

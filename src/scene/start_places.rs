@@ -1,4 +1,4 @@
-//! Where objects start over the surface: anywhere, from a heap to evenly, or by a histogram.
+//! Where objects start over the surface: anywhere, from a heap to evenly spread, or by a histogram.
 
 use crate::error::{Error, Result};
 use crate::scene::bounds::SHARE;
@@ -6,12 +6,12 @@ use crate::scene::check::{MAX_CELLS, is_grid};
 use crate::scene::draw::weighted_place;
 use crate::scene::{Draws, DropRanges, Range};
 
-/// What one point of the even sequence is beyond the one before it: the inverse of the plastic
-/// number, and its square.
+/// Step of the even sequence from one point to the next: the inverse of the plastic number, and its
+/// square.
 const EVEN_STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 
 impl DropRanges {
-    /// Fails on impossible places.
+    /// Fails on invalid places.
     pub(super) fn check_places(&self) -> Result<()> {
         self.check_positions()?;
         match &self.spread {
@@ -35,7 +35,7 @@ impl DropRanges {
         Err(Error::value("start.positions", what))
     }
 
-    /// The way that the objects of a scene find their places.
+    /// The start places of a scene's objects.
     pub(super) fn places<'a>(&'a self, draws: &'a Draws<'a>) -> StartPlaces<'a> {
         StartPlaces {
             start: self,
@@ -58,12 +58,12 @@ pub(super) struct StartPlaces<'a> {
 }
 
 impl StartPlaces<'_> {
-    /// Where the middle of the `i`-th thing starts, whose draws are at `path`, metres from the surface's; `half` are the half
-    /// sides of the surface, `free` is how far from its middle the object still is between the
-    /// walls.
+    /// Where the middle of the `i`-th object starts, metres from the surface's middle. Its draws
+    /// are at `path`; `half` are the half sides of the surface, and within `free` of the middle the
+    /// object is between the walls.
     ///
-    /// Places of a histogram and of the even sequence are of the whole surface: what would reach
-    /// through a wall is moved up to it.
+    /// Places of a histogram and of the even sequence cover the whole surface: an object that would
+    /// reach through a wall is moved up to it.
     pub(super) fn place(&self, i: usize, path: &str, half: [f64; 2], free: [f64; 2]) -> [f64; 2] {
         let at = match &self.even {
             Some(even) => even.place(i, self.start),
@@ -79,7 +79,7 @@ impl StartPlaces<'_> {
         [x * free_x, y * free_y]
     }
 
-    /// A point of a cell that is drawn by its weight.
+    /// A point of a cell drawn by its weight.
     fn in_cell(&self, path: &str) -> [f64; 2] {
         let rows = &self.start.positions;
         let (row, column) = self.draw_cell(path);
@@ -107,10 +107,11 @@ fn cell(range: &Range, i: usize, of: usize) -> Range {
     Range::new(range.min + low * length, range.min + high * length)
 }
 
-/// Points that cover the surface evenly however many they are, drawn towards the middle.
+/// Points that cover the surface evenly, however many there are, contracted towards the middle.
 ///
 /// # Method
-/// The sequence R2 of [Roberts 2018], turned by a random offset (Cranley and Patterson 1976).
+/// The sequence R2 of [Roberts 2018], shifted by a random offset modulo 1 (Cranley and Patterson
+/// 1976).
 ///
 /// [Roberts 2018]: https://extremelearning.com.au/unreasonable-effectiveness-of-quasirandom-sequences/
 struct EvenPlaces {
@@ -128,7 +129,7 @@ impl EvenPlaces {
         }
     }
 
-    /// Of the `i`-th object, as a share of the surface's half sides.
+    /// Place of the `i`-th object, as a share of the surface's half sides.
     fn place(&self, i: usize, start: &DropRanges) -> [f64; 2] {
         [(0, start.x), (1, start.y)].map(|(axis, range)| {
             let share = (self.offset[axis] + i as f64 * EVEN_STEP[axis]).fract();
@@ -178,7 +179,7 @@ mod tests {
     #[test]
     fn spread_leads_from_a_heap_to_an_even_cover() {
         assert!(starts(&spread(0.0), 9).iter().all(|at| *at == [0.0, 0.0]));
-        // 16 places at random are in 10 of 16 cells: 16 (1 - (15/16)^16).
+        // 16 random places are in 10 of 16 cells: 16 (1 - (15/16)^16).
         assert!(covered(&starts(&spread(1.0), 16)) >= 13);
         let [half, whole] = [0.5, 1.0].map(|share| starts(&spread(share), 7));
         for (a, b) in half.iter().zip(&whole) {

@@ -1,4 +1,4 @@
-//! How much of a list a recipe takes.
+//! How much of a list a recipe uses.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ pub enum Take {
     /// All of it.
     #[default]
     All,
-    /// This many from the start, or all where there are fewer; at least one.
+    /// This many from the start, or all if there are fewer; at least one.
     First(usize),
 }
 

@@ -1,25 +1,26 @@
 //! The paper's sources of variation, switched off one at a time.
 //!
-//! Draws are keyed by their path and not by what was drawn before, so two recipes that differ in
-//! one switch give scenes that differ in nothing else: scene `k` of one and scene `k` of the other
-//! are a pair.
+//! Draws are keyed by their path and not by what was drawn before, so scenes of two recipes that
+//! differ in one switch differ in nothing else: scene `k` of one and scene `k` of the other are a
+//! pair.
 
 use serde::{Deserialize, Serialize};
 
-/// A source of variation that a recipe can do without.
+/// A source of variation that a recipe can switch off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Variation {
-    /// Change of the objects' colours: they keep those of their photos.
+    /// Change of the objects' colours; if off, they are those of the photos.
     Colour,
-    /// Labelled photos of the place: only the first is used, for pictures without objects too.
+    /// Labelled photos of the place; if off, only the first is used, also for pictures without
+    /// objects.
     Viewpoint,
-    /// Photos of an asset: only its first is used.
+    /// Photos of an asset; if off, only its first is used.
     Photo,
-    /// Where lights are, how bright and of which colour: each stays at the middle of its ranges.
-    /// How large they are, which is how soft shadows are, still varies.
+    /// Position, brightness and colour of lights; if off, each stays at the middle of its ranges.
+    /// Their size, and so the softness of shadows, still varies.
     Light,
-    /// New choices of objects for every scene: there are only 50, as in the paper.
+    /// New selections of objects for every scene; if off, there are only 50, as in the paper.
     Selection,
 }
 
@@ -37,9 +38,9 @@ impl Variation {
 /// A dataset of the paper's Table 1: which sources of variation are off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ablation {
-    /// Name, as of its folder.
+    /// Name, also of its folder.
     pub name: &'static str,
-    /// What is off.
+    /// Sources that are off.
     pub off: &'static [Variation],
 }
 

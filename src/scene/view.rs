@@ -1,4 +1,4 @@
-//! The part of a photo that a picture shows: zoom, shift and turn of plate and camera together.
+//! The part of a photo that a picture shows: zoom, shift and rotation of plate and camera together.
 
 use crate::camera::Camera;
 use crate::error::Result;
@@ -8,18 +8,18 @@ use crate::scene::bounds::{SHIFT, TURN, ZOOM};
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 
-/// Which part of the photo is seen; the default is all of it.
+/// The visible part of the photo; the default is all of it.
 ///
-/// What a photo does not show is never seen: a turn zooms in as far as it must.
+/// What is outside the photo is never visible: a rotation zooms in as far as necessary.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct View {
-    /// How many times larger everything is than in the whole photo, at least 1. Default: 1.
+    /// Magnification relative to the whole photo, at least 1. Default: 1.
     pub zoom: f64,
-    /// Where the part lies: -1 at the photo's left and upper edge, 1 at its right and lower one.
+    /// Position of the part: -1 at the photo's left and upper edge, 1 at its right and lower one.
     /// Default: 0, 0.
     pub shift: [f64; 2],
-    /// Turn of the camera about its axis, clockwise, degrees. Default: 0.
+    /// Rotation of the camera about its optical axis, clockwise, degrees. Default: 0.
     pub turn_deg: f64,
 }
 
@@ -39,10 +39,10 @@ impl View {
         *self == Self::default()
     }
 
-    /// The camera that sees this part, its picture as large as that of the photo's camera.
+    /// The camera that sees this part, with a picture as large as that of the photo's camera.
     ///
     /// # Method
-    /// Exact, for pixels of any shape: a turn about the optical axis, a longer focal length and
+    /// Exact, for pixels of any shape: a rotation about the optical axis, a longer focal length and
     /// another principal point.
     pub fn camera(&self, photo: &Camera) -> Camera {
         if self.is_whole() {
@@ -62,10 +62,10 @@ impl View {
         }
     }
 
-    /// The part of a plate that is seen, as large as the plate; `photo` is the camera of the whole
-    /// plate, of which `value` is known between pixels.
+    /// The visible part of a plate, as large as the plate; `photo` is the camera of the whole
+    /// plate, and `value` gives the plate between pixels.
     ///
-    /// A turn and a zoom about the principal point keep a radial distortion as it is.
+    /// A rotation and a zoom about the principal point leave a radial distortion unchanged.
     pub fn plate<P: Copy + Send + Sync>(
         &self,
         photo: &Camera,
@@ -80,18 +80,18 @@ impl View {
         })
     }
 
-    /// The photo's axes from the picture's.
+    /// Rotation from the picture's axes to the photo's.
     fn turn(&self) -> UnitQuaternion<f64> {
         UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.turn_deg.to_radians())
     }
 
-    /// The zoom with which all that is seen lies in the photo.
+    /// The zoom at which everything visible is inside the photo.
     pub(crate) fn zoom_used(&self, photo: &Camera) -> f64 {
         let reach = self.reach(photo).component_div(&half_size(photo));
         self.zoom.max(reach.max())
     }
 
-    /// Pixels from the middle of what is seen to its outermost points, without zoom.
+    /// Pixels from the middle of the visible part to its outermost points, without zoom.
     fn reach(&self, photo: &Camera) -> Vector2<f64> {
         let half = half_size(photo).component_div(&photo.focal_px);
         let turn = self.turn().to_rotation_matrix().matrix().abs();
@@ -99,7 +99,7 @@ impl View {
         turned.xy().component_mul(&photo.focal_px)
     }
 
-    /// The photo's pixel in the middle of what is seen.
+    /// The photo's pixel in the middle of the visible part.
     fn center(&self, photo: &Camera) -> Vector2<f64> {
         let half = half_size(photo);
         let room = half - self.reach(photo) / self.zoom_used(photo);
@@ -120,7 +120,7 @@ fn half_size(camera: &Camera) -> Vector2<f64> {
     Vector2::from(camera.image.map(f64::from)) / 2.0
 }
 
-/// What the view is drawn from.
+/// Ranges of the view.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ViewRanges {
@@ -130,7 +130,7 @@ pub struct ViewRanges {
     pub shift_x: Range,
     /// From the photo's upper edge (-1) to its lower one (1). Default: 0.
     pub shift_y: Range,
-    /// Degrees. Default: 0.
+    /// Rotation, degrees. Default: 0.
     pub turn_deg: Range,
 }
 
@@ -192,7 +192,7 @@ mod tests {
         view.plate(&photo(), |at| sample_bilinear_clamped(&plate, at.x, at.y))
     }
 
-    /// Columns and rows of the photo as its colours.
+    /// A plate whose colours are its columns and rows.
     fn plate() -> Image<LinearRgb> {
         Image::from_fn(160, 120, |x, y| {
             LinearRgb::new(x as f32 + 0.5, y as f32 + 0.5, 0.0)

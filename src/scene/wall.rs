@@ -6,11 +6,11 @@ use crate::geom::Vector3;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 
-/// Height of a wall of which only the presence is known, as a share of the surface's shorter side:
-/// a lip, at which what slides comes to rest.
+/// Height of a wall of unknown height, as a share of the surface's shorter side: a lip that stops
+/// sliding objects.
 const LIP_RATIO: f64 = 0.05;
 
-/// Walls along all edges of a surface. What goes over their rim is gone.
+/// Walls along all edges of a surface. An object that goes over their rim is gone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Wall {
@@ -22,7 +22,8 @@ pub struct Wall {
 }
 
 impl Wall {
-    /// A wall of which only some is known, along a surface of this size: without a height, a lip.
+    /// A wall along a surface of this size, possibly with unknown values: a missing height is that
+    /// of a lip, a missing slope is 0.
     pub fn new(size: [f64; 2], height: Option<f64>, slope_deg: Option<f64>) -> Self {
         Self {
             height: height.unwrap_or(LIP_RATIO * size[0].min(size[1])),
@@ -30,13 +31,13 @@ impl Wall {
         }
     }
 
-    /// How far outside the surface's edges the rim is, metres.
+    /// Distance of the rim outside the surface's edges, metres.
     pub fn outset(&self) -> f64 {
         self.height * libm::tan(self.slope_deg.to_radians())
     }
 
-    /// The inner sides of the four walls of a surface: each from its left lower corner, as seen
-    /// from the middle, clockwise.
+    /// The inner sides of the four walls of a surface: each from its lower left corner, clockwise
+    /// as seen from the middle.
     pub fn inner_faces(&self, size: [f64; 2]) -> [[Vector3<f64>; 4]; 4] {
         let (edge, out) = (size.map(|side| side / 2.0), self.outset());
         let rim = edge.map(|half| half + out);
@@ -58,7 +59,7 @@ fn rectangle_at(z: f64, [x, y]: [f64; 2]) -> [Vector3<f64>; 4] {
     [[-x, y], [x, y], [x, -y], [-x, -y]].map(|[x, y]| Vector3::new(x, y, z))
 }
 
-/// What the walls of a scene are drawn from, instead of what the background's label says.
+/// Ranges of a scene's walls, which override the background's label.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WallRanges {
@@ -72,7 +73,7 @@ pub struct WallRanges {
 }
 
 impl WallRanges {
-    /// Walls along a surface of this size whose label says `labelled`.
+    /// Walls along a surface of this size with the label `labelled`.
     pub(super) fn draw(&self, draws: &Draws, size: [f64; 2], labelled: Option<Wall>) -> Wall {
         let height = Range::draw_optional(self.height, draws, "walls.height");
         let slope_deg = Range::draw_optional(self.slope_deg, draws, "walls.slope_deg");
@@ -111,7 +112,7 @@ mod tests {
                 [face[0].z, face[1].z, face[2].z, face[3].z],
                 [0.0, 0.075, 0.075, 0.0]
             );
-            // Its first three corners turn clockwise as seen from the middle.
+            // Its first three corners run clockwise as seen from the middle.
             let turn = (face[1] - face[0]).cross(&(face[2] - face[1]));
             assert!(turn.dot(&normal) < 0.0);
         }

@@ -15,42 +15,44 @@ use crate::scene::{AreaLight, Card, EnvironmentMap, LightShape, Shot};
 use nalgebra::SMatrix;
 use std::path::Path;
 
-/// The script that renders the folder, written beside the scene.
+/// The script that renders the folder, written next to the scene.
 pub const SCRIPT: &str = "scene_reference.py";
-/// How often light may bounce in a shot with interreflection.
+/// Maximum number of bounces of light in a shot with interreflection.
 const MAX_BOUNCES: u32 = 4;
 
 const SCRIPT_TEXT: &str = include_str!("../../../golden/render/scene_reference.py");
-/// Samples of a pixel that the scene asks for: noise of about 1e-3.
+/// Samples per pixel that the scene requests: noise of about 1e-3.
 const SAMPLES_PER_PIXEL: u32 = 1024;
-/// Side of an endless surface for a program that needs a number, metres.
+/// Side of an infinite surface for a program that needs a number, metres.
 const ENDLESS_SIDE_M: f64 = 1000.0;
-/// Between these depths the camera sees, metres: all of what a scene may hold. To a ray tracer the
-/// range costs no precision: pictures differ by 1e-6 from those between 0.01 and 100.
+/// Clipping range of the camera, metres: everything that a scene may hold. The range costs a ray
+/// tracer no precision: pictures differ by 1e-6 from those between 0.01 and 100.
 const CLIP_M: [f64; 2] = [1e-6, 1e7];
 /// Side of the smallest picture that Blender renders, pixels.
 const LEAST_SIDE_PX: u32 = 4;
-/// Side of the smallest light, metres: of one of 1e-5 Cycles makes pixels of 200 in place of 0.6.
+/// Side of the smallest light, metres: with one of 1e-5, Cycles renders pixels of 200 instead of
+/// 0.6.
 const LEAST_LIGHT_M: f64 = 1e-4;
-/// The darkest surface that Cycles' shadow catcher tells from none; its bounces are 1e-5 bright.
+/// The darkest albedo that Cycles' shadow catcher distinguishes from zero; its bounces are 1e-5
+/// bright.
 const LEAST_ALBEDO: f32 = 1e-3;
-/// How far off the middle the script takes a principal point for the middle where a lens bends
-/// lines, pixels; and how far pixels that are not square may move the picture's side.
+/// Tolerance of the script, pixels, where a lens has distortion: how far a principal point may be
+/// from the centre, and how far non-square pixels may move the picture's side.
 const OFF_AXIS_PX: f64 = 0.05;
 
 /// Writes `scene.json`, its plate, textures and environment (float EXR), and the script that
 /// renders them in Blender.
 ///
-/// `size` is that of the labelled surface, metres. The picture that the script makes, `beauty.exr`,
-/// is the shot's frame: the exposure is multiplied into the lights.
+/// `size` is that of the labelled surface, metres. The script renders the shot's frame as
+/// `beauty.exr`: the exposure is multiplied into the lights.
 ///
-/// Cycles has nothing like a light map or a holdout mask: those are left out.
+/// Light maps and holdout masks are left out, since Cycles has nothing like them.
 ///
 /// # Errors
 /// [`Error::File`] for what cannot be written; [`Error::Value`] for ids beyond 65 535, which
-/// Blender does not have, pictures and lights that are too small for it, and for a k1 beside an
-/// aperture, a principal point off the middle or pixels that are not square, which Cycles' bent
-/// lenses do not have.
+/// Blender does not support, for pictures and lights that are too small for it, and for a k1
+/// combined with an aperture, an off-centre principal point or non-square pixels, which Cycles'
+/// lenses with distortion do not support.
 pub fn export(shot: &Shot, size: [f64; 2], folder: impl AsRef<Path>) -> Result<()> {
     check_image(shot.camera.image)?;
     check_lights(&shot.lights)?;
@@ -84,7 +86,7 @@ fn check_lights(lights: &[AreaLight]) -> Result<()> {
     }
 }
 
-/// What the script refuses.
+/// Fails on a lens that the script rejects.
 fn check_lens(shot: &Shot) -> Result<()> {
     if shot.k1 == 0.0 {
         return Ok(());
@@ -104,7 +106,7 @@ fn bent_lens(k1: f64, expected: &str) -> Error {
     Error::value("lens.k1", what)
 }
 
-/// How far the camera is from one with square pixels and the principal point in the middle, pixels.
+/// Deviation of the camera from one with square pixels and a centred principal point, pixels.
 fn off_axis_px(camera: &Camera) -> f64 {
     let [width, height] = camera.image.map(f64::from);
     let (focal, principal) = (camera.focal_px, camera.principal_px);
@@ -115,7 +117,7 @@ fn off_axis_px(camera: &Camera) -> f64 {
     shift_x.abs().max(shift_y.abs()).max(stretch)
 }
 
-/// What `scene.json` holds, its pictures written.
+/// The contents of `scene.json`; also writes its pictures.
 fn scene_file(shot: &Shot, size: [f64; 2], folder: &Path) -> Result<CyclesFile> {
     let cards = shot.cards.iter();
     let lights = shot.lights.iter();
@@ -208,7 +210,7 @@ fn write_card(folder: &Path, card: &Card) -> Result<CyclesQuad> {
     })
 }
 
-/// A card's id as Blender can have it.
+/// A card's id, if Blender supports it.
 fn checked_id(card: &Card) -> Result<u32> {
     let id = card.id.0;
     if (1..=u32::from(u16::MAX)).contains(&id) {
@@ -275,7 +277,7 @@ fn light_target(light: &AreaLight) -> [f64; 3] {
     }
 }
 
-/// One environment for the constant one and the picture.
+/// The environment with the constant one and the picture combined.
 fn write_environment(folder: &Path, shot: &Shot) -> Result<CyclesEnvironment> {
     let Some(map) = &shot.environment else {
         return Ok(CyclesEnvironment {

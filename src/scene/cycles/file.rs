@@ -1,4 +1,4 @@
-//! What stands in a scene file of the reference renderer; lengths in metres, matrices by rows.
+//! Contents of a scene file of the reference renderer; lengths in metres, matrices by rows.
 
 use crate::pixel::LinearRgb;
 use crate::scene::{Grade, LightShape};
@@ -39,7 +39,7 @@ pub(super) struct CyclesCamera {
     pub(super) t: [f64; 3],
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) resolution: Option<[u32; 2]>,
-    /// The least and the greatest depth that is seen.
+    /// The least and the greatest visible depth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) clip: Option<[f64; 2]>,
     /// OpenCV's first coefficient of radial distortion.
@@ -49,7 +49,7 @@ pub(super) struct CyclesCamera {
     pub(super) aperture: Option<CyclesAperture>,
 }
 
-/// Diameter of the aperture, and the depth that is in focus.
+/// Diameter of the aperture, and the depth in focus.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct CyclesAperture {
     pub(super) diameter: f64,
@@ -68,7 +68,7 @@ pub(super) struct CyclesTray {
 #[derive(Serialize, Deserialize)]
 pub(super) struct CyclesGround {
     pub(super) extent: [f64; 2],
-    /// Of light that bounces, where any does.
+    /// For interreflection, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) albedo: Option<f32>,
 }
@@ -78,8 +78,8 @@ pub(super) struct CyclesPicture {
     pub(super) path: String,
 }
 
-/// A card; `texture` is premultiplied, or what a film adds where there is `film`: its opacity per
-/// channel.
+/// A card; `texture` is premultiplied; with a `film`, which is its opacity per channel, `texture`
+/// is what the film adds.
 #[derive(Serialize, Deserialize)]
 pub(super) struct CyclesQuad {
     pub(super) id: u32,

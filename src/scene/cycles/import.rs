@@ -14,18 +14,17 @@ use crate::scene::{AreaLight, Card, EnvironmentMap, Shot, ThinLens};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-/// Extent of the plane that shadows fall on in a file that does not tell it, as a multiple of the
+/// Extent of the plane that receives shadows, if the file does not give it, as a multiple of the
 /// tray's sides: that of the reference renderer.
 const CATCHER_RATIO: f64 = 3.0;
 
-/// The shot that a scene file of the reference renderer describes, at the file's own size or
+/// Reads the shot that a scene file of the reference renderer describes, at the file's own size or
 /// another.
 ///
 /// Every quad has its pose, and its texture is a premultiplied scene-linear EXR. The plate is
 /// averaged over the pixels of the picture, as the script does.
 ///
-/// # Errors
-/// A file that cannot be read or misses a key; a picture that it names and that cannot be read.
+/// A file that cannot be read or lacks a key; a picture in it that cannot be read.
 pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
     let path = path.as_ref();
     let file: CyclesFile = io::read_json(path)?;
@@ -43,12 +42,12 @@ pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
     Ok(shot)
 }
 
-/// The pictures of a scene: they lie in its folder or, where scenes share them, in the folder
-/// beside it.
+/// The pictures of a scene: they are in its folder or, if several scenes share them, in a folder
+/// next to it.
 struct PictureFolder {
     /// The scene's file.
     scene: PathBuf,
-    /// The folder that holds the scene's own.
+    /// The parent of the scene's own folder.
     root: PathBuf,
     /// Name of the scene's folder in it.
     own: PathBuf,
@@ -66,7 +65,7 @@ impl PictureFolder {
         })
     }
 
-    /// The picture of a name: at most one step up.
+    /// Path of a named picture: at most one level up.
     fn find(&self, name: &str) -> Result<PathBuf> {
         let mut place = self.own.clone();
         for step in Path::new(name).components() {
@@ -164,7 +163,7 @@ fn catcher_size(file: &CyclesFile) -> [f64; 2] {
     }
 }
 
-/// What the surface sends back, where light bounces at all.
+/// Albedo of the surface for interreflection; black for none.
 fn bounced_albedo(file: &CyclesFile) -> LinearRgb {
     let ground = file.ground.as_ref().filter(|_| file.render.max_bounces > 0);
     let albedo = ground.and_then(|ground| ground.albedo);
@@ -215,8 +214,8 @@ fn area_light(light: &CyclesLight) -> AreaLight {
     }
 }
 
-/// Each pixel the mean over the part of the photo that it covers, whether that is more than one of
-/// its pixels or less.
+/// The photo resampled to this size: each pixel is the mean over the area of the photo that it
+/// covers, whether larger or smaller than one of the photo's pixels.
 fn averaged(photo: &Image<LinearRgb>, [width, height]: [u32; 2]) -> Image<LinearRgb> {
     let (width, height) = (width as usize, height as usize);
     if photo.size() == (width, height) {
@@ -229,7 +228,7 @@ fn averaged(photo: &Image<LinearRgb>, [width, height]: [u32; 2]) -> Image<Linear
     })
 }
 
-/// The mean over some columns and rows, each with its share.
+/// The weighted mean over some columns and rows.
 fn weighted_mean(
     photo: &Image<LinearRgb>,
     columns: &[(usize, f32)],

@@ -1,7 +1,7 @@
 //! Scene files of the reference renderer: any shot can be checked against Blender's Cycles.
 //!
 //! `export` writes a folder that `golden/render/scene_reference.py` renders; `import` reads such
-//! files, so that both programs render the same thing.
+//! files, so that both programs render the same scene.
 
 mod export;
 mod file;

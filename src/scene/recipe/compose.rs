@@ -1,4 +1,4 @@
-//! One scene of a recipe: what is drawn, in which order.
+//! Composes one scene of a recipe: what is drawn, in which order.
 
 use crate::color::Albedo;
 use crate::error::{Error, Result};
@@ -11,12 +11,12 @@ use crate::scene::{
 };
 use std::f64::consts::PI;
 
-/// Which scene of a dataset.
+/// Number of a scene in a dataset.
 #[derive(Clone, Copy)]
 pub(super) struct SceneNumber {
     pub(super) seed: u64,
     pub(super) k: u64,
-    /// All is drawn as for the first picture of its sequence.
+    /// Everything is drawn as for the first picture of its sequence.
     pub(super) place: SequencePlace,
 }
 
@@ -32,12 +32,12 @@ impl SceneNumber {
     }
 }
 
-/// The backgrounds that a scene may have.
+/// The backgrounds to choose from.
 #[derive(Clone, Copy)]
 pub(super) struct Places<'a> {
-    /// With objects.
+    /// For scenes with objects.
     pub(super) viewpoints: &'a [Background],
-    /// Without.
+    /// For scenes without.
     pub(super) negatives: &'a [Background],
 }
 
@@ -51,7 +51,7 @@ impl<'a> Places<'a> {
 }
 
 impl Recipe {
-    /// A scene of a recipe whose switches have been applied.
+    /// Composes a scene of a recipe whose switches have been applied.
     pub(super) fn compose(
         &self,
         number: SceneNumber,
@@ -94,7 +94,7 @@ impl Recipe {
         }
     }
 
-    /// The scene with these objects, its light drawn, at rest and as it was rendered.
+    /// A scene with these objects and its light drawn, not yet moved by a belt or post-processed.
     fn lit_scene(
         &self,
         draws: &Draws,
@@ -157,8 +157,8 @@ impl Recipe {
         self.surface_albedo.or(background.albedo)
     }
 
-    /// The recipe's, or that of the light where the surface's own colour is known and the recipe's
-    /// is the default.
+    /// The recipe's tint; if that is the default and the surface's own colour is known, the colour
+    /// of the light on it.
     fn cast(&self, background: &Background) -> LightTint {
         match (self.albedo_of(background), self.cast) {
             (Some(Albedo::Color(albedo)), LightTint::MatchSurface { share, .. }) => {
@@ -181,7 +181,7 @@ impl Recipe {
         }
     }
 
-    /// A bend about an axis of any direction; flat, and nothing drawn, where the range is 0.
+    /// A bend about an axis of random direction; flat, and nothing drawn, if the range is 0.
     fn draw_bend(&self, draws: &Draws, path: &str) -> Bend {
         if self.bend_deg.is_zero() {
             return Bend::default();
@@ -204,11 +204,11 @@ fn pick_background<'a>(draws: &Draws, backgrounds: &'a [Background]) -> Result<&
 }
 
 /// Radiance of the constant environment that gives `share` of the lights' irradiance at the
-/// surface's centre; `share` itself, white, when there is no light.
+/// surface's centre; `share` itself, white, if there is no light.
 ///
 /// # Method
 /// A disk of power P and radius r faces the centre from distance d and height h: its irradiance
-/// there is `P h / (pi d (d^2 + r^2))`, and that of a square of its area 1 % less at most. A
+/// there is `P h / (pi d (d^2 + r^2))`, and that of a square of the same area at most 1 % less. A
 /// constant environment of radiance L gives `pi L`.
 fn ambient_radiance(lights: &[AreaLight], share: f64) -> LinearRgb {
     if lights.is_empty() {
@@ -219,14 +219,14 @@ fn ambient_radiance(lights: &[AreaLight], share: f64) -> LinearRgb {
     })
 }
 
-/// Radiance all around that gives `share` of the irradiance of a light at the centre.
+/// Ambient radiance that gives `share` of the irradiance of a light at the centre.
 fn ambient_factor(light: &AreaLight, share: f64) -> f64 {
     let [x, y, h] = light.position;
     let d2 = x * x + y * y + h * h;
     share * light.power * h / (PI * PI * d2.sqrt() * (d2 + squared_radius(light)))
 }
 
-/// That of a disk of the light's area, square metres.
+/// Squared radius of a disk of the light's area, square metres.
 fn squared_radius(light: &AreaLight) -> f64 {
     let [a, b] = light.size;
     match light.shape {

@@ -25,100 +25,99 @@ use serde::{Deserialize, Serialize};
 
 const OBJECT_COUNT: Bounds = Bounds::new(0.0, MAX_OBJECTS as f64, "what comes to rest in a heap");
 
-/// What scenes are drawn from; every [`Range`] is a uniform distribution named by its path in this
-/// document.
+/// Distributions that scenes are drawn from; every [`Range`] is a uniform distribution named by its
+/// path in this document.
 ///
-/// Every field has a default, so a file only holds what differs from it.
+/// Every field has a default, so a file only needs the values that differ.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Recipe {
     /// Width and height of the pictures, pixels. Default: `[640, 480]`.
     pub image: [u32; 2],
-    /// Sources of variation that are switched off; all other draws stay as they are. Default:
-    /// none.
+    /// Sources of variation that are switched off; all other draws stay the same. Default: none.
     pub off: Vec<Variation>,
     /// Labelled backgrounds that objects fall on, each a viewpoint: all, or the first ones.
     /// Default: `"all"`.
     pub viewpoints: Take,
-    /// Which part of the photo is shown. Default: all of it.
+    /// The visible part of the photo. Default: all of it.
     pub view: ViewRanges,
     /// Lens of the camera. Default: that of the photo, in focus everywhere.
     pub lens: LensRanges,
-    /// Photos of each asset that are used: all, or the first ones. Default: `"all"`.
+    /// Photos used of each asset: all, or the first ones. Default: `"all"`.
     pub photos: Take,
-    /// Objects in a scene. Default: `[4, 12]`.
+    /// Number of objects in a scene. Default: `[4, 12]`.
     pub objects: Count,
-    /// Distractors in a scene: assets of that role fall among the objects, hide them and cast
-    /// shadows, but have no label. Default: 0.
+    /// Number of distractors in a scene: assets of that role fall among the objects, hide them and
+    /// cast shadows, but have no label. Default: 0.
     #[serde(skip_serializing_if = "Count::is_zero")]
     pub distractors: Count,
-    /// No asset is twice in a scene: more objects (or distractors) than there are assets are an
-    /// error. Default: false, assets come again once all are in the scene.
+    /// Whether an asset occurs at most once in a scene: more objects (or distractors) than assets
+    /// are then an error. Default: false, assets repeat once all are in the scene.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub at_most_once: bool,
-    /// Share of the scenes that stay empty, without distractors too: pictures of the place alone, 0
-    /// to 1; they come from all backgrounds, whatever `viewpoints` says. Default: 0.
+    /// Share of scenes without any object or distractor, 0 to 1; they use all backgrounds, whatever
+    /// `viewpoints` says. Default: 0.
     pub negatives: f64,
-    /// How many different choices of objects there are. Default: `"unique"`, a new one for every
-    /// scene.
+    /// Number of different selections of objects. Default: `"unique"`, a new one for every scene.
     pub selections: Selections,
-    /// Factor on an object's size and thickness, its mass following. Default: `[0.9, 1.1]`.
+    /// Factor on an object's size and thickness; the mass follows. Default: `[0.9, 1.1]`.
     pub scale: Range,
-    /// How objects start.
+    /// Positions and rotations in which objects start.
     pub start: DropRanges,
     /// Change of an object's colours.
     pub grade: GradeRanges,
-    /// Degrees that an object's card is curved by from one end to the other, about an axis of any
-    /// direction in it; above 0 its ends are nearer to whoever looks at its front. Default: 0.
+    /// Bend of an object's card about a random axis in it, degrees from end to end; if positive,
+    /// its ends are nearer to a viewer of its front. Default: 0.
     pub bend_deg: Range,
-    /// Treatments of the edges of cut-outs, one of them for each picture. Default: none, they are
-    /// left as they are.
+    /// Edge treatments of cut-outs, one drawn for each picture. Default: none, edges stay as they
+    /// are.
     pub edges: Vec<EdgeTreatment>,
-    /// Lights; `lights = []` makes scenes without shadows. Default: one.
+    /// Lights; `lights = []` gives scenes without shadows. Default: one.
     pub lights: Vec<LightRanges>,
-    /// Irradiance of the constant environment on the surface, as a share of what the lights give
-    /// at its centre; the radiance itself when there is no light. Default: `[0.3, 0.8]`.
+    /// Irradiance of the constant environment on the surface, as a share of what the lights give at
+    /// its centre; without lights, its radiance. Default: `[0.3, 0.8]`.
     pub ambient: Range,
-    /// Light from a picture of the surroundings, on top of `ambient`.
+    /// Light from an environment map, in addition to `ambient`.
     pub environment: EnvironmentRanges,
-    /// Brighter or darker than the plate, EV. Default: `[-0.3, 0.3]`.
+    /// Brightness of the objects relative to the plate, EV. Default: `[-0.3, 0.3]`.
     pub gain_ev: Range,
     /// Coefficient of friction in a scene, [`Surface::friction`]. Default: 0.5.
     pub friction: Range,
-    /// Share of the speed that a bounce gives back, [`Surface::restitution`]. Default: 0.
+    /// Coefficient of restitution, [`Surface::restitution`]. Default: 0.
     pub restitution: Range,
-    /// Walls on the edges of the surface. Default: what the background's label says; without a
-    /// word of it, invisible ones that nothing gets over.
+    /// Walls on the edges of the surface. Default: those of the background's label or, if it
+    /// mentions none, invisible ones that nothing gets over.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub walls: Option<WallRanges>,
-    /// What falls in place of a cut-out. Default: `box`.
+    /// Collision shape of a cut-out. Default: `box`.
     pub collider: Collider,
-    /// Share of light that the surface reflects, where it is known: the exposure is then matched
-    /// to the surface instead of the plate's white; and the light's colour, where the surface's is known. Default: what the background's label says.
+    /// Albedo of the surface, if known: the exposure is then matched to the surface instead of the
+    /// plate's white, and so is the light's colour if the surface's colour is known. Default: that
+    /// of the background's label.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface_albedo: Option<Albedo>,
-    /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's.
-    /// Where the surface's own colour is known, white stands for all of it; light stays white with
-    /// `{ match_surface = { share = 0 } }`. Default: white.
+    /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's. If
+    /// the surface's own colour is known, white stands for all of it;
+    /// `{ match_surface = { share = 0 } }` keeps the light white. Default: white.
     pub cast: LightTint,
-    /// Where the first light stands: `match_walls` finds it by which walls of the surface the photo
-    /// shows bright, within the error of that, `match_walls_exactly` as if it had none. Default:
-    /// `drawn`.
+    /// Position of the first light: `match_walls` estimates it from which walls of the surface are
+    /// bright in the photo, within the error of the estimate; `match_walls_exactly` leaves out the
+    /// error. Default: `drawn`.
     #[serde(skip_serializing_if = "LightDirectionSource::is_drawn")]
     pub light_direction: LightDirectionSource,
-    /// How the light is spread over the surface: `{ match_surface = { share = 1 } }` takes the
-    /// gradients that the plate shows. Default: evenly.
+    /// Distribution of the light over the surface: `{ match_surface = { share = 1 } }` takes the
+    /// gradients of the plate. Default: even.
     #[serde(skip_serializing_if = "LightMap::is_even")]
     pub light_map: LightMap,
-    /// Light that goes to and fro between the surface and the objects over it: share of the
-    /// surface's albedo; where that is not known, the albedo itself. Default: 0, none.
+    /// Interreflection between the surface and the objects above it: a share of the surface's
+    /// albedo, or the albedo itself if that is unknown. Default: 0, none.
     #[serde(skip_serializing_if = "Range::is_zero")]
     pub interreflection: Range,
     /// A belt that carries the objects past the camera, in sequences of pictures. Default: none,
-    /// every picture is a scene of its own.
+    /// every picture is an independent scene.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub belt: Option<BeltRanges>,
-    /// What happens to the finished frame. Default: nothing.
+    /// Post-processing of the finished frame. Default: none.
     pub finish: PostProcessRanges,
     /// How objects come to rest.
     pub settle: SettleOptions,
@@ -168,7 +167,7 @@ impl Recipe {
     /// (both in their order).
     ///
     /// Objects are dropped: they start in a stack over the surface, without overlap, within its
-    /// walls. The camera and the exposure are left for the stages that know the photo.
+    /// walls. The camera and the exposure are left to the stages that know the photo.
     ///
     /// # Method
     /// Every number is drawn by its own path ([`Draws`](crate::scene::Draws)), so that one more
@@ -176,8 +175,8 @@ impl Recipe {
     /// until the catalog is used up, then again from all of it; distractors likewise from theirs.
     ///
     /// # Errors
-    /// An impossible range; no background; an empty catalog while there should be objects; a card
-    /// that fits the surface in no direction.
+    /// An invalid range; no background; an empty catalog although there should be objects; a card
+    /// that does not fit the surface in any direction.
     pub fn scene(
         &self,
         seed: u64,
@@ -189,7 +188,7 @@ impl Recipe {
             .map(|(scene, _)| scene)
     }
 
-    /// Scene `k` and every draw that it was made with, in order.
+    /// Scene `k` and every draw that it is made from, in order.
     ///
     /// # Errors
     /// As [`scene`](Self::scene).
@@ -216,7 +215,8 @@ impl Recipe {
         Ok((scene, log.into_draws()))
     }
 
-    /// Where picture `k` is in its sequence; without a belt each is one of its own.
+    /// The place of picture `k` in its sequence; without a belt each picture is a sequence of its
+    /// own.
     pub(crate) fn place_in_sequence(&self, k: u64) -> SequencePlace {
         let alone = SequencePlace {
             sequence: k,
@@ -226,7 +226,7 @@ impl Recipe {
         self.belt.map_or(alone, |belt| belt.place_of(k))
     }
 
-    /// The backgrounds of scenes that stay empty: all, unless it is they that are switched off.
+    /// The backgrounds of scenes without objects: all, or only the first without that variation.
     fn places_of_negatives<'a>(&self, backgrounds: &'a [Background]) -> &'a [Background] {
         let take = match self.off.contains(&Variation::Viewpoint) {
             true => Take::First(1),
@@ -235,10 +235,10 @@ impl Recipe {
         take.slice_of(backgrounds)
     }
 
-    /// Fails on the first asset that at its largest fits between the walls of some background in no
-    /// direction, on a lens that folds the pictures of some background over, and where there are no
-    /// assets, or with [`at_most_once`](Self::at_most_once) too few: a scene like that would be
-    /// refused, however late it comes.
+    /// Fails on the first asset whose largest size does not fit between the walls of some
+    /// background in any direction, on a lens that folds over the pictures of some background, and
+    /// if there are no assets or, with [`at_most_once`](Self::at_most_once), too few: such a scene
+    /// would be rejected, however late it comes.
     pub fn check_room(&self, backgrounds: &[Background], catalog: &[AssetVariant]) -> Result<()> {
         let recipe = self.narrowed();
         recipe.check_selections(catalog)?;
@@ -262,8 +262,8 @@ impl Recipe {
             .try_for_each(|background| self.lens.check_folds(background))
     }
 
-    /// Fails if a photo of an asset at its largest fits between the walls of a background in no
-    /// direction.
+    /// Fails if a photo of an asset at its largest size does not fit between the walls of a
+    /// background in any direction.
     fn check_fit(&self, background: &Background, variant: &AssetVariant) -> Result<()> {
         let sizes = self.photos.slice_of(&variant.photo_sizes).iter();
         let mut largest = sizes.map(|size| size.map(|side| side * self.scale.max));

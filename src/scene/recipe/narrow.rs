@@ -4,7 +4,7 @@ use crate::scene::{
     EnvironmentRanges, GradeRanges, LightRanges, Recipe, Selections, Take, Variation, ViewRanges,
 };
 
-/// Selections of objects where they repeat (the paper's 50).
+/// Number of selections where they repeat (the paper's 50).
 const REPEATED_SELECTIONS: u64 = 50;
 
 impl Recipe {
@@ -41,7 +41,7 @@ impl Recipe {
         }
     }
 
-    /// Light as it is at the middle of all ranges.
+    /// The recipe with its light at the middle of all ranges.
     fn with_still_light(self) -> Self {
         Self {
             lights: self.lights.iter().map(LightRanges::at_middle).collect(),
@@ -55,7 +55,7 @@ impl Recipe {
 }
 
 impl EnvironmentRanges {
-    /// The first picture, not turned at random.
+    /// The first picture, without random rotation.
     fn at_middle(&self) -> Self {
         Self {
             files: self.files.first().cloned().into_iter().collect(),
@@ -92,7 +92,7 @@ mod tests {
             .unwrap()
     }
 
-    /// The scene with everything that a source decides set to the same.
+    /// The scene with everything that a source varies set to the same values.
     fn apart_from(source: Variation, mut scene: Scene) -> Scene {
         match source {
             Variation::Colour => scene
@@ -121,7 +121,7 @@ mod tests {
         for source in Variation::ALL {
             let off = scenes(&[source]);
             assert_ne!(off, all, "{source:?} changes nothing");
-            // Choices of objects are the same in the first 50 scenes, where none repeats yet.
+            // Selections are the same in the first 50 scenes, where none repeats yet.
             for (a, b) in all.iter().zip(&off).take(REPEATED_SELECTIONS as usize) {
                 assert_eq!(
                     apart_from(source, a.clone()),
@@ -167,7 +167,7 @@ mod tests {
     fn light_that_is_off_stays_at_the_middle_of_every_range_that_it_has() {
         let warm = LightRanges {
             temperature_k: Some(Range::new(2500.0, 6500.0)),
-            // The share of ambient light is that of what a lamp of its size gives.
+            // The share of ambient light is relative to that of a lamp of its size.
             size: Range::new(0.3, 0.3),
             ..LightRanges::default()
         };

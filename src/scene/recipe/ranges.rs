@@ -14,16 +14,16 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GradeRanges {
-    /// Degrees. Default: `[-20, 20]`.
+    /// Hue shift, degrees. Default: `[-20, 20]`.
     pub hue_deg: Range,
     /// Factor. Default: `[0.8, 1.2]`.
     pub saturation: Range,
     /// Factor. Default: `[0.8, 1.2]`.
     pub value: Range,
-    /// Colours of see-through plastic to choose from in place of a turn of the hue; they are dyes
-    /// on top of the plastic's own colour. Default: none.
+    /// Colours of see-through plastic to choose from instead of a hue shift; they are dyes on top
+    /// of the plastic's own colour. Default: none.
     pub palette: Vec<PaletteEntry>,
-    /// Factor on the glints of the studio's light. Default: 1.
+    /// Factor on glints, which come from the studio's light. Default: 1.
     pub glints: Range,
 }
 
@@ -31,7 +31,7 @@ pub struct GradeRanges {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LightRanges {
-    /// Outline. Default: `ellipse`.
+    /// Shape. Default: `ellipse`.
     pub shape: LightShape,
     /// Height over the surface, metres. Default: `[0.8, 1.6]`.
     pub height: Range,
@@ -41,7 +41,7 @@ pub struct LightRanges {
     pub azimuth_deg: Range,
     /// Side length or diameter, metres: softness. Default: `[0.05, 0.6]`.
     pub size: Range,
-    /// Power, watts; it cancels out when one light is matched to the plate. Default: `10`.
+    /// Power, watts; it cancels out if a single light is matched to the plate. Default: `10`.
     pub power: Range,
     /// Red, green and blue, scene-linear. Default: `[1, 1, 1]`.
     pub color: [Range; 3],
@@ -79,7 +79,7 @@ impl Default for LightRanges {
 }
 
 impl GradeRanges {
-    /// Colours as they are in the photo.
+    /// Colours as in the photo.
     pub const UNCHANGED: Self = Self {
         hue_deg: Range::fixed(0.0),
         saturation: Range::fixed(1.0),
@@ -88,7 +88,7 @@ impl GradeRanges {
         glints: Range::fixed(1.0),
     };
 
-    /// The change of an object at a path.
+    /// The colour change of an object at a path.
     pub(super) fn draw(&self, draws: &Draws, path: &str) -> Grade {
         Grade {
             hue_deg: self.draw_hue(draws, path) as f32,
@@ -99,7 +99,7 @@ impl GradeRanges {
         }
     }
 
-    /// Degrees; none where there is a palette.
+    /// Hue shift, degrees; none if there is a palette.
     fn draw_hue(&self, draws: &Draws, path: &str) -> f64 {
         if self.palette.is_empty() {
             self.hue_deg.draw_field(draws, path, "hue_deg")

@@ -7,29 +7,31 @@ use crate::scene::belt::SequencePlace;
 use crate::scene::{AssetVariant, Count, DrawLog, Draws, DropRanges, Grade, Object, Recipe, Take};
 use serde::{Deserialize, Serialize};
 
-/// What falls in place of a cut-out, as thick as the asset.
+/// Collision shape of a cut-out, as thick as the asset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Collider {
     /// A box around the whole card.
     #[default]
     Box,
-    /// A convex prism of the object's hull: cards come to lie closer, at some cost in time.
+    /// A convex prism of the object's hull: cards come to rest closer to each other, at some cost
+    /// in time.
     Hull,
 }
 
-/// How many different choices of objects there are; in files `"unique"` or a number above 0.
+/// Number of different selections of objects; in files `"unique"` or a number above 0.
 ///
-/// A choice is the number of objects and the asset and photo of each; size, colour and start are
+/// A selection is the number of objects and the asset and photo of each; size, colour and start are
 /// drawn for every scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "SelectionsInFile", into = "SelectionsInFile")]
 pub enum Selections {
-    /// A new choice for every scene.
+    /// A new selection for every scene.
     #[default]
     Unique,
-    /// This many; scene `k`, on a belt sequence `k`, has choice `k + k / n` modulo this `n`: each round
-    /// begins with another one, so that a split that takes every fifth scene takes all of them.
+    /// This many; scene `k` (with a belt, sequence `k`) has selection `k + k / n` modulo this `n`:
+    /// each round begins with another one, so that a split that takes every fifth scene gets all of
+    /// them.
     Count(u64),
 }
 
@@ -65,7 +67,7 @@ impl From<Selections> for SelectionsInFile {
 }
 
 impl Selections {
-    /// The selection that a sequence has, which without a belt is a scene.
+    /// The selection of a sequence, which without a belt is a single scene.
     fn index_for(self, place: SequencePlace) -> Result<u64> {
         match self {
             Self::Unique => Ok(place.first),
@@ -75,13 +77,13 @@ impl Selections {
     }
 }
 
-/// What is chosen from one part of the catalog: objects, or distractors.
+/// What is selected from one part of the catalog: objects, or distractors.
 pub(super) struct Choice<'a> {
     role: Role,
     count: &'a Count,
     /// Path of the count in the recipe.
     pub(super) at: &'static str,
-    /// Path of each choice, before its number.
+    /// Path prefix of each choice, without its number.
     path: &'static str,
 }
 
@@ -136,7 +138,7 @@ impl Recipe {
             .collect()
     }
 
-    /// Fails where more may be asked for than there are assets, and none may be there twice.
+    /// Fails if more objects may be requested than there are assets, and none may occur twice.
     pub(super) fn check_selections(&self, catalog: &[AssetVariant]) -> Result<()> {
         for role in [Role::Object, Role::Distractor] {
             let choice = self.choice_of(role);
@@ -154,20 +156,20 @@ impl Recipe {
         }
     }
 
-    /// Whether pictures can hold assets of a role.
+    /// Whether pictures can contain assets of a role.
     pub(super) fn draws_from(&self, role: Role) -> bool {
         !self.choice_of(role).count.is_zero()
     }
 }
 
 impl Choice<'_> {
-    /// The part of a catalog that it chooses from.
+    /// The part of a catalog that it selects from.
     fn part_of<'a>(&self, catalog: &'a [AssetVariant]) -> Vec<&'a AssetVariant> {
         let part = catalog.iter().filter(|variant| variant.role == self.role);
         part.collect()
     }
 
-    /// Fails on an empty part while there should be something of it.
+    /// Fails on an empty part although objects are requested from it.
     fn check_part(&self, count: usize, assets: usize) -> Result<()> {
         if count == 0 || assets > 0 {
             return Ok(());
@@ -182,7 +184,7 @@ impl Choice<'_> {
         ))
     }
 
-    /// Fails where something would have to be there twice.
+    /// Fails if an asset would have to occur twice.
     fn check_once(&self, count: usize, assets: usize) -> Result<()> {
         if count <= assets {
             return Ok(());
@@ -196,7 +198,7 @@ impl Choice<'_> {
     }
 }
 
-/// One of a part of the catalog whose place is still `left`; all of them are once none is.
+/// Draws an asset that is still in `left`; once none is, all of them are again.
 fn draw_without_repetition<'a>(
     draws: &Draws,
     path: &str,
@@ -210,7 +212,7 @@ fn draw_without_repetition<'a>(
 }
 
 impl AssetVariant {
-    /// An object with one of the asset's photos, not placed yet.
+    /// An object with one of the asset's photos, not yet placed.
     fn draw_object(
         &self,
         draws: &Draws,
@@ -246,7 +248,7 @@ impl AssetVariant {
         Err(Error::value(at, "no photo, expected at least one"))
     }
 
-    /// Corners of the prism that falls; none where a box does.
+    /// Corners of the falling prism; none if a box falls.
     fn collider_outline(&self, photo: usize, collider: Collider) -> Vec<[f64; 2]> {
         match collider {
             Collider::Box => Vec::new(),

@@ -53,7 +53,7 @@ fn scene(recipe: &Recipe, k: u64) -> Scene {
         .unwrap()
 }
 
-/// The same with caps that are distractors among the bottles.
+/// The same with caps as distractors among the bottles.
 fn catalog_with_caps() -> Vec<AssetVariant> {
     let caps = (0..3).map(|i| AssetVariant {
         asset: format!("cap{i}"),
@@ -84,7 +84,7 @@ fn start_height(object: &Object) -> f64 {
     }
 }
 
-/// The object without its place in the stack.
+/// The object without its height in the stack.
 fn apart_from_height(object: &Object) -> Object {
     let mut object = object.clone();
     if let Placement::Drop { height, .. } = &mut object.placement {
@@ -155,7 +155,7 @@ fn distractors_that_no_asset_is_are_told() {
         told.to_string(),
         "distractors: 2 requested, but no asset has the role \"distractor\""
     );
-    // And before the first picture, however seldom they are drawn.
+    // And before the first picture, however rarely they are drawn.
     let seldom = Recipe {
         distractors: Range::new(0.0, 1.0).into(),
         ..Recipe::default()
@@ -165,7 +165,7 @@ fn distractors_that_no_asset_is_are_told() {
         told.to_string().starts_with("distractors: 1 asked for"),
         "{told}"
     );
-    // What is never drawn may be as large as it likes.
+    // An asset that is never drawn may have any size.
     let mut huge = catalog_with_caps();
     huge[0].photo_sizes = vec![[3.0, 3.0]];
     assert!(Recipe::default().check_room(&[tray("a")], &huge).is_ok());
@@ -186,7 +186,7 @@ fn negatives_come_from_all_backgrounds_whatever_the_viewpoints() {
     // Binomial, about 100 draws: 50 +- 5.
     let on_second = empty.iter().filter(|s| s.plate == "b").count();
     assert!(on_second.abs_diff(empty.len() / 2) < 25, "{on_second}");
-    // But for the ablation, which is of nothing else.
+    // Except in the ablation, where negatives use only the first background, too.
     let off = Recipe {
         off: vec![Variation::Viewpoint],
         ..recipe
@@ -239,7 +239,7 @@ fn at_most_once_is_an_error_where_there_are_too_few_assets() {
     assert_eq!(drawn.to_string(), expected);
     let few = once(Range::new(4.0, 10.0));
     assert!(few.check_room(&[tray("a")], &catalog(10)).is_ok());
-    // What is not there twice anyhow stays as it is.
+    // Scenes without repeated assets are unchanged.
     let usual = Recipe {
         at_most_once: false,
         ..few.clone()
@@ -704,7 +704,7 @@ fn labelled_walls_are_those_of_the_scene() {
     assert_eq!(scene.unwrap().surface.wall, Some(wall));
 }
 
-/// A recipe with everything that is made of a photo beyond its cut-out.
+/// A recipe that uses everything derived from a photo beyond its cut-out.
 fn retouching() -> Recipe {
     let text = "bend_deg = [-20, 20]\nedges = ['as_is', 'soft', 'eroded', 'poisson']\n\
                 [grade]\nhue_deg = 0\nglints = [0.2, 0.9]\npalette = ['clear', 'light_blue', 'green', 'brown']";
