@@ -1,4 +1,4 @@
-//! Rectangles of pixels, which a picture is rendered in.
+//! Rectangles of pixels, in which a picture is rendered.
 
 use crate::geom::Vector3;
 use crate::render::ranges::ranges_meet;
@@ -14,19 +14,19 @@ pub(super) struct PixelBlock {
 }
 
 impl PixelBlock {
-    /// A picture cut into squares of a side, row by row; smaller ones at its ends.
+    /// Cuts a picture into square tiles, row by row; those at its ends are smaller.
     pub(super) fn tiles_of(width: usize, height: usize, side: usize) -> Vec<Self> {
         pieces_of(height, side)
             .flat_map(|y| pieces_of(width, side).map(move |x| Self { x, y: y.clone() }))
             .collect()
     }
 
-    /// They have a pixel in common.
+    /// Whether they have a pixel in common.
     pub(super) fn meets(&self, other: &Self) -> bool {
         ranges_meet(&self.x, &other.x) && ranges_meet(&self.y, &other.y)
     }
 
-    /// All its pixels are the other's, too.
+    /// Whether all its pixels are also the other's.
     pub(super) fn is_within(&self, other: &Self) -> bool {
         let within = |own: &Range<usize>, other: &Range<usize>| {
             other.start <= own.start && own.end <= other.end
@@ -34,7 +34,7 @@ impl PixelBlock {
         within(&self.x, &other.x) && within(&self.y, &other.y)
     }
 
-    /// Number of one of its pixels, row by row.
+    /// Index of one of its pixels, row by row.
     #[inline(always)]
     pub(super) fn number_of(&self, x: usize, y: usize) -> usize {
         (y - self.y.start) * self.x.len() + x - self.x.start
@@ -53,7 +53,7 @@ impl PixelBlock {
             .map(|[x, y]| Vector3::new(x, y, 1.0))
     }
 
-    /// Its own four corners, where its pixels end.
+    /// Its own four corners, at the outer edges of its pixels.
     pub(super) fn ends(&self) -> [[f64; 2]; 4] {
         let [left, right] = [self.x.start, self.x.end].map(|x| x as f64);
         let [top, bottom] = [self.y.start, self.y.end].map(|y| y as f64);

@@ -1,4 +1,4 @@
-//! What a card shows at a place, read from its texture at full size.
+//! A card's texture read at full resolution.
 
 use crate::asset::Texture;
 use crate::filter::sample_bilinear;
@@ -8,7 +8,7 @@ use crate::render::grade::shifted_opacity;
 use crate::render::view::ScenePlane;
 use crate::scene::Card;
 
-/// What a card shows seen from a point: full detail, nothing outside of its texture.
+/// Reads a card as seen from a point: at full detail, transparent outside its texture.
 pub(super) fn card_texel(
     card: &Card,
     plane: &ScenePlane,

@@ -1,20 +1,21 @@
-//! What the renderer requires of a shot, checked once.
+//! Validation of a shot, once.
 
 use crate::asset::Texture;
 use crate::error::{Error, Result};
 use crate::pixel::Film;
 use crate::scene::{AreaLight, Card, EnvironmentMap, Shot};
 
-/// Is a shot something that can be rendered?
+/// Checks that a shot can be rendered.
 ///
-/// Reads every texel, so ask once per shot that comes from outside, not once per frame.
-/// [`render`](super::render) itself neither asks nor panics: a NaN in a texture then becomes a NaN
-/// in the picture. Cards that are edge-on, behind the eye or without area are fine; they are not
-/// seen.
+/// Reads every texel, so call it once per shot from an untrusted source, not once per frame.
+/// [`render`](super::render) itself neither checks nor panics: a NaN in a texture becomes a NaN in
+/// the picture. Cards that are edge-on, behind the eye or without area are valid and simply not
+/// visible.
 ///
 /// # Errors
 /// [`Error::Value`] that names the card: a texel that is NaN or infinite, an alpha outside 0..1,
-/// the id 0 or one used twice; a plate of another size; a light or an exposure that is not finite.
+/// the id 0 or a duplicate id; a plate of the wrong size; a light or an exposure that is not
+/// finite.
 pub fn check(shot: &Shot) -> Result<()> {
     check_plate(shot)?;
     check_lights(&shot.lights)?;
@@ -54,7 +55,7 @@ fn is_finite(light: &AreaLight) -> bool {
     numbers.all(f64::is_finite) && light.color.is_finite()
 }
 
-/// The environment, constant or a map, and the exposure.
+/// Checks the environment, constant or a map, and the exposure.
 fn check_sky(shot: &Shot) -> Result<()> {
     shot.environment.iter().try_for_each(check_map)?;
     require(

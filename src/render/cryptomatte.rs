@@ -1,12 +1,12 @@
-//! Cryptomatte: which objects are in a pixel, and how much of each is seen, in channels of floats.
+//! Cryptomatte: the objects in each pixel and their visible coverage, in float channels.
 
 use crate::deep::{DeepImage, DeepSample};
 use crate::pixel::ObjectId;
 
-/// Sets of four channels, two ranks each: the six ranks that most programs write.
+/// Sets of four channels, two ranks each: the usual six ranks.
 const CHANNEL_SETS: usize = 3;
 
-/// Channels of a set: id and coverage of the one rank, then of the next.
+/// Channels of a set: id and coverage of one rank, then of the next.
 const SET_CHANNELS: [&str; 4] = ["R", "G", "B", "A"];
 
 /// Characters of the layer's key in its attributes.
@@ -16,25 +16,26 @@ const KEY_DIGITS: usize = 7;
 ///
 /// # Method
 /// [Friedman and Jones, "Cryptomatte Specification" 1.2.0 (2019)][specification]: an object's id is
-/// the MurmurHash3 of its name, made a float that is neither a NaN nor subnormal; a pixel's objects
-/// are ranked by coverage, two ranks to a set of four channels; text attributes name the layer, the
-/// hash and the objects. Readers need the floats exactly: no half, and no compression with loss.
+/// the MurmurHash3 of its name, converted to a float that is neither a NaN nor subnormal; a pixel's
+/// objects are ranked by coverage, two ranks per set of four channels; text attributes name the
+/// layer, the hash and the objects. Readers need the exact floats: neither half floats nor lossy
+/// compression.
 ///
 /// [specification]: https://github.com/Psyop/Cryptomatte
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cryptomatte {
     /// Names and samples, row by row: `CryptoObject00.R`, ...
     pub channels: Vec<(String, Vec<f32>)>,
-    /// Names and texts of attributes: `cryptomatte/3ae39a5/name`, ...
+    /// Names and values of text attributes: `cryptomatte/3ae39a5/name`, ...
     pub metadata: Vec<(String, String)>,
 }
 
 impl Cryptomatte {
-    /// The layer of the objects in a picture; `names` holds their names, and objects without one
+    /// The layer of the objects in a picture; `names` maps ids to names, and objects without one
     /// are left out.
     ///
-    /// Coverage is what is seen of an object. Where more than six objects share a pixel, those with
-    /// least are left out.
+    /// Coverage is the visible part of an object. If more than six objects share a pixel, those
+    /// with the least coverage are left out.
     pub fn new(deep: &DeepImage, layer: &str, names: &[(ObjectId, String)]) -> Self {
         let ids: Vec<_> = names
             .iter()
@@ -66,8 +67,8 @@ fn rank_planes(deep: &DeepImage, ids: &[(ObjectId, f32)]) -> Vec<Vec<f32>> {
     planes
 }
 
-/// Ids and visible coverage of a pixel's objects, each once, the most visible first; as many as
-/// there are ranks.
+/// Ids and visible coverage of a pixel's objects, each once, the most visible first, up to the
+/// number of ranks.
 fn ranked_objects(
     samples: &[DeepSample],
     ids: &[(ObjectId, f32)],
@@ -83,7 +84,7 @@ fn ranked_objects(
             None => ranks.push((id, s.visible)),
         }
     }
-    // By id where coverage is the same, so that nothing depends on depth.
+    // By id for equal coverage, so that nothing depends on depth.
     ranks.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
     ranks.resize(count, (0.0, 0.0));
     ranks
@@ -114,19 +115,19 @@ fn manifest_text(names: &[(ObjectId, String)]) -> String {
     serde_json::Value::Object(ids.collect()).to_string()
 }
 
-/// Name of a layer's attribute, which has the layer's key in it.
+/// Name of a layer's attribute, which contains the layer's key.
 fn attribute_name(layer: &str, what: &str) -> String {
     let hash = format!("{:08x}", murmur3(layer.as_bytes()));
     format!("cryptomatte/{}/{what}", &hash[..KEY_DIGITS])
 }
 
-/// The id of a name as the manifest has it.
+/// The id of a name as in the manifest.
 fn hex_id(name: &str) -> String {
     format!("{:08x}", id_of_name(name).to_bits())
 }
 
-/// The id of a name: its hash as a float, the exponent moved away from those of zero, subnormals,
-/// infinity and NaN.
+/// The id of a name: its hash as a float, with an exponent that avoids zero, subnormals, infinity
+/// and NaN.
 fn id_of_name(name: &str) -> f32 {
     const MANTISSA: u32 = (1 << 23) - 1;
     const SIGN: u32 = 1 << 31;
@@ -135,7 +136,7 @@ fn id_of_name(name: &str) -> f32 {
     f32::from_bits(hash & (SIGN | MANTISSA) | exponent << 23)
 }
 
-/// MurmurHash3_x86_32 with seed 0, by Austin Appleby, who put it into the public domain.
+/// MurmurHash3_x86_32 with seed 0, by Austin Appleby, who placed it in the public domain.
 fn murmur3(bytes: &[u8]) -> u32 {
     let words = bytes.chunks_exact(4);
     let rest = words.remainder().iter().rev();
@@ -150,7 +151,7 @@ fn murmur3(bytes: &[u8]) -> u32 {
     mix_hash(hash ^ mix_word(rest) ^ bytes.len() as u32)
 }
 
-/// Lets every bit of a hash act on every other.
+/// Final mix, after which every bit of a hash depends on every other.
 fn mix_hash(mut hash: u32) -> u32 {
     hash = (hash ^ hash >> 16).wrapping_mul(0x85eb_ca6b);
     hash = (hash ^ hash >> 13).wrapping_mul(0xc2b2_ae35);
@@ -232,7 +233,7 @@ mod tests {
             sample(2, 0.5),
             sample(3, 0.0),
             sample(9, 0.1),
-            // An object of which the pixel has two samples counts once.
+            // An object with two samples in the pixel counts once.
             sample(1, 0.125),
         ];
         let deep = DeepImage::from_pixels(Image::filled(1, 1, LinearRgb::WHITE), [pixel]);

@@ -1,4 +1,4 @@
-//! A shot becomes deep samples, fast.
+//! Renders a shot to deep samples, fast.
 
 use crate::asset::Texture;
 use crate::deep::DeepImage;
@@ -30,28 +30,28 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Side of the blocks that the picture is put together from.
+/// Side of the tiles that make up the picture.
 const TILE_SIDE_PX: usize = 32;
 
-/// Renders a shot: per pixel and card, its light and its coverage; per pixel, what shadows leave of
+/// Renders a shot: per pixel and card, its light and its coverage; per pixel, the shadow factor of
 /// the plate.
 ///
-/// Same bits for any number of threads and any order of the cards. Never fails: cards that cannot
-/// be seen are left out, and numbers in `options` are brought into the range that works. Ask
-/// `check` about shots from outside.
+/// Same bits for any number of threads and any order of the cards. Never fails: invisible cards are
+/// left out, and numbers in `options` are clamped to the supported range. Use `check` for shots
+/// from untrusted sources.
 ///
 /// # Method
 /// Everything is planar, so each map between two planes seen from a point is a homography.
 /// Irradiance is smooth: it is computed once per receiver on a lattice in the picture, as a sum
-/// over Gauss nodes of the lights and fixed directions of the environment, each seen through the
-/// product of `1 - alpha` of the cards in between. Textures are sharp: they are read at the
-/// quantiles of the pixel filter, from the mip level whose own blur makes up for what those leave
-/// over. Cards are ordered by depth block by block; blocks in which they cross are split.
+/// over Gauss nodes of the lights and fixed directions of the environment, each attenuated by the
+/// product of `1 - alpha` of the cards in between. Textures are sharp: they are sampled at the
+/// quantiles of the pixel filter, from the mip level whose own blur makes up for the rest of the
+/// filter. Cards are sorted by depth per block; blocks in which they cross are split.
 pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     render_unhidden(shot, options).held_out(shot.holdout.as_deref())
 }
 
-/// The same before what of the place stands in front hides any of it.
+/// The same before the holdout hides anything.
 pub(crate) fn render_unhidden(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped().for_image(shot.camera.image);
     let mut watch = Stopwatch::start();
@@ -76,8 +76,8 @@ pub(crate) fn render_unhidden(shot: &Shot, options: &RenderOptions) -> DeepImage
     bent
 }
 
-/// What is up to `margin` pixels beyond the picture's border: a deep picture with so many more on
-/// every side, which need not be whole within them. No card bends light in it.
+/// The pixels up to `margin` beyond the picture's border: a deep picture with that many more on
+/// every side, whose middle may be incomplete. Cards do not refract in it.
 pub(crate) fn render_beyond(shot: &Shot, margin: usize, options: &RenderOptions) -> DeepImage {
     let options = options.clamped().for_image(shot.camera.image);
     let wide = Shot {
@@ -92,7 +92,7 @@ pub(crate) fn render_beyond(shot: &Shot, margin: usize, options: &RenderOptions)
     bounces.brighten(stack.render(|tile| !tile.is_within(&picture)))
 }
 
-/// All that a picture is put together from, seen through the shot's lens.
+/// Everything that makes up a picture, seen through the shot's lens.
 struct SeenStack {
     stack: LayerStack,
     /// None for a pinhole.
@@ -113,7 +113,7 @@ impl SeenStack {
         }
     }
 
-    /// What lies behind a card.
+    /// The stack behind a card.
     fn behind(&self, card: ObjectId) -> Self {
         Self {
             stack: self.stack.behind(card),
@@ -121,7 +121,7 @@ impl SeenStack {
         }
     }
 
-    /// The picture in the tiles that are wanted; nothing in others.
+    /// Renders the picture in the wanted tiles; the others stay empty.
     fn render(&self, wanted: impl Fn(&PixelBlock) -> bool + Sync) -> DeepImage {
         let [width, height] = self.image;
         let side = self.lens.map_or(TILE_SIDE_PX, |(lens, _)| lens.tile_side());
@@ -182,14 +182,14 @@ fn layer_stack(
     }
 }
 
-/// Some light shines.
+/// Whether any light shines.
 fn is_lit(shot: &Shot) -> bool {
     !shot.lights.is_empty() || !shot.ambient.is_black() || shot.environment.is_some()
 }
 
-/// The same without any light: what objects cover and hide, and how far away they are.
+/// Renders without light: coverage and depth only.
 ///
-/// All that labels are made from, at a part of the cost; the same bits as [`render`] gives for it.
+/// Sufficient for labels, at a fraction of the cost; the same bits as those of [`render`].
 pub fn render_coverage(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let straight = |card: &Card| Card {
         refraction: Default::default(),
@@ -207,7 +207,7 @@ pub fn render_coverage(shot: &Shot, options: &RenderOptions) -> DeepImage {
     render(&dark, options)
 }
 
-/// The cards as receivers of light, then the surface; none for what is not seen.
+/// The cards as receivers of light, then the surface; none for those that are not visible.
 fn receivers(
     context: &LightingContext<'_>,
     cards: &[Option<ProjectedCard<'_>>],
@@ -221,7 +221,7 @@ fn receivers(
         .collect()
 }
 
-/// The layers of the cards that are seen and have a receiver, each with the light on it.
+/// The layers of the visible cards that have a receiver, each with the light on it.
 fn lit_layers(
     cards: Vec<Option<ProjectedCard<'_>>>,
     receivers: &[Option<ReceiverIrradiance>],
@@ -237,8 +237,7 @@ fn lit_layers(
         .collect()
 }
 
-/// Where light is looked up: for each pixel, or for each sub-sample where nodes are closer than
-/// pixels.
+/// Where light is looked up: per pixel, or per sub-sample if nodes are closer together than pixels.
 fn sample_grid(
     view: &CameraView,
     lattice: &Lattice,
@@ -261,7 +260,7 @@ struct ProjectedCard<'a> {
     card: &'a Card,
     plane: ProjectedPlane,
     texture: BakedTexture,
-    /// Its texture runs the other way.
+    /// Whether its texture is mirrored.
     mirrored: bool,
     columns: Range<usize>,
     rows: Range<usize>,
@@ -318,7 +317,7 @@ impl<'a> ProjectedCard<'a> {
     }
 }
 
-/// The side of a card that is turned to the camera, and whether its texture runs the other way.
+/// The side of a card that faces the camera, and whether its texture is mirrored.
 fn visible_texture<'a>(
     card: &'a Card,
     plane: &ScenePlane,
@@ -330,7 +329,7 @@ fn visible_texture<'a>(
     }
 }
 
-/// Tiles as one picture; the factor on the plate is 1 where no tile has one.
+/// Assembles tiles into one picture; the factor on the plate is 1 where no tile has one.
 fn assemble_tiles([width, height]: [usize; 2], side: usize, tiles: Vec<RenderedTile>) -> DeepImage {
     let mut shadow = Image::filled(width, height, LinearRgb::WHITE);
     for tile in &tiles {
@@ -342,7 +341,7 @@ fn assemble_tiles([width, height]: [usize; 2], side: usize, tiles: Vec<RenderedT
     DeepImage::from_tiles(shadow, side, samples)
 }
 
-/// Copies a block's values, row by row, to where it lies in a picture.
+/// Copies a block's values, row by row, to its place in a picture.
 fn copy_block(block: &PixelBlock, values: &[LinearRgb], picture: &mut Image<LinearRgb>) {
     let rows = values.chunks_exact(block.x.len());
     for (y, row) in block.y.clone().zip(rows) {

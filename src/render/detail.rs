@@ -1,15 +1,15 @@
-//! At which level of detail a card's texture is read.
+//! Level of detail at which a card's texture is read.
 
 use crate::asset::Texture;
 use crate::geom::Vector3;
 use crate::render::pixel_filter::residual_sigma;
 use crate::render::view::{CameraView, ProjectedPlane, ScenePlane};
 
-/// Sub-samples a side from which on a sharper level of detail pays.
+/// Sub-samples per side from which a sharper level of detail pays off.
 const DENSE_SUBSAMPLES: usize = 4;
 
-/// Level of detail by matching variance: what sub-samples leave of the pixel's window, the
-/// texture's own filter covers.
+/// Level of detail by matching variance: the texture's own filter adds the part of the pixel's
+/// window that the sub-samples lack.
 ///
 /// A level read bilinearly has variance `4^level / 4` texels.
 pub(super) fn detail_level(texels_per_pixel: f64, offsets: &[f64]) -> f64 {
@@ -20,7 +20,7 @@ pub(super) fn detail_level(texels_per_pixel: f64, offsets: &[f64]) -> f64 {
         .max(0.0)
 }
 
-/// Texels of the full texture along the side of a pixel that shows `target`.
+/// Texels of the full texture per side of a pixel that shows `target`.
 pub(super) fn texels_per_pixel(
     texture: &Texture,
     plane: &ScenePlane,
@@ -33,7 +33,7 @@ pub(super) fn texels_per_pixel(
     projected.cell_metres(view, target) * (texels / (plane.size[0] * plane.size[1])).sqrt()
 }
 
-/// How much sharper a level many sub-samples a side read.
+/// How much sharper a level can be with many sub-samples per side.
 fn sharpening(subsamples: usize) -> f64 {
     if subsamples >= DENSE_SUBSAMPLES {
         0.25

@@ -1,14 +1,14 @@
-//! Four numbers that are worked on together, as one vector register.
+//! Four numbers that are processed together, as one vector register.
 
 use crate::pixel::{LinearRgb, Mix, PremulRgba};
 use bytemuck::{Pod, Zeroable};
 
-/// Numbers between which others lie.
+/// Values that can be interpolated.
 pub(super) trait Blend: Copy {
-    /// `self` at 0, `o` at 1; exactly the value where both are the same.
+    /// `self` at 0, `o` at 1; exactly the value if both are equal.
     fn lerp(self, o: Self, t: f32) -> Self;
 
-    /// Between four corners of a cell.
+    /// Bilinear interpolation between the four corners of a cell.
     #[inline(always)]
     fn bilinear(top: [Self; 2], bottom: [Self; 2], fx: f32, fy: f32) -> Self {
         top[0]
@@ -26,14 +26,14 @@ impl Float4 {
     pub(super) const ZERO: Self = Self([0.0; 4]);
     pub(super) const ONE: Self = Self([1.0; 4]);
 
-    /// A light: a number for each color channel, and 1.
+    /// A light: a number for each colour channel, and 1.
     #[inline(always)]
     pub(super) fn light_from_fn(channel: impl Fn(usize) -> f32) -> Self {
         let [r, g, b] = [0, 1, 2].map(channel);
         Self([r, g, b, 1.0])
     }
 
-    /// A light that is so many times as bright.
+    /// A light multiplied by a factor.
     #[inline(always)]
     pub(super) fn light_scaled(self, factor: f32) -> Self {
         Self::light_from_fn(|channel| factor * self.0[channel])
@@ -59,26 +59,26 @@ impl Float4 {
         Self(std::array::from_fn(|i| self.0[i] * o.0[i]))
     }
 
-    /// `self + a * b`, number by number.
+    /// `self + a * b`, element by element.
     #[inline(always)]
     pub(super) fn add_product(self, a: Self, b: Self) -> Self {
         Self(std::array::from_fn(|i| self.0[i] + a.0[i] * b.0[i]))
     }
 
-    /// `1 - self`, number by number.
+    /// `1 - self`, element by element.
     #[inline(always)]
     pub(super) fn complement(self) -> Self {
         Self(self.0.map(|v| 1.0 - v))
     }
 
-    /// Every number brought into 0 to 1; NaN becomes 0.
+    /// Every element clamped to 0 to 1; NaN becomes 0.
     #[inline(always)]
     #[expect(clippy::manual_clamp, reason = "turns NaN into 0")]
     pub(super) fn clamped(self) -> Self {
         Self(self.0.map(|v| v.max(0.0).min(1.0)))
     }
 
-    /// The same with another fourth number.
+    /// The same with another fourth element.
     #[inline(always)]
     pub(super) fn with_fourth(self, fourth: f32) -> Self {
         Self([self.0[0], self.0[1], self.0[2], fourth])
@@ -86,7 +86,7 @@ impl Float4 {
 }
 
 impl Blend for Float4 {
-    /// Both columns at once, in one register, then between them.
+    /// Interpolates both columns at once, in one register, then between them.
     #[inline(always)]
     fn bilinear(top: [Self; 2], bottom: [Self; 2], fx: f32, fy: f32) -> Self {
         let (top, bottom): ([f32; 8], [f32; 8]) = (bytemuck::cast(top), bytemuck::cast(bottom));
@@ -111,7 +111,7 @@ impl Mix for Float4 {
 }
 
 impl From<LinearRgb> for Float4 {
-    /// With nothing as the fourth.
+    /// With 0 as the fourth element.
     #[inline(always)]
     fn from(c: LinearRgb) -> Self {
         Self([c.r, c.g, c.b, 0.0])

@@ -1,4 +1,4 @@
-//! Colour and opacity that are worked on together, as one vector register.
+//! Colour and opacity that are processed together, as one vector register.
 
 use crate::pixel::{Film, LinearRgb, Mix, PremulRgba};
 use crate::render::float4::{Blend, Float4};
@@ -31,7 +31,7 @@ impl Float8 {
         Float4([p, q, s, t])
     }
 
-    /// `self + a * b`, number by number.
+    /// `self + a * b`, element by element.
     #[inline(always)]
     pub(super) fn add_product(self, a: Self, b: Self) -> Self {
         Self(std::array::from_fn(|i| self.0[i] + a.0[i] * b.0[i]))
@@ -55,7 +55,7 @@ impl Mix for Float8 {
 }
 
 impl From<Film> for Float8 {
-    /// With nothing as alpha.
+    /// With 0 as alpha.
     #[inline(always)]
     fn from(film: Film) -> Self {
         Self::new(film.color.into(), film.opacity.into())

@@ -6,8 +6,8 @@ use crate::render::float8::Float8;
 use crate::render::texel_grid::SIMD_LANES;
 use crate::scene::Grade;
 
-/// Opacity of film whose transmittance is turned in hue and changed in saturation; grey stays as it
-/// is.
+/// Opacity of film after a hue shift and a change of saturation of its transmittance; grey is
+/// unchanged.
 #[inline(always)]
 pub(super) fn shifted_opacity(opacity: LinearRgb, hue_deg: f32, saturation: f32) -> LinearRgb {
     let through = opacity.map(|o| 1.0 - o);
@@ -20,7 +20,7 @@ pub(super) fn shifted_opacity(opacity: LinearRgb, hue_deg: f32, saturation: f32)
     }
 }
 
-/// The mean over channels; exactly the channels' value where they are the same.
+/// The mean over channels; exactly the channels' value if they are equal.
 #[inline(always)]
 pub(super) fn channel_mean(c: LinearRgb) -> f32 {
     if c.r == c.g && c.g == c.b {
@@ -30,7 +30,7 @@ pub(super) fn channel_mean(c: LinearRgb) -> f32 {
     }
 }
 
-/// Grades the colours of texels, and what film among them lets pass.
+/// Grades the colours of texels, and the opacity of those that are film.
 pub(super) fn grade_texels(texels: &mut [Float8], grade: &Grade) {
     let halves: &mut [Float4] = bytemuck::cast_slice_mut(texels);
     if *grade != Grade::default() {
@@ -48,12 +48,13 @@ pub(super) fn grade_opacities(opacities: &mut [Float4], grade: &Grade) {
     }
 }
 
-/// Film of another hue lets another hue pass; how bright it reflects does not matter.
+/// Whether film's opacity changes: hue and saturation affect it, the brightness of its reflection
+/// does not.
 fn turns_opacity(grade: &Grade) -> bool {
     (grade.hue_deg, grade.saturation) != (0.0, 1.0)
 }
 
-/// Every second one is a colour.
+/// Every second element is a colour.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
@@ -65,7 +66,7 @@ fn shift_colors(halves: &mut [Float4], hue_deg: f32, saturation: f32, value: f32
     });
 }
 
-/// The last one of every `step` is an opacity.
+/// The last of every `step` elements is an opacity.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
@@ -77,8 +78,8 @@ fn shift_opacities(texels: &mut [Float4], step: usize, hue_deg: f32, saturation:
     });
 }
 
-/// Changes one of every `step` colours, over channels apart, so that it is vectorised; empty ones
-/// stay.
+/// Changes one of every `step` colours, channel by channel, so that it is vectorised; empty ones
+/// are unchanged.
 #[inline(always)]
 fn map_colors(
     texels: &mut [Float4],

@@ -1,10 +1,10 @@
-//! Shapes with straight edges, row by row: where linear conditions on `(x, y, 1)` all hold.
+//! Convex shapes row by row: where linear conditions on `(x, y, 1)` all hold.
 
 use crate::geom::Vector3;
 use crate::render::ranges::integer_range;
 use std::ops::Range;
 
-/// The `x` for which every `side . (x, y, 1)` is at least 0, as lowest and highest; reversed where
+/// The `x` for which every `side . (x, y, 1)` is at least 0, as lowest and highest; reversed if
 /// there is none.
 pub(super) fn row_span(sides: &[Vector3<f64>], y: f64) -> (f64, f64) {
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -21,21 +21,21 @@ pub(super) fn row_span(sides: &[Vector3<f64>], y: f64) -> (f64, f64) {
     (low, high)
 }
 
-/// Most sides of a [`ConvexShape`]: an octagon's, and two planes that cut it.
+/// Maximum number of sides of a [`ConvexShape`]: an octagon's, and two planes that clip it.
 const MAX_SIDES: usize = 10;
 
-/// A convex shape, ready to be asked for its rows.
+/// A convex shape, prepared for queries by row.
 #[derive(Clone, Debug)]
 pub(super) struct ConvexShape {
-    /// Lines `x = a y + b` that it lies to the right of, then those that it lies to the left of,
-    /// then conditions `a y + b >= 0` on whole rows.
+    /// Lines `x = a y + b` on its left, then those on its right, then conditions `a y + b >= 0` on
+    /// whole rows.
     lines: [[f64; 2]; MAX_SIDES],
-    /// Where each of these ends.
+    /// End index of each kind.
     ends: [u8; 3],
 }
 
 impl ConvexShape {
-    /// Where all conditions on `(x, y, 1)` hold, at most [`MAX_SIDES`] of them.
+    /// The shape where all conditions on `(x, y, 1)` hold, at most [`MAX_SIDES`] of them.
     pub(super) fn new(sides: &[Vector3<f64>]) -> Self {
         let mut shape = Self {
             lines: [[0.0; 2]; MAX_SIDES],
@@ -61,7 +61,7 @@ impl ConvexShape {
         self.ends[kind] = start + count as u8;
     }
 
-    /// Lines that it lies to the right of, to the left of, and conditions on whole rows.
+    /// Lines on its left, on its right, and conditions on whole rows.
     #[inline(always)]
     fn kinds(&self) -> [&[[f64; 2]]; 3] {
         let [right, left, level] = self.ends.map(usize::from);
@@ -72,13 +72,13 @@ impl ConvexShape {
         ]
     }
 
-    /// The nodes of row `j` of a lattice inside of it.
+    /// The nodes of row `j` of a lattice inside it.
     pub(super) fn nodes(&self, j: usize, within: &Range<usize>) -> Range<usize> {
         let (low, high) = self.row_span(j as f64);
         integer_range(low, high, within)
     }
 
-    /// Left and right ends of `N` rows from row `first` on; reversed where a row has nothing.
+    /// Left and right ends of `N` rows from row `first` on; reversed for an empty row.
     pub(super) fn row_spans<const N: usize>(&self, first: f64) -> ([f64; N], [f64; N]) {
         let (mut lows, mut highs) = ([f64::NEG_INFINITY; N], [f64::INFINITY; N]);
         let at = |[a, b]: [f64; 2], k: usize| a * (first + k as f64) + b;
@@ -133,8 +133,7 @@ pub(super) fn nodes_inside(
     integer_range(low, high, within)
 }
 
-/// Sides of the shape `0 <= u/w <= 1`, `0 <= v/w <= 1`, `w >= 0`, reaching further out by shares of
-/// it.
+/// Sides of the shape `0 <= u/w <= 1`, `0 <= v/w <= 1`, `w >= 0`, extended by shares of its size.
 pub(super) fn quad_sides(
     u: &Vector3<f64>,
     v: &Vector3<f64>,
@@ -150,7 +149,7 @@ pub(super) fn quad_sides(
     ]
 }
 
-/// The same side, `by` further out both along x and along y.
+/// The same side, moved outwards by `by` along both x and y.
 pub(super) fn grown_side(side: &Vector3<f64>, by: f64) -> Vector3<f64> {
     Vector3::new(side.x, side.y, side.z + by * (side.x.abs() + side.y.abs()))
 }

@@ -1,4 +1,4 @@
-//! Light that goes to and fro between the surface and the cards over it.
+//! Interreflection between the surface and the cards above it.
 
 use crate::camera::RadialDistortion;
 use crate::deep::DeepImage;
@@ -13,31 +13,32 @@ use crate::render::view::{
 };
 use crate::scene::{Card, Shot};
 
-/// How far light spreads on its way to and fro, as a share of the typical card's longer side: 8 mm
-/// for 200 mm, the order of a pile's height; half and twice that do as well.
+/// How far interreflected light spreads, as a share of the typical card's longer side: 8 mm for 200
+/// mm, the order of a pile's height; half and twice as much work equally well.
 const BOUNCE_SPREAD_RATIO: f64 = 0.04;
 
-/// Points of the grid on the surface in a spread.
+/// Grid points on the surface per spread.
 const GRID_STEPS_PER_SPREAD: f64 = 4.0;
 
-/// Most steps along a side; longer ones where cards lie far apart.
+/// Maximum number of steps along a side; they are longer if cards are far apart.
 const MAX_GRID_STEPS: f64 = 512.0;
 
-/// A white surface under a white card would glow forever.
+/// Maximum albedo product: a white surface under a white card would give infinite light.
 const MAX_BOUNCE: f32 = 0.95;
 
-/// Brightens the surface by what cards above reflect back to it, where the shot asks for it.
+/// Brightens the surface by the light that cards above reflect back to it, if the shot has
+/// interreflection.
 ///
 /// Shadow factors may come out above 1.
 ///
 /// # Method
-/// `S` is divided by `1 - albedo R`, with `R` the light that comes back from straight above: the
-/// sum over cards upwards of their colour times the squared transmittance of what lies below,
-/// blurred over the surface.
+/// `S` is divided by `1 - albedo R`, where `R` is the light that comes back from straight above:
+/// the sum over cards upwards of their colour times the squared transmittance of what is below
+/// them, blurred over the surface.
 pub(super) struct Bounces {
     albedo: LinearRgb,
     lens: RadialDistortion,
-    /// None where there is nothing to brighten.
+    /// None if there is nothing to brighten.
     seen: Option<(ProjectedPlane, BounceMap)>,
 }
 
@@ -72,12 +73,12 @@ impl Bounces {
     }
 }
 
-/// What light becomes that comes back by these shares again and again.
+/// Sum of the geometric series of light that comes back by these shares each time.
 fn endless_bounces(back: LinearRgb) -> LinearRgb {
     back.map(|b| 1.0 / (1.0 - b.clamp(0.0, MAX_BOUNCE)))
 }
 
-/// What comes back from above, on a grid over the part of the surface that has cards over it.
+/// Light that comes back from above, on a grid over the part of the surface that is under cards.
 struct BounceMap {
     corner: [f64; 2],
     step: f64,
@@ -94,7 +95,7 @@ impl BounceMap {
         let step = (spread / GRID_STEPS_PER_SPREAD).max(width.max(height) / MAX_GRID_STEPS);
         let [columns, rows] = [width, height].map(|length| (length / step) as usize + 1);
         let back = Image::from_fn(columns, rows, |i, j| {
-            // In the middle of a cell: on its corners rounding would decide at the ends of cards.
+            // At the centre of a cell: at its corners, rounding would decide at the ends of cards.
             let (x, y) = (i as f64 + 0.5, j as f64 + 0.5);
             let point = Vector3::new(left + x * step, bottom + y * step, 0.0);
             light_from_above(&cards, &point)
@@ -120,7 +121,7 @@ fn typical_length(cards: &[(&Card, ScenePlane)]) -> Option<f64> {
     median(longer, f64::total_cmp)
 }
 
-/// Low end and length of cards along an axis, with room for the blur.
+/// Low end and length of the cards' extent along an axis, with room for the blur.
 fn extent(cards: &[(&Card, ScenePlane)], axis: usize, spread: f64) -> Option<(f64, f64)> {
     let ends = cards
         .iter()
@@ -131,7 +132,7 @@ fn extent(cards: &[(&Card, ScenePlane)], axis: usize, spread: f64) -> Option<(f6
     Some((low, high - low))
 }
 
-/// Light that cards straight above a point of the surface send back to it.
+/// Light that cards straight above a point of the surface reflect back to it.
 fn light_from_above(cards: &[(&Card, ScenePlane)], point: &Vector3<f64>) -> LinearRgb {
     let hits = cards
         .iter()
@@ -146,7 +147,7 @@ fn light_from_above(cards: &[(&Card, ScenePlane)], point: &Vector3<f64>) -> Line
     back
 }
 
-/// Height over a point of the surface at which a card is, and what it shows there.
+/// Height of a card over a point of the surface, and its texel there.
 fn hit_above(card: &Card, plane: &ScenePlane, point: &Vector3<f64>) -> Option<(f64, Film)> {
     let height = plane.normal.dot(&(plane.center - point)) / plane.normal.z;
     let uv = plane.texture_coordinates(&(point + Vector3::z() * height));

@@ -1,4 +1,4 @@
-//! Irradiance of each receiver at the nodes of the lattice, to be looked up between them.
+//! Irradiance of each receiver at the nodes of the lattice, to be interpolated between them.
 
 use crate::pixel::Mix;
 use crate::render::float4::{Blend, Float4};
@@ -20,8 +20,8 @@ pub(super) struct IrradianceMap {
 /// The maps of all receivers, computed in parallel in bands of rows; the same bits for any number
 /// of threads.
 ///
-/// Irradiance, or what shadows leave of it as a share; each with 1 as the fourth number. None in
-/// the dark.
+/// Irradiance, or the share of it that shadows leave; each with 1 as the fourth number. None in the
+/// dark.
 pub(super) fn irradiance_maps(
     receivers: &[Option<ReceiverIrradiance>],
 ) -> Vec<Option<IrradianceMap>> {
@@ -37,7 +37,7 @@ pub(super) fn irradiance_maps(
     maps
 }
 
-/// What occluders hide of the light with soft shadows, on the coarser lattice.
+/// Light with soft shadows that occluders block, on the coarser lattice.
 fn hidden_maps(receivers: &[Option<ReceiverIrradiance>]) -> Vec<Option<IrradianceMap>> {
     let mut maps = maps_of(receivers, |lit| {
         IrradianceMap::filled(&lit.coarse, Float4::ZERO)
@@ -48,17 +48,17 @@ fn hidden_maps(receivers: &[Option<ReceiverIrradiance>]) -> Vec<Option<Irradianc
 
 /// Rows of a receiver's map that one task fills.
 struct MapBand<'a> {
-    /// The receiver's number.
+    /// The receiver's index.
     number: usize,
     lit: &'a ReceiverIrradiance,
-    /// Number of the first row.
+    /// Index of the first row.
     first: usize,
-    /// Nodes of a row.
+    /// Number of nodes in a row.
     width: usize,
     values: &'a mut [Float4],
 }
 
-/// A map for each receiver under some light.
+/// A map for each receiver under some of its light.
 fn maps_of(
     receivers: &[Option<ReceiverIrradiance>],
     map: impl Fn(&ReceiverIrradiance) -> IrradianceMap,
@@ -70,7 +70,7 @@ fn maps_of(
 }
 
 impl MapBand<'_> {
-    /// Numbers of its rows.
+    /// Indices of its rows.
     fn rows(&self) -> Range<usize> {
         self.first..self.first + self.values.len() / self.width
     }
@@ -108,7 +108,7 @@ fn map_bands<'a>(
         .collect()
 }
 
-/// What occluders hide of a receiver's lights.
+/// Light of a receiver that occluders block.
 fn fill_hidden_rows(band: &mut MapBand<'_>, buffers: &mut BandBuffers) {
     let lit = band.lit;
     let receiver = &lit.coarse;
@@ -119,7 +119,7 @@ fn fill_hidden_rows(band: &mut MapBand<'_>, buffers: &mut BandBuffers) {
     }
 }
 
-/// Irradiance or its share, from the sharp part and the soft one.
+/// Irradiance or its share, from the parts with sharp and with soft shadows.
 fn fill_combined_rows(band: &mut MapBand<'_>, soft: &IrradianceMap, buffers: &mut BandBuffers) {
     let lit = band.lit;
     lit.fine.gather_band(band.rows(), buffers);
@@ -136,13 +136,13 @@ fn fill_combined_rows(band: &mut MapBand<'_>, soft: &IrradianceMap, buffers: &mu
     }
 }
 
-/// The rows of which any node is requested, with their numbers in the band.
+/// The rows with any requested node, with their indices in the band.
 fn wanted_rows(rows: &mut [RowSums]) -> impl Iterator<Item = (usize, &mut RowSums)> {
     let rows = rows.iter_mut().enumerate();
     rows.filter(|(_, row)| !row.requested.is_empty())
 }
 
-/// What is left of open irradiance, or that as a share of it.
+/// Open irradiance less the hidden part, or that as a share of it.
 #[inline(always)]
 fn remaining(relative: bool, open: &Float4, hidden: &Float4) -> Float4 {
     if relative {
@@ -152,8 +152,8 @@ fn remaining(relative: bool, open: &Float4, hidden: &Float4) -> Float4 {
     }
 }
 
-/// The value of a coarser row at the `i`-th node from `start`; the row begins at the node before
-/// `start`.
+/// Interpolates a row of the coarser lattice at the `i`-th node from `start`; the row begins at the
+/// node before `start`.
 #[inline(always)]
 fn between_coarse(coarse: &[Float4], start: usize, i: usize) -> Float4 {
     let first = coarser_position(start).0;
@@ -161,13 +161,13 @@ fn between_coarse(coarse: &[Float4], start: usize, i: usize) -> Float4 {
     coarse[node - first].lerp(coarse[node + 1 - first], way)
 }
 
-/// What is left of open irradiance.
+/// Open irradiance less the hidden part.
 #[inline(always)]
 fn remaining_light(open: &Float4, hidden: &Float4) -> Float4 {
     Float4::light_from_fn(|i| (open.0[i] - hidden.0[i]).max(0.0))
 }
 
-/// The same as a share; exactly 1 where nothing is hidden, and where there is no light.
+/// The same as a share; exactly 1 if nothing is hidden or there is no light.
 #[inline(always)]
 fn remaining_share(open: &Float4, hidden: &Float4) -> Float4 {
     Float4::light_from_fn(|i| channel_share(open.0[i], hidden.0[i]))
@@ -193,7 +193,7 @@ impl IrradianceMap {
         }
     }
 
-    /// Bands of rows of the map of a receiver with this number.
+    /// Bands of rows of the map of the receiver with this index.
     fn row_bands<'a>(
         &'a mut self,
         number: usize,
@@ -210,7 +210,7 @@ impl IrradianceMap {
         })
     }
 
-    /// The row of this coarser map that belongs to row `j` of a finer one, at all nodes around
+    /// The row of this coarser map that corresponds to row `j` of a finer one, at all nodes around
     /// `requested`; 0 outside.
     fn enlarge_row(&self, j: usize, requested: &Range<usize>, out: &mut Vec<Float4>) {
         let first = coarser_position(requested.start).0;
@@ -235,18 +235,18 @@ impl IrradianceMap {
         &self.values[start - self.columns.start..][..columns.len()]
     }
 
-    /// Does it share nodes with a part of the lattice?
+    /// Whether it shares nodes with a part of the lattice.
     pub(super) fn meets(&self, columns: Range<usize>, rows: Range<usize>) -> bool {
         ranges_meet(&self.columns, &columns) && ranges_meet(&self.rows, &rows)
     }
 
-    /// Is a position inside, with all four nodes around it?
+    /// Whether a position is inside, with all four nodes around it.
     #[inline(always)]
     pub(super) fn holds(&self, column: LatticePosition, row: LatticePosition) -> bool {
         holds_cell(&self.columns, column.0 as usize) && holds_cell(&self.rows, row.0 as usize)
     }
 
-    /// The value at a position; at the nearest cell for one outside.
+    /// The value at a position; that of the nearest cell for one outside.
     ///
     /// Maps hold at least two nodes a side.
     #[inline(always)]
@@ -258,9 +258,10 @@ impl IrradianceMap {
         Float4::bilinear([top[0], top[1]], [bottom[0], bottom[1]], column.1, row.1)
     }
 
-    /// The values at positions along a row, from left to right, as [`value_at`](Self::value_at) each.
+    /// The values at positions along a row, from left to right, each as
+    /// [`value_at`](Self::value_at).
     ///
-    /// Between rows first, for each node once.
+    /// Interpolates between rows first, once for each node.
     pub(super) fn values_along(
         &self,
         row: LatticePosition,
@@ -293,13 +294,13 @@ impl IrradianceMap {
     }
 }
 
-/// Are a node and the next one both inside?
+/// Whether a node and the next one are both inside.
 #[inline(always)]
 fn holds_cell(nodes: &Range<usize>, first: usize) -> bool {
     first >= nodes.start && first + 1 < nodes.end
 }
 
-/// Number inside a range of the node before a position, of which another follows.
+/// Index in a range of the node before a position; another one follows it.
 #[inline(always)]
 fn cell_before(position: LatticePosition, range: &Range<usize>) -> usize {
     (position.0 as usize)

@@ -1,25 +1,25 @@
 //! The lattice of picture positions at which light is computed.
 //!
-//! Light varies slowly where textures do not, so it is computed once per node and receiver, and
-//! looked up between nodes. The lattice lies in the *picture*, not on the receiver: nodes are as
-//! dense as pixels ask for, at any distance and slant, and nothing is spent on what the camera does
-//! not see.
+//! Irradiance varies slowly where textures do not, so it is computed once per node and receiver,
+//! and interpolated between nodes. The lattice is in the *picture*, not on the receiver: nodes are
+//! as dense as the pixels require, at any distance and slant, and nothing is spent on what the
+//! camera does not see.
 
 use crate::render::view::CameraView;
 use nalgebra::Matrix3;
 
-/// Nodes over the picture: node `(i, j)` lies at pixel position `((i - 1) cell, (j - 1) cell)`.
+/// Nodes over the picture: node `(i, j)` is at pixel position `((i - 1) cell, (j - 1) cell)`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lattice {
-    /// Distance of nodes, pixels.
+    /// Spacing of nodes, pixels.
     cell: f64,
-    /// The same that textures are read for, as a share of it.
+    /// Spacing that textures are read for, as a share of it.
     pub(super) detail: f64,
     /// The camera, in nodes instead of pixels.
     pub(super) view: CameraView,
 }
 
-/// Where a pixel position lies between nodes: the node before it, and the way to the next.
+/// A pixel position between nodes: the node before it, and the fraction towards the next.
 pub(super) type LatticePosition = (u32, f32);
 
 impl Lattice {
@@ -38,8 +38,8 @@ impl Lattice {
         }
     }
 
-    /// The lattice of [`COARSER`] times the distance. What throws shadows on it is read as if nodes
-    /// were half as far apart: blurred more, many layers on each other would take away too much.
+    /// The lattice with [`COARSER`] times the spacing. Occluders are read as if nodes were half as
+    /// far apart: blurred more, many layers on top of each other would take away too much light.
     pub(super) fn coarser(view: &CameraView, cell: f64) -> Self {
         Self {
             detail: 0.5,
@@ -47,8 +47,8 @@ impl Lattice {
         }
     }
 
-    /// Lattice positions of the picture positions `i + 0.5 + offset`, for all `i` below `pixels`
-    /// and all offsets in turn.
+    /// Lattice positions of the picture positions `i + 0.5 + offset`, for each `i` below `pixels`
+    /// and, within that, each offset.
     pub(super) fn positions_of(&self, pixels: usize, offsets: &[f64]) -> Vec<LatticePosition> {
         (0..pixels)
             .flat_map(|i| {
@@ -59,7 +59,7 @@ impl Lattice {
             .collect()
     }
 
-    /// Where a position of the picture is on the lattice.
+    /// Lattice position of a position in the picture.
     pub(super) fn position_of(&self, x: f64, y: f64) -> (LatticePosition, LatticePosition) {
         (self.position_at(x), self.position_at(y))
     }
@@ -70,15 +70,16 @@ impl Lattice {
     }
 }
 
-/// Nodes up to one pixel beyond the picture's end: sub-samples reach over it.
+/// Nodes up to one pixel beyond the picture's end, since sub-samples reach past it.
 fn node_count(pixels: usize, cell: f64) -> usize {
     ((pixels as f64 + 1.0) / cell) as usize + 3
 }
 
-/// Nodes of a lattice between two of the coarser one, for light with soft shadows.
+/// Spacing of the coarser lattice, for light with soft shadows, in nodes of the finer one.
 pub(super) const COARSER: usize = 4;
 
-/// The node of the coarser lattice before a node of the finer one, and the way to the next.
+/// The node of the coarser lattice before a node of the finer one, and the fraction towards the
+/// next.
 #[inline(always)]
 pub(super) fn coarser_position(node: usize) -> (usize, f32) {
     let at = node + COARSER - 1;

@@ -1,9 +1,9 @@
-//! Cards as layers over the picture, walked front to back, block by block.
+//! Cards as layers over the picture, composited front to back, block by block.
 //!
-//! The reciprocal of a plane's depth is linear in the picture, so if the same order of cards holds
-//! at the four corners of a block it holds in all of it. A block where it does not (cards cross) is
-//! split until it does, or until it is one pixel: order is decided by depth at the pixel's centre
-//! there. Inside a block each card is walked once, as a layer.
+//! The reciprocal of a plane's depth is linear in the picture, so if cards have the same order at
+//! the four corners of a block, they have it in the whole block. A block with different orders
+//! (cards cross) is split until they agree or it is a single pixel, where depth at the pixel's
+//! centre decides. Inside a block each card is processed once, as a layer.
 
 use crate::deep::{DeepSample, DeepTile};
 use crate::geom::Vector3;
@@ -29,59 +29,59 @@ use std::sync::Arc;
 /// A card in the picture.
 #[derive(Clone, Debug)]
 pub(super) struct Layer {
-    /// Whose it is.
+    /// The card's id.
     pub(super) id: ObjectId,
-    /// How it lies.
+    /// Its plane in the picture.
     pub(super) plane: ProjectedPlane,
     /// Its colours.
     pub(super) texture: Arc<BakedTexture>,
-    /// Light on it; none in the dark.
+    /// Irradiance on it; none in the dark.
     pub(super) light: Option<Arc<IrradianceMap>>,
-    /// Where anything is seen on it.
+    /// The part where its texture is not empty.
     shape: ConvexShape,
-    /// Position among the texels, times `w`.
+    /// Rows that map `(x, y, 1)` to the position among the texels, times `w`.
     texel_rows: [Vector3<f64>; 2],
-    /// Pixels it may touch.
+    /// Columns of pixels that it may touch.
     pub(super) columns: Range<usize>,
-    /// Pixels it may touch.
+    /// Rows of pixels that it may touch.
     pub(super) rows: Range<usize>,
 }
 
-/// Where the samples of all pixels lie.
+/// Positions of the samples of all pixels.
 #[derive(Clone, Debug)]
 pub(super) struct SampleGrid {
     /// Positions along each side of a pixel, from its centre.
     pub(super) offsets: Vec<f64>,
-    /// Light is looked up for each sub-sample, not for each pixel: where the lattice is finer than
-    /// pixels are.
+    /// Whether light is looked up per sub-sample and not per pixel, since the lattice is finer than
+    /// the pixels.
     pub(super) per_subsample: bool,
     /// Positions in the lattice: sub-sample by sub-sample, or the middles of pixels.
     pub(super) columns: Vec<LatticePosition>,
-    /// Positions in the lattice, the same way.
+    /// Positions in the lattice, likewise.
     pub(super) rows: Vec<LatticePosition>,
-    /// Where the lattice lies under a part of a picture that a lens bends; `columns` and `rows` are
-    /// not used then.
+    /// The lattice under a part of a picture distorted by a lens; `columns` and `rows` are not used
+    /// then.
     pub(super) bent: Option<BentLattice>,
 }
 
-/// A lattice over what a pinhole camera sees, under a part of what a lens makes of that.
+/// A lattice over the pinhole camera's picture, under a part of the distorted one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BentLattice {
     pub(super) lattice: Lattice,
-    /// Position of the pinhole camera's picture, from the picture's.
+    /// Maps a position in the picture to one in the pinhole camera's picture.
     pub(super) ideal_from_picture: Matrix3<f64>,
 }
 
-/// The surface under the cards, which their shadows fall on.
+/// The surface under the cards, which receives their shadows.
 #[derive(Clone, Debug)]
 pub(super) struct ShadowCatcher {
-    /// How it lies; none where the camera does not look down on it.
+    /// Its plane in the picture; none if the camera does not look down on it.
     pub(super) plane: Option<ProjectedPlane>,
-    /// What shadows leave of its light; none where there is no shadow.
+    /// Share of its light that shadows leave; none if there is no shadow.
     pub(super) share: Option<Arc<IrradianceMap>>,
 }
 
-/// A picture's parts, ready to be put together.
+/// Everything that makes up a picture, ready for rendering.
 #[derive(Debug)]
 pub(super) struct LayerStack {
     /// Cards, in the order of their ids.
@@ -92,16 +92,16 @@ pub(super) struct LayerStack {
     pub(super) samples: SampleGrid,
     /// Factor on light.
     pub(super) exposure: f32,
-    /// What its layers' texels have.
+    /// Content of its layers' texels.
     pub(super) content: TexelContent,
 }
 
-/// Deep samples of a block in any order of pixels, front to back for each.
+/// Deep samples of a block, in any order of pixels, front to back within each.
 #[derive(Debug, Default)]
 pub(super) struct TileSamples {
-    /// Number of the pixel in the block, and sample.
+    /// Index of the pixel in the block, and its sample.
     samples: Vec<(u32, DeepSample)>,
-    /// What each sample hides, per channel; empty where no layer is film.
+    /// What each sample hides, per channel; empty if no layer is film.
     tints: Vec<LinearRgb>,
 }
 
@@ -123,7 +123,7 @@ pub(super) struct RenderedTile {
     /// Which pixels.
     pub(super) block: PixelBlock,
     pub(super) samples: DeepTile,
-    /// The plate's factor, row by row; none where it is 1 everywhere.
+    /// The plate's factor, row by row; none if it is 1 everywhere.
     pub(super) shadow: Option<Vec<LinearRgb>>,
 }
 
@@ -137,7 +137,7 @@ impl RenderedTile {
         }
     }
 
-    /// The plate's factors of a row of a part of the block.
+    /// The plate's factors for a row of a part of the block.
     fn shadow_row(&mut self, part: &PixelBlock, y: usize) -> Option<&mut [LinearRgb]> {
         let start = self.block.number_of(part.x.start, y);
         let row = self.shadow.as_mut()?;
@@ -151,7 +151,7 @@ impl BentLattice {
         self.lattice.position_of(ideal.x, ideal.y)
     }
 
-    /// Pixels of the pinhole camera's picture that a block of the picture shows, and some around.
+    /// Pixels of the pinhole camera's picture that a block of the picture shows, with a margin.
     fn ideal_area(&self, block: &PixelBlock) -> PixelBlock {
         let ends = block.ends().map(|[x, y]| {
             let ideal = self.ideal_from_picture * Vector3::new(x, y, 1.0);
@@ -161,7 +161,7 @@ impl BentLattice {
         PixelBlock { x, y }
     }
 
-    /// Columns and rows of the nodes around a block, one more on either side.
+    /// Columns and rows of the nodes around a block, with one more on either side.
     fn nodes_around(&self, block: &PixelBlock) -> (Range<usize>, Range<usize>) {
         let nodes = block.ends().map(|end| self.position_of(end));
         let columns = nodes.map(|(column, _)| column.0 as usize);
@@ -172,7 +172,7 @@ impl BentLattice {
     }
 }
 
-/// The integers between some numbers, and two more on each side.
+/// The integers between some numbers, with two more on each side.
 fn range_around(numbers: [f64; 4]) -> Range<usize> {
     let low = numbers.into_iter().fold(f64::INFINITY, f64::min);
     let high = numbers.into_iter().fold(0.0, f64::max);
@@ -202,8 +202,8 @@ impl SampleGrid {
         1.0 / (r * r) as f32
     }
 
-    /// Where a position of the grid is on the lattice: a pixel, where light is looked up once for
-    /// each, or a sub-sample.
+    /// Lattice position of a position of the grid: a pixel, if light is looked up once per pixel,
+    /// or a sub-sample.
     #[inline(always)]
     fn position_of(&self, x: usize, y: usize) -> (LatticePosition, LatticePosition) {
         match &self.bent {
@@ -212,7 +212,7 @@ impl SampleGrid {
         }
     }
 
-    /// Looks up a map at pixels of a row, which are not split into sub-samples.
+    /// Looks up a map at the pixels of a row, which are not split into sub-samples.
     fn look_up_row(
         &self,
         map: &IrradianceMap,
@@ -232,7 +232,7 @@ impl SampleGrid {
         }
     }
 
-    /// Where a position of the grid is in the picture, along one axis.
+    /// Picture coordinate of a position of the grid, along one axis.
     fn coordinate_of(&self, index: usize) -> f64 {
         let n = self.positions_per_side();
         let offset = if self.per_subsample {
@@ -256,7 +256,7 @@ impl SampleGrid {
     fn node_range(&self, pixels: &Range<usize>, positions: &[LatticePosition]) -> Range<usize> {
         let n = self.positions_per_side();
         let [first, last] = [pixels.start * n, pixels.end * n - 1].map(|i| positions[i].0 as usize);
-        // A node more on either side: sub-samples reach beyond the middle of their pixel.
+        // One more node on either side: sub-samples reach beyond the middle of their pixel.
         first.saturating_sub(1)..last + 3
     }
 }
@@ -266,18 +266,18 @@ impl Layer {
         ranges_meet(&self.columns, &block.x) && ranges_meet(&self.rows, &block.y)
     }
 
-    /// Reciprocal depth, rounded so that planes that coincide have the same.
+    /// Reciprocal depth, rounded so that coincident planes have the same.
     fn reciprocal_depth(&self, p: &Vector3<f64>) -> f32 {
         (self.plane.w.dot(p) / self.plane.height) as f32
     }
 
-    /// It is nowhere farther away than another layer.
+    /// Whether it is nowhere farther away than another layer.
     fn is_before(&self, other: &Self, points: &[Vector3<f64>]) -> bool {
         let mut points = points.iter();
         points.all(|p| self.reciprocal_depth(p) >= other.reciprocal_depth(p))
     }
 
-    /// Depth at a pixel's centre; as far as can be where the plane is behind the camera.
+    /// Depth at a pixel's centre; the maximum if the plane is behind the camera.
     fn depth_at(&self, x: usize, y: usize) -> Depth {
         Depth(self.plane.depth_at(&pixel_center(x, y)) as f32)
     }
@@ -301,15 +301,15 @@ impl Layer {
         }
     }
 
-    /// The layer in a block of a picture that an affine map leads to this one.
+    /// The layer in a block of a picture that an affine map takes to this one.
     fn seen_through(&self, map: &Matrix3<f64>, block: &PixelBlock) -> Self {
         let (plane, texture) = (self.plane.seen_through(map), Arc::clone(&self.texture));
         let area = (block.y.clone(), block.x.clone());
         Self::new(self.id, (plane, texture), self.light.clone(), area)
     }
 
-    /// It is farther away than another layer, in the middle of what they have in common; in its own
-    /// middle where that is nothing.
+    /// Whether it is farther away than another layer, in the middle of their common area or, if
+    /// there is none, in its own middle.
     fn is_behind(&self, other: &Self) -> bool {
         let common = PixelBlock {
             x: range_overlap(&self.columns, &other.columns),
@@ -331,7 +331,7 @@ impl Layer {
 }
 
 impl LayerStack {
-    /// The layers behind one of them, a whole layer each, as a stack of their own.
+    /// The layers behind one of them, each complete, as a stack of their own.
     pub(super) fn behind(&self, id: ObjectId) -> Self {
         let front = self.layers.iter().find(|layer| layer.id == id);
         let farther = |layer: &&Layer| front.is_some_and(|front| layer.is_behind(front));
@@ -343,7 +343,7 @@ impl LayerStack {
         }
     }
 
-    /// The same for a block of a picture that a lens bends: the layers that it may show.
+    /// The same for a block of a picture distorted by a lens: the layers that it may show.
     pub(super) fn bent(&self, bent: BentLattice, block: &PixelBlock) -> Self {
         let map = &bent.ideal_from_picture;
         let area = bent.ideal_area(block);
@@ -367,7 +367,7 @@ impl LayerStack {
         }
     }
 
-    /// Renders all of a block; `scratch` is for its samples.
+    /// Renders a whole block; `scratch` holds its samples.
     pub(super) fn render_tile(&self, block: PixelBlock, scratch: &mut TileSamples) -> RenderedTile {
         let layers: Vec<_> = (0..self.layers.len())
             .filter(|&k| self.layers[k].touches(&block))
@@ -382,7 +382,7 @@ impl LayerStack {
         tile
     }
 
-    /// Renders a part of a tile, in halves where its layers cross.
+    /// Renders a part of a tile, in halves if its layers cross.
     fn render_part(
         &self,
         part: &PixelBlock,
@@ -416,7 +416,7 @@ impl LayerStack {
         }
     }
 
-    /// The layers that touch a block, the nearest in its middle first.
+    /// The layers that touch a block, sorted by depth in its middle, the nearest first.
     fn sorted_layers(
         &self,
         part: &PixelBlock,
@@ -426,7 +426,7 @@ impl LayerStack {
         let touching = layers.iter().filter(|&&k| self.layers[k].touches(part));
         let mut sorted: Vec<_> = touching.copied().collect();
         let middle = corners.iter().sum::<Vector3<f64>>() / 4.0;
-        // A stable sort: cards that coincide stay in the order of their ids.
+        // A stable sort: coincident cards stay in the order of their ids.
         sorted.sort_by(|&a, &b| {
             let [a, b] = [a, b].map(|k| self.layers[k].reciprocal_depth(&middle));
             b.total_cmp(&a)
@@ -440,7 +440,8 @@ impl LayerStack {
             .all(|pair| self.layers[pair[0]].is_before(&self.layers[pair[1]], corners))
     }
 
-    /// Walks the layers of a part of a tile front to back; returns what passes through all of them.
+    /// Composites the layers of a part of a tile front to back; returns the transmittance of all of
+    /// them.
     fn render_layers(
         &self,
         (tile, block): (&PixelBlock, &PixelBlock),
@@ -461,7 +462,7 @@ impl LayerStack {
         through
     }
 
-    /// One row of one layer: every sub-sample's colour and opacity, added up by pixel.
+    /// One row of one layer: every sub-sample's colour and opacity, summed by pixel.
     fn sample_row(
         &self,
         layer: &Layer,
@@ -524,7 +525,7 @@ impl LayerStack {
         });
     }
 
-    /// Keeps what a row's pixels got from a layer.
+    /// Stores what a row's pixels received from a layer.
     fn keep_row(
         &self,
         layer: &Layer,
@@ -552,8 +553,9 @@ impl LayerStack {
         }
     }
 
-    /// Finds the factors on what a row's pixels got from a layer, and whether they are the light on
-    /// it: sub-samples that are lit have theirs already, and in the dark nothing is seen.
+    /// Finds the factors for what a row's pixels received from a layer, and whether these factors
+    /// are the light on it: lit sub-samples already include theirs, and in the dark nothing is
+    /// visible.
     fn light_pixels(
         &self,
         layer: &Layer,
@@ -580,7 +582,7 @@ impl LayerStack {
         }
     }
 
-    /// What a pixel got from a layer: sums over its sub-samples of light and alpha, and what it
+    /// A pixel's sample of a layer: sums over its sub-samples of light and alpha, and of what it
     /// hides.
     #[inline(always)]
     fn deep_sample(
@@ -608,10 +610,10 @@ impl LayerStack {
         share.as_ref().is_some_and(|map| map.meets(columns, rows))
     }
 
-    /// What shadows leave of the surface's light: the average over what is seen of it.
+    /// Share of the surface's light that shadows leave: the average over its visible part.
     ///
-    /// The definition divides average irradiances; the unshadowed one is the same all over a pixel
-    /// (to about 1e-4 of it), so that averaging the share itself is the same.
+    /// The definition divides average irradiances; the unshadowed one is constant within a pixel
+    /// (to about 1e-4), so averaging the share itself gives the same result.
     fn shade_catcher(&self, part: &PixelBlock, through: &Transmittance, tile: &mut RenderedTile) {
         let (Some(map), Some(plane)) = (&self.catcher.share, &self.catcher.plane) else {
             return;
@@ -627,7 +629,7 @@ impl LayerStack {
         }
     }
 
-    /// The shadow of a row, of which `shares` has the pixels' shares.
+    /// The shadow of a row; `shares` holds the pixels' shares.
     fn shade_row(
         &self,
         (map, shares): (&IrradianceMap, &[Float4]),
@@ -648,7 +650,7 @@ impl LayerStack {
         }
     }
 
-    /// Looks up the share at the pixels of a row; none where it is looked up for each sub-sample.
+    /// Looks up the share at the pixels of a row; none if it is looked up per sub-sample.
     fn fill_pixel_shares(
         &self,
         map: &IrradianceMap,
@@ -679,8 +681,8 @@ impl LayerStack {
         }
     }
 
-    /// The mean share of a pixel by what passes to each sub-sample; 1 beyond the end of the
-    /// surface.
+    /// The mean share of a pixel, weighted by the transmittance to each sub-sample; 1 beyond the
+    /// end of the surface.
     fn mean_share(
         &self,
         map: &IrradianceMap,
@@ -718,7 +720,7 @@ impl LayerStack {
     }
 }
 
-/// Where the surface is in one row of pixels.
+/// The extent of the surface in one row of pixels.
 struct CatcherSpans {
     /// Left and right end at each row of sub-samples.
     rows: Vec<(f64, f64)>,
@@ -740,7 +742,7 @@ impl CatcherSpans {
         }
     }
 
-    /// All sub-samples of a pixel are on the surface.
+    /// Whether all sub-samples of a pixel are on the surface.
     #[inline(always)]
     fn hold_pixel(&self, x: usize) -> bool {
         x as f64 + 0.5 >= self.inner.0 && x as f64 + 0.5 <= self.inner.1
@@ -752,21 +754,21 @@ impl CatcherSpans {
     }
 }
 
-/// What some spans have in common; reversed where that is nothing.
+/// The intersection of some spans; reversed if it is empty.
 fn common_span(spans: &[(f64, f64)]) -> (f64, f64) {
     let low = spans.iter().map(|s| s.0).fold(f64::NEG_INFINITY, f64::max);
     let high = spans.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
     (low, high)
 }
 
-/// The weighted mean of a share, per channel; 1 for no weight, and exactly 1 where the share is 1
-/// all over.
+/// The weighted mean of a share, per channel; 1 for no weight, and exactly 1 if the share is 1
+/// everywhere.
 fn weighted_mean(sum: &Float4, weight: &Float4) -> LinearRgb {
     let [r, g, b] = [0, 1, 2].map(|c| channel_mean_share(sum.0[c], weight.0[c]));
     LinearRgb::new(r, g, b)
 }
 
-/// One channel of it; all of the light where there is no weight.
+/// One channel of it; 1 if there is no weight.
 #[inline(always)]
 fn channel_mean_share(sum: f32, weight: f32) -> f32 {
     if weight > 0.0 {
@@ -805,7 +807,7 @@ impl LayerLine {
         )
     }
 
-    /// The same line, counted from `x`.
+    /// The same line, starting at `x`.
     fn starting_at(&self, x: f32) -> TexelLine {
         self.position.map(|(start, step)| (start + step * x, step))
     }

@@ -1,9 +1,10 @@
-//! A picture taken through a lens that bends it.
+//! Pictures through a lens with distortion.
 //!
-//! Everything in a picture of planes is linear in `(x, y, 1)`, and stays so behind an affine map. So
-//! the stack of layers is made for the pinhole camera that sees what the lens lets into the
-//! picture; then each small tile of the picture walks the layers through the tangent of the lens
-//! there. Nothing is resampled: a sub-sample of the picture is a sub-sample of the cards.
+//! Everything in a picture of planes is linear in `(x, y, 1)`, and an affine map preserves this. So
+//! the stack of layers is built for the pinhole camera that sees everything in the distorted
+//! picture; each small tile of the picture then samples the layers through the tangent of the
+//! distortion there. Nothing is resampled: a sub-sample of the picture is a sub-sample of the
+//! cards.
 
 use crate::camera::{Camera, RadialDistortion};
 use crate::geom::{Point2, Vector2};
@@ -12,27 +13,27 @@ use crate::render::lattice::Lattice;
 use crate::render::layers::{BentLattice, LayerStack};
 use crate::scene::Shot;
 
-/// How far the tangent may be from the lens at a corner of a tile, pixels: what a code of 8 bits of
-/// an edge from black to white is worth four times over.
+/// Maximum deviation of the tangent from the distortion at a corner of a tile, pixels: four codes
+/// of 8 bits on an edge from black to white.
 const TANGENT_ERROR_PX: f64 = 0.016;
-/// Sides of tiles, of which the largest is taken that errs by no more.
+/// Sides of tiles; the largest with a small enough error is used.
 const TILE_SIDES_PX: [usize; 4] = [32, 16, 8, 4];
-/// Pixels of the pinhole camera around what the picture shows: sub-samples reach out of it.
+/// Margin of the pinhole camera around the visible part, pixels: sub-samples reach out of it.
 const MARGIN_PX: f64 = 2.0;
 
-/// A lens over a picture, and the pinhole camera behind it.
+/// A lens with distortion, and the pinhole camera behind it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LensView {
-    /// Sees all that the picture shows, without the lens.
+    /// Sees everything in the picture, without the lens.
     pub(super) pinhole: Camera,
     lens: RadialDistortion,
-    /// Position of the pinhole camera's picture, from that of a camera with the picture's
-    /// principal point.
+    /// Offset from a position in the picture of a camera with the picture's principal point to one
+    /// in the pinhole camera's.
     offset: Vector2<f64>,
 }
 
 impl LensView {
-    /// None for a shot whose camera is a pinhole.
+    /// None if the shot's camera is a pinhole.
     pub(super) fn new(shot: &Shot) -> Option<Self> {
         let lens = shot.distortion();
         if lens.is_none() {
@@ -53,14 +54,14 @@ impl LensView {
         })
     }
 
-    /// Side of the tiles in which the lens is its own tangent.
+    /// Side of the tiles in which the distortion is replaced by its tangent.
     pub(super) fn tile_side(&self) -> usize {
         let curvature = self.lens.curvature();
         let is_fine = |side: &usize| tangent_error(*side, curvature) <= TANGENT_ERROR_PX;
         TILE_SIDES_PX.into_iter().find(is_fine).unwrap_or(4)
     }
 
-    /// The layers as the lens shows them in a tile.
+    /// The layers as seen through the lens in a tile.
     pub(super) fn stack_in(
         &self,
         stack: &LayerStack,
@@ -76,7 +77,7 @@ impl LensView {
     }
 }
 
-/// By how much a tangent misses at a tile's corner, half a diagonal from where it touches.
+/// Error of the tangent at a tile's corner, half a diagonal from the point of tangency.
 fn tangent_error(side: usize, curvature: f64) -> f64 {
     let half_diagonal_2 = 0.5 * (side * side) as f64;
     0.5 * curvature * half_diagonal_2

@@ -1,4 +1,4 @@
-//! Where light comes from, as a list of points and directions.
+//! The sources of light, as a list of points and directions.
 
 use crate::geom::{Point3, Vector3};
 use crate::light;
@@ -8,14 +8,14 @@ use crate::scene::{AreaLight, Shot};
 use nalgebra::{Matrix3, Vector4};
 use std::f64::consts::PI;
 
-/// Pieces of the sky narrower than this throw shadows too sharp for the coarser lattice, radians.
+/// Pieces of the sky narrower than this cast shadows too sharp for the coarser lattice, radians.
 const SMALL_WIDTH_RAD: f64 = 0.15;
 
-/// Widest step in a penumbra, nodes of the finer lattice. At 2 no golden scene is farther from Cycles
-/// by more than 1 % than with all samples, at 4 one is by 4 %.
+/// Widest step in a penumbra, nodes of the finer lattice. At 2 no golden scene is more than 1 %
+/// farther from Cycles than with all samples, at 4 one is 4 % farther.
 const PENUMBRA_STEP_CELLS: f64 = 2.0;
 
-/// Largest piece of a light, as a share of its height over what it lights.
+/// Largest piece of a light, as a share of its height over the receiver.
 const MAX_PIECE: f64 = 0.25;
 
 /// A part of a plane that light falls on.
@@ -23,18 +23,18 @@ const MAX_PIECE: f64 = 0.25;
 pub(super) struct LitPatch {
     /// Its middle.
     pub(super) center: Vector3<f64>,
-    /// Unit normal on the side that is seen.
+    /// Unit normal on the visible side.
     pub(super) normal: Vector3<f64>,
     /// Metres from its middle to its far ends.
     pub(super) reach: f64,
-    /// How far things that cast shadows stand up from it, metres.
+    /// Height of occluders above it, metres.
     pub(super) occluded: f64,
-    /// Distance of two nodes of the finer lattice on it, metres; 0 where every sample is wanted.
+    /// Spacing of the finer lattice on it, metres; 0 if every sample is wanted.
     pub(super) cell: f64,
 }
 
 impl LitPatch {
-    /// Samples along each side of a light, those of a square one being `most` at most.
+    /// Samples along each side of a light, at most `most` for a square one.
     fn samples_along(&self, light: &AreaLight, most: usize) -> [usize; 2] {
         let [a, b] = light::side_lengths(light);
         let longer = a.max(b);
@@ -44,8 +44,8 @@ impl LitPatch {
         [0, 1].map(|k| (wanted[k].ceil() as usize).clamp(1, most[k]))
     }
 
-    /// Samples along a side of a light of this length: as many as that asks for and the width of the
-    /// widest penumbra; all there are of a light that the surface hides a part of.
+    /// Samples along a side of a light of this length: enough for its size and for the width of the
+    /// widest penumbra; all available ones if the surface hides a part of the light.
     fn wanted_samples(&self, light: &AreaLight, size: f64) -> f64 {
         if light::lowest_z(light) < 0.0 {
             return f64::INFINITY;
@@ -53,11 +53,11 @@ impl LitPatch {
         let way = light::frame(light).center.coords - self.center;
         let rise = self.normal.dot(&way);
         let pieces = size / (MAX_PIECE * rise.max(0.0));
-        // Of a light that faces what it lights; the lower it stands, the longer they are.
+        // For a light that faces the receiver; the lower it is, the longer its penumbrae.
         let slant = way.norm() / rise.max(0.0);
         let penumbra = slant * size * self.occluded / (rise - self.occluded).max(0.0);
         let steps = penumbra / (PENUMBRA_STEP_CELLS * self.cell);
-        // Where nothing casts a shadow in any detail, 0 over 0, the maximum passes over it.
+        // `f64::max` ignores the NaN of 0 over 0, where nothing casts a shadow in any detail.
         pieces.max(steps).max(1.0)
     }
 }
@@ -68,18 +68,18 @@ impl LitPatch {
 pub(super) struct LightSample {
     /// Where.
     pub(super) at: Vector4<f64>,
-    /// Side of the square of light that it represents: metres, or radians of a direction.
+    /// Side of the square of light that it represents: metres, or radians for a direction.
     pub(super) width: f64,
-    /// What it does to a receiver that sees it.
+    /// How it lights a receiver that sees it.
     pub(super) kind: LightSampleKind,
 }
 
-/// How a light sample lights a receiver.
+/// The kind of a light sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum LightSampleKind {
     /// A piece of a light's face: unit normal and area.
     Face {
-        /// Which way it shines.
+        /// Direction in which it emits.
         normal: Vector3<f64>,
         /// Square metres.
         area: f64,
@@ -100,17 +100,18 @@ pub(super) struct LightGroup {
     pub(super) samples: Vec<LightSample>,
 }
 
-/// All that lights a receiver.
+/// Everything that lights a receiver.
 #[derive(Clone, Debug)]
 pub(super) struct LightSamples {
-    /// What throws sharp shadows: area lights, in their order, then small pieces of the map.
+    /// Light with sharp shadows: area lights, in their order, then small pieces of the map.
     pub(super) sharp: Vec<LightGroup>,
-    /// The rest of what is all around: the constant environment, then the pieces of the map.
+    /// The rest of the light from all around: the constant environment, then the other pieces of
+    /// the map.
     pub(super) soft: Vec<LightGroup>,
 }
 
 impl LightSamples {
-    /// What lights a receiver.
+    /// The light on a receiver.
     pub(super) fn above(shot: &Shot, options: &RenderOptions, patch: &LitPatch) -> Self {
         let normal = &patch.normal;
         let faces = Self::faces_above(shot, options, patch);
@@ -121,7 +122,7 @@ impl LightSamples {
         Self::from_parts(faces.into_iter(), ambient, pieces)
     }
 
-    /// The area lights of it alone.
+    /// Only the area lights of a receiver.
     pub(super) fn faces_above(
         shot: &Shot,
         options: &RenderOptions,
@@ -133,7 +134,7 @@ impl LightSamples {
             .collect()
     }
 
-    /// The same for a plain quadrature: whole lights, and the map in even rectangles.
+    /// The same by plain quadrature: whole lights, and the map in equal rectangles.
     pub(super) fn plain(
         shot: &Shot,
         options: &RenderOptions,
@@ -153,7 +154,7 @@ impl LightSamples {
         sharp.into_iter().chain(soft).collect()
     }
 
-    /// Leaves out what is black.
+    /// Leaves out black groups.
     fn from_parts(
         faces: impl Iterator<Item = LightGroup>,
         ambient: LightGroup,
@@ -169,7 +170,7 @@ impl LightSamples {
         }
     }
 
-    /// Irradiance of the sky where nothing is in its way.
+    /// Unobstructed irradiance of the sky.
     pub(super) fn open_sky(&self) -> LinearRgb {
         let all = self.sharp.iter().chain(&self.soft);
         all.fold(LinearRgb::BLACK, |sum, group| {
@@ -179,9 +180,9 @@ impl LightSamples {
 }
 
 impl LightGroup {
-    /// The part of a light that is above a receiver's plane, as bright in the receiver's middle as
-    /// in closed form: the few nodes of a large light near by add up to several times too much or
-    /// too little.
+    /// The part of a light that is above a receiver's plane, scaled to the closed-form irradiance
+    /// in the receiver's middle: the few nodes of a large nearby light add up to several times too
+    /// much or too little.
     fn face_above(light: &AreaLight, count: usize, patch: &LitPatch) -> Self {
         let counts = patch.samples_along(light, count);
         let nodes = light::nodes_above(light, counts, Point3::from(patch.center), &patch.normal);
@@ -193,9 +194,9 @@ impl LightGroup {
         }
     }
 
-    /// Irradiance in a receiver's middle by its light in closed form over that by its samples; 1
-    /// where there is none, and nearer to the light than the receiver reaches: no factor holds for
-    /// all of it there.
+    /// Irradiance in a receiver's middle by its light in closed form over that by its samples; 1 if
+    /// there is none, and if the light is nearer than the receiver's reach: no factor then holds for
+    /// all of it.
     fn closed_form_ratio(&self, light: &AreaLight, patch: &LitPatch) -> f64 {
         let (frame, point) = (light::frame(light), &patch.center);
         let exact = light::unit_irradiance(light, Point3::from(*point), patch.normal);
@@ -208,7 +209,7 @@ impl LightGroup {
         }
     }
 
-    /// Irradiance at a point with unit normal by unit radiance.
+    /// Irradiance for unit radiance at a point with unit normal.
     pub(super) fn unit_irradiance(&self, point: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
         let samples = self.samples.iter();
         samples.map(|sample| sample.irradiance(point, normal)).sum()
@@ -239,7 +240,7 @@ impl LightGroup {
         }
     }
 
-    /// A piece of a map: a group by itself, since each has a colour of its own.
+    /// A piece of a map: a group of its own, since each has its own colour.
     fn sky_piece(piece: light::SkyPiece) -> Self {
         Self {
             radiance: piece.irradiance,
@@ -247,7 +248,7 @@ impl LightGroup {
         }
     }
 
-    /// Its samples are of a sun, or of a lamp far away.
+    /// Whether its samples belong to a sun or a distant lamp.
     fn is_small(&self) -> bool {
         self.samples.iter().all(|s| s.width < SMALL_WIDTH_RAD)
     }
@@ -263,7 +264,7 @@ impl LightGroup {
 
 /// Axes of a frame whose `z` is `normal`.
 fn hemisphere_frame(normal: &Vector3<f64>) -> Matrix3<f64> {
-    // An axis of the world that is far from parallel to it.
+    // A world axis that is far from parallel to it.
     let oblique = if normal.x.abs() < 0.6 {
         Vector3::x()
     } else {
@@ -302,8 +303,8 @@ impl LightSample {
         }
     }
 
-    /// Cosines, distance and area at a point with unit normal: irradiance by unit radiance; 0 below
-    /// a horizon.
+    /// Irradiance for unit radiance at a point with unit normal: cosines, distance and area; 0
+    /// below a horizon.
     pub(super) fn irradiance(&self, point: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
         match self.kind {
             LightSampleKind::Sky { share } => share,
@@ -321,7 +322,7 @@ mod tests {
     use crate::quality::Quality;
     use crate::scene::LightShape;
 
-    /// A disk of 10 W that faces the origin from right above it.
+    /// A disk of 10 W that faces the origin from straight above.
     fn disk(size: f64, height: f64) -> AreaLight {
         AreaLight {
             shape: LightShape::Ellipse,
@@ -339,7 +340,8 @@ mod tests {
         }
     }
 
-    /// What lights a card at the origin with this normal, from its middle to its ends `reach` long.
+    /// The light on a card at the origin with this normal; `reach` is the distance from its middle
+    /// to its ends.
     fn face(light: AreaLight, quality: Quality, normal: Vector3<f64>, reach: f64) -> LightGroup {
         let shot = Shot::new(tilted_camera()).with_light(light);
         let options = RenderOptions::from(quality);
@@ -351,7 +353,7 @@ mod tests {
         LightSamples::faces_above(&shot, &options, &patch).remove(0)
     }
 
-    /// By what the nodes of a light are scaled for a level card.
+    /// Scale factor of a light's nodes for a level card.
     fn factor(light: AreaLight, quality: Quality, reach: f64) -> f32 {
         let scaled = face(light, quality, Vector3::z(), reach).radiance;
         scaled.g / light::radiance(&light).g
@@ -359,7 +361,7 @@ mod tests {
 
     #[test]
     fn a_light_of_any_size_is_as_bright_as_in_closed_form() {
-        // Under the last normal the plane cuts the light.
+        // With the last normal the plane cuts the light.
         let normals = [0.0, 0.1, 0.6].map(|tilt: f64| Vector3::new(0.0, tilt.sin(), tilt.cos()));
         for normal in normals {
             let exact = light::irradiance(&disk(10.0, 1.0), Point3::origin(), normal);
@@ -424,7 +426,7 @@ mod tests {
 
     #[test]
     fn a_smaller_world_is_as_bright() {
-        // A bottle, and one of 2 cm, under as large a light for their size.
+        // A bottle, and one of 2 cm, under a light of the same relative size.
         let [whole, tenth] = [1.0, 0.1]
             .map(|scale| factor(disk(8.0 * scale, 0.8 * scale), Quality::Draft, 0.11 * scale));
         assert!((whole - 1.0).abs() > 0.2, "{whole}");

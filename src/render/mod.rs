@@ -1,16 +1,17 @@
-//! Render: a [`Shot`](crate::Shot) becomes deep samples, from which the picture and its labels are
-//! both folded.
+//! Render: a [`Shot`](crate::Shot) becomes deep samples, from which both the picture and its labels
+//! are computed.
 //!
 //! Everything in a shot is planar, so each map between two planes seen from a point is a homography
 //! and visibility needs no ray tracing. Work is split by frequency: textures are sharp and are
-//! sampled several times a pixel (`layers`), irradiance is smooth and is computed once per receiver
-//! on a coarse lattice of the picture and looked up (`irradiance`). [`render_reference`] computes
-//! the same definition sample by sample without any of this, to test against.
+//! sampled several times per pixel (`layers`); irradiance is smooth and is computed once per
+//! receiver on a coarse lattice of the picture and interpolated (`irradiance`).
+//! [`render_reference`] computes the same definition sample by sample without any of this, for
+//! tests.
 //!
-//! The definition: cards are Lambert surfaces that scatter a share `alpha` of the light and let the
-//! rest pass; lights are seen through the product of `1 - alpha` of the cards in between; the plate
-//! is multiplied by the ratio of shadowed to unshadowed irradiance of the surface `z = 0`; a pixel
-//! is the average under a Blackman-Harris window three pixels wide.
+//! The definition: cards are Lambertian surfaces that scatter a share `alpha` of the light and
+//! transmit the rest; lights are attenuated by the product of `1 - alpha` of the cards in between;
+//! the plate is multiplied by the ratio of shadowed to unshadowed irradiance of the surface
+//! `z = 0`; a pixel is the average under a Blackman-Harris window three pixels wide.
 //!
 //! ```
 //! use petcomp::geom::{Pose, Quad};
@@ -75,7 +76,7 @@ pub use reference::render_reference;
 #[doc(hidden)]
 pub use retouch::retouched_fully;
 
-/// Fills a buffer with `n` times a value; it keeps its memory.
+/// Fills a buffer with `n` copies of a value, reusing its memory.
 #[inline]
 fn refill<T: Copy>(buffer: &mut Vec<T>, n: usize, value: T) {
     buffer.clear();

@@ -1,4 +1,4 @@
-//! What stops light in a shot.
+//! The occluders of a shot.
 
 use crate::asset::Texture;
 use crate::geom::Vector3;
@@ -7,29 +7,29 @@ use crate::render::view::ScenePlane;
 use crate::scene::{Card, Grade};
 use std::sync::Arc;
 
-/// A card as something that stops light.
+/// A card as an occluder.
 #[derive(Debug)]
 pub(super) struct Occluder<'a> {
-    /// Where it lies.
+    /// Its plane.
     pub(super) plane: ScenePlane,
     front: Arc<OpacityMips<'a>>,
-    /// None where it is the front seen through.
+    /// None if the back is the front seen through.
     back: Option<Arc<OpacityMips<'a>>>,
 }
 
-/// Everything that stops light: cards, and the surface for what comes from below.
+/// All occluders: the cards, and the surface for light from below.
 #[derive(Debug)]
 pub(super) struct Occluders<'a> {
     /// In the order of the cards.
     pub(super) cards: Vec<Occluder<'a>>,
     /// The plane `z = 0` as far as it reaches.
     pub(super) surface: ScenePlane,
-    /// Some card is film: what gets through differs from channel to channel.
+    /// Whether some card is film, so that transmittance differs between channels.
     pub(super) tinted: bool,
 }
 
 impl<'a> Occluders<'a> {
-    /// What stops light in a shot; cards of one texture share its opacity.
+    /// The occluders of a shot; cards with the same texture share its opacity.
     pub(super) fn new(cards: &[(&'a Card, ScenePlane)], surface: ScenePlane) -> Self {
         let mut known = Vec::new();
         let cards: Vec<_> = cards
@@ -43,14 +43,14 @@ impl<'a> Occluders<'a> {
         }
     }
 
-    /// The point of the surface below the mean of the cards' middles: their shadows fall around it.
+    /// The point of the surface below the mean of the cards' centres: their shadows fall around it.
     pub(super) fn middle_on_surface(&self) -> Vector3<f64> {
         let centers = self.cards.iter().map(|card| card.plane.center);
         let mean = centers.sum::<Vector3<f64>>() / self.cards.len().max(1) as f64;
         Vector3::new(mean.x, mean.y, 0.0)
     }
 
-    /// How far cards stand up from the plane through a point with this unit normal, metres.
+    /// Height of the cards above the plane through a point with this unit normal, metres.
     pub(super) fn height_above(&self, normal: &Vector3<f64>, point: &Vector3<f64>) -> f64 {
         let corners = self.cards.iter().flat_map(|card| card.plane.corners());
         let heights = corners.map(|corner| normal.dot(&(corner - point)));
@@ -70,8 +70,8 @@ impl<'a> Occluder<'a> {
         }
     }
 
-    /// What a receiver sees of it, `toward` being the side of the light on its normal; and whether
-    /// that is its back.
+    /// The side of it that a receiver sees, and whether that is its back; `toward` is the side of
+    /// the light on its normal.
     ///
     /// A receiver sees the side that is turned away from the light.
     pub(super) fn side_facing(&self, toward: f64) -> (&OpacityMips<'a>, bool) {
@@ -81,7 +81,7 @@ impl<'a> Occluder<'a> {
         }
     }
 
-    /// Some corner of it is more than `margin` above a plane, `normal . p = offset`.
+    /// Whether some corner of it is more than `margin` above a plane, `normal . p = offset`.
     pub(super) fn is_above(&self, normal: &Vector3<f64>, offset: f64, margin: f64) -> bool {
         let corners = self.plane.corners();
         corners.iter().any(|c| normal.dot(c) - offset > margin)

@@ -1,4 +1,4 @@
-//! Opacity alone, for what falls into shadow.
+//! Opacity alone, for shadows.
 
 use crate::asset::Texture;
 use crate::image::Image;
@@ -14,7 +14,7 @@ use crate::work::{self, Kind};
 use std::f64::consts::SQRT_2;
 use std::sync::{Arc, OnceLock};
 
-/// A texture's opacity at each halving, made on first use; shared by the cards that show it.
+/// Mip levels of a texture's opacity, computed on first use; shared by the cards that show it.
 #[derive(Debug)]
 pub(super) struct OpacityMips<'a> {
     texture: &'a Texture,
@@ -31,12 +31,12 @@ impl<'a> OpacityMips<'a> {
         }
     }
 
-    /// It differs from channel to channel.
+    /// Whether it differs between channels.
     pub(super) fn is_film(&self) -> bool {
         self.texture.is_film()
     }
 
-    /// The same opacity: colours do not matter to the alpha of a cut-out.
+    /// Whether a texture has the same opacity: a cut-out's alpha does not depend on the colours.
     pub(super) fn serves(&self, texture: &Texture, grade: &Grade) -> bool {
         match (self.texture, texture) {
             (Texture::Rgba(a), Texture::Rgba(b)) => Arc::ptr_eq(a, b),
@@ -45,7 +45,7 @@ impl<'a> OpacityMips<'a> {
         }
     }
 
-    /// The coarsest opacity whose texels are no larger than `cell` metres, or a coarser one that
+    /// The coarsest level whose texels are no larger than `cell` metres, or a coarser one that
     /// blurs by `blur` metres; on a card of this size.
     pub(super) fn level_for(&self, size: [f64; 2], cell: f64, blur: f64) -> Arc<OpacityLevel> {
         let (width, height) = self.texture.size();
@@ -58,7 +58,7 @@ impl<'a> OpacityMips<'a> {
         if let Some(opacity) = self.levels[level].get() {
             return opacity.clone();
         }
-        // Made outside of the lock: a pyramid may halve in parallel, and a thread that waits may
+        // Computed outside the lock: a pyramid may be halved in parallel, and a waiting thread may
         // come back here.
         let opacity = Arc::new(OpacityLevel::new(self.texture, &self.grade, level));
         let kept = self.levels[level].get_or_init(|| {
@@ -69,28 +69,28 @@ impl<'a> OpacityMips<'a> {
     }
 }
 
-/// How often texels can be doubled within a length of so many of them: the exponent of the number.
+/// Number of times that texels can be doubled within a length of this many texels.
 fn halvings_within(texels: f64) -> usize {
     (texels.max(1.0).to_bits() >> 52) as usize - 1023
 }
 
-/// Opacity of a texture at one level of detail.
+/// Opacity of a texture at one mip level.
 #[derive(Debug)]
 pub(super) struct OpacityLevel {
     pub(super) grid: TexelGrid,
     width: usize,
     height: usize,
-    /// What passes each texel, per channel: 1 minus alpha in all of them for a texture that is no
-    /// film.
+    /// Transmittance of each texel, per channel: 1 minus alpha in all of them for a texture that is
+    /// no film.
     pub(super) passing: Vec<Float4>,
-    /// Where it stops any light.
+    /// Where it blocks any light.
     pub(super) extent: TexelExtent,
-    /// Every texel stops all light.
+    /// Whether every texel blocks all light.
     opaque: bool,
 }
 
 impl OpacityLevel {
-    /// Opacity of a texture halved `level` times, in a card's own colours.
+    /// Opacity of a texture halved `level` times, with a card's grade.
     pub(super) fn new(texture: &Texture, grade: &Grade, level: usize) -> Self {
         let grid = TexelGrid::new(texture.size(), level as f64);
         match texture {
@@ -118,21 +118,21 @@ impl OpacityLevel {
         }
     }
 
-    /// How far inside of its sides an opaque texture is surely read as opaque, as shares of it;
-    /// none for one that is not.
+    /// How far inside its sides an opaque texture is certain to be read as opaque, as shares of it;
+    /// none for one that is not opaque.
     pub(super) fn opaque_inset(&self) -> Option<[f64; 2]> {
         self.opaque
             .then(|| self.grid.texels.map(|n| (0.5 + POSITION_ERROR_TEXELS) / n))
     }
 
-    /// Multiplies what gets through, along a line over bordered texels from its sample `first` on.
+    /// Multiplies transmittances along a line over bordered texels from its sample `first` on.
     pub(super) fn attenuate(&self, line: &TexelLine, first: usize, through: &mut [Float4]) {
         let size = (self.width, self.height);
         attenuate_line(&self.passing, size, line, first as f32, through);
     }
 }
 
-/// An image as opacities, with a border of none.
+/// An image as opacities, with a transparent border.
 fn bordered<P: Copy>(image: &Image<P>, opacity: impl Fn(P) -> Float4) -> Image<Float4> {
     let [width, height] = [image.width(), image.height()].map(|n| n + 2 * BORDER_TEXELS);
     let mut texels = Image::filled(width, height, Float4::ZERO);
@@ -143,7 +143,7 @@ fn bordered<P: Copy>(image: &Image<P>, opacity: impl Fn(P) -> Float4) -> Image<F
     texels
 }
 
-/// What passes opacities.
+/// Transmittances from opacities.
 fn passing(mut texels: Image<Float4>) -> Vec<Float4> {
     for t in texels.pixels_mut() {
         *t = t.clamped().complement();
@@ -151,7 +151,7 @@ fn passing(mut texels: Image<Float4>) -> Vec<Float4> {
     texels.into_vec()
 }
 
-/// Every texel inside of the border stops all light.
+/// Whether every texel inside the border blocks all light.
 fn is_opaque(texels: &Image<Float4>) -> bool {
     let inner = |n: usize| BORDER_TEXELS..n - BORDER_TEXELS;
     let stops_all = |o: &Float4| o.rgb() == LinearRgb::WHITE;
@@ -159,8 +159,8 @@ fn is_opaque(texels: &Image<Float4>) -> bool {
     rows.all(|row| row.iter().all(stops_all))
 }
 
-/// Dense since it is the innermost loop of shadows: compiled as one piece for each set of vector
-/// instructions.
+/// Dense since it is the innermost loop of shadows: compiled as one piece for each vector
+/// instruction set.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",

@@ -1,13 +1,14 @@
-//! How finely a picture is sampled.
+//! Sampling density of a picture.
 
 use crate::bounds::Bounds;
 use crate::error::Result;
 use crate::quality::Quality;
 use serde::{Deserialize, Serialize};
 
-/// How finely a picture is sampled; the same numbers give the same bits.
+/// Sampling density of a picture; the same numbers give the same bits.
 ///
-/// One for each [`Quality`]: points on the measured curve of error (against Cycles) over run time.
+/// There is one for each [`Quality`], on the measured curve of error (against Cycles) over run
+/// time.
 ///
 /// ```
 /// use petcomp::Quality;
@@ -22,16 +23,17 @@ use serde::{Deserialize, Serialize};
 pub struct RenderOptions {
     /// Samples along each side of a pixel, 1 to 16. Default: 2.
     pub subsamples: usize,
-    /// Samples along each side of a square light, 1 to 32, at most: a small light whose penumbrae are
-    /// narrow in the picture has fewer, an oblong one as many in all, more of them along its longer
-    /// side. Default: 3.
+    /// Maximum samples along each side of a square light, 1 to 32: a small light with narrow
+    /// penumbrae in the picture gets fewer, an oblong one the same total, with more along its
+    /// longer side. Default: 3.
     pub light_samples: usize,
-    /// Directions that the environment is seen from, 1 to 4096. Default: 32.
+    /// Directions sampled for the environment, 1 to 4096. Default: 32.
     pub ambient_samples: usize,
-    /// Distance of two samples of the irradiance, 0.25 to 16 pixels. Default: 1.5. In pictures longer
-    /// than 960 pixels it grows with them: shadows are no sharper there, they only have more pixels.
+    /// Spacing of the irradiance samples, 0.25 to 16 pixels. Default: 1.5. In pictures longer than
+    /// 960 pixels it grows with them: their shadows are no sharper, they only span more pixels.
     pub cell_px: f64,
-    /// What is seen through objects whose refraction was measured is displaced. Default: true.
+    /// Whether objects whose refraction was measured displace what is seen through them. Default:
+    /// true.
     #[serde(skip_serializing_if = "Clone::clone")]
     pub refraction: bool,
 }
@@ -70,19 +72,20 @@ impl Default for RenderOptions {
     }
 }
 
-/// `Quality::Reference` has 6; beyond 16 the error is below a code of 8 bits, and the time without
+/// `Quality::Reference` has 6; beyond 16 the error is below a code of 8 bits, and the time
+/// unbounded.
 /// bounds.
 const SUBSAMPLES: Bounds = Bounds::new(1.0, 16.0, "quality reference has 6");
 const LIGHT_SAMPLES: Bounds = Bounds::new(1.0, 32.0, "quality reference has 8");
 const AMBIENT_SAMPLES: Bounds = Bounds::new(1.0, 4096.0, "quality reference has 400");
 const CELL_PX: Bounds = Bounds::new(0.25, 16.0, "pixels; smaller cells resolve no more");
 
-/// Longest pictures whose cells are as long as they are told. Two of 1920 x 1080 with 30 bottles have
-/// the same error at cells of 1.5 and 3 pixels (0.00167, 0.00166), and 8 % more at 4.5.
+/// Longest pictures whose cells are used as given. Two of 1920 x 1080 with 30 bottles have the same
+/// error at cells of 1.5 and 3 pixels (0.00167, 0.00166), and 8 % more at 4.5.
 const MAX_CELL_IMAGE_PX: f64 = 960.0;
 
 impl RenderOptions {
-    /// Fails on the first number without use: zero, or so large that a picture takes hours.
+    /// Fails on the first useless number: zero, or so large that a picture takes hours.
     ///
     /// # Errors
     /// [`Error::Value`](crate::Error::Value) with the option's name.
@@ -93,7 +96,7 @@ impl RenderOptions {
         CELL_PX.check("cell_px", self.cell_px)
     }
 
-    /// The same for a picture of some width and height.
+    /// The options for a picture of some width and height.
     pub(super) fn for_image(self, image: [u32; 2]) -> Self {
         let longer = f64::from(image[0].max(image[1]));
         Self {
@@ -102,8 +105,8 @@ impl RenderOptions {
         }
     }
 
-    /// The same with every number inside the range that the arithmetic bears: at least one sample,
-    /// cells of 0.25 to 16 pixels.
+    /// The options with every number clamped to the range that the arithmetic supports: at least
+    /// one sample, cells of 0.25 to 16 pixels.
     pub(super) fn clamped(self) -> Self {
         Self {
             subsamples: self.subsamples.clamp(1, 64),

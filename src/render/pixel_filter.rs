@@ -1,8 +1,8 @@
-//! The window that a pixel looks through.
+//! The pixel filter.
 
 use std::f64::consts::TAU;
 
-/// Half of the window's width, pixels: Cycles' default filter is 1.5 wide to either side.
+/// Half of the window's width, pixels: Cycles' default filter extends 1.5 to either side.
 const WINDOW_RADIUS_PX: f64 = 1.5;
 
 /// Variance of the window, square pixels.
@@ -11,18 +11,18 @@ const WINDOW_VARIANCE_PX2: f64 = 0.17266;
 /// Coefficients of the Blackman-Harris window (Harris 1978, four terms, 92 dB).
 const WINDOW_TERMS: [f64; 4] = [0.35875, -0.48829, 0.14128, -0.01168];
 
-/// Positions, pixels from the centre, that split the window's weight into `count` equal parts at
-/// their middle.
+/// Positions, pixels from the centre, of the midpoints (by weight) of `count` equal parts of the
+/// window's weight.
 ///
-/// All samples of a pixel have the same weight then.
+/// All samples of a pixel then have the same weight.
 pub(super) fn filter_quantiles(count: usize) -> Vec<f64> {
     (0..count)
         .map(|i| filter_quantile((i as f64 + 0.5) / count as f64))
         .collect()
 }
 
-/// What the positions leave of the window's width: the standard deviation that the texture's own
-/// filter must add.
+/// The part of the window's width that the positions lack: the standard deviation that the
+/// texture's own filter must add.
 pub(super) fn residual_sigma(offsets: &[f64]) -> f64 {
     let residual = WINDOW_VARIANCE_PX2 - mean_square(offsets);
     residual.max(0.0).sqrt()
@@ -53,7 +53,7 @@ fn cumulative_weight(s: f64) -> f64 {
     t + (first + second + third) / WINDOW_TERMS[0]
 }
 
-/// The integral of a cosine of the window up to `t`.
+/// The integral up to `t` of a cosine term of the window.
 fn integrated_term(k: usize, t: f64) -> f64 {
     WINDOW_TERMS[k] * libm::sin(TAU * k as f64 * t) / (TAU * k as f64)
 }
@@ -62,7 +62,7 @@ fn integrated_term(k: usize, t: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Offsets and left-over sigma for r = 1, 2, 3, 4, 6, worked out by another program.
+    /// Offsets and residual sigma for r = 1, 2, 3, 4, 6, computed by another program.
     #[test]
     fn quantiles_are_the_published_ones() {
         let table: [(&[f64], f64); 5] = [

@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-/// Ranges have something in common.
+/// Whether ranges have something in common.
 pub(super) fn ranges_meet(a: &Range<usize>, b: &Range<usize>) -> bool {
     a.start < b.end && b.start < a.end
 }
 
-/// The shortest range that holds both; an empty one adds nothing.
+/// The shortest range that contains both; an empty one adds nothing.
 pub(super) fn range_union(a: Range<usize>, b: Range<usize>) -> Range<usize> {
     match (a.is_empty(), b.is_empty()) {
         (true, _) => b,
@@ -16,7 +16,7 @@ pub(super) fn range_union(a: Range<usize>, b: Range<usize>) -> Range<usize> {
     }
 }
 
-/// What two ranges have in common.
+/// The intersection of two ranges.
 pub(super) fn range_overlap(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     let start = a.start.max(b.start);
     start..a.end.min(b.end).max(start)
@@ -27,7 +27,7 @@ pub(super) fn range_until(range: Range<usize>, end: usize) -> Range<usize> {
     range.start.min(end)..range.end.min(end)
 }
 
-/// Integers in `low..=high`, cut to `within`.
+/// Integers in `low..=high`, clipped to `within`.
 pub(super) fn integer_range(low: f64, high: f64, within: &Range<usize>) -> Range<usize> {
     let start = integer_from(low).clamp(within.start, within.end);
     let end = if high >= 0.0 {
@@ -38,8 +38,8 @@ pub(super) fn integer_range(low: f64, high: f64, within: &Range<usize>) -> Range
     start..end.max(start)
 }
 
-/// The lowest integer that is not below `x`, and not below 0. `as` saturates, so infinite ends are
-/// cut like all others.
+/// The lowest integer that is neither below `x` nor below 0. `as` saturates, so infinite ends are
+/// clipped like all others.
 #[inline(always)]
 fn integer_from(x: f64) -> usize {
     let below = x as usize;

@@ -1,7 +1,7 @@
-//! What reaches a card or the surface: all its light in the open, less what occluders take away.
+//! Light that reaches a card or the surface: all its light in the open, less what occluders block.
 //!
-//! Keeping what is *lost* instead of what arrives makes work sparse, since most rays meet no
-//! occluder at most nodes, and makes light exact where nothing is in its way.
+//! Tracking the light that is *lost* instead of the light that arrives makes work sparse, since
+//! most rays meet no occluder at most nodes, and makes unobstructed light exact.
 
 use crate::geom::Vector3;
 use crate::pixel::{LinearRgb, Mix};
@@ -29,12 +29,12 @@ pub(super) const BAND_ROWS: usize = 16;
 #[derive(Debug)]
 pub(super) struct Receiver {
     plane: ProjectedPlane,
-    /// Nodes outside of these sides are not requested.
+    /// Nodes outside these sides are not requested.
     outline: ConvexShape,
     pub(super) columns: Range<usize>,
     pub(super) rows: Range<usize>,
     groups: Vec<RayGroup>,
-    /// Irradiance that comes from other lights than these, before anything is lost.
+    /// Irradiance from lights other than these, before anything is lost.
     open_sky: LinearRgb,
 }
 
@@ -51,25 +51,25 @@ impl RayGroup {
     }
 }
 
-/// A receiver under lights whose shadows are sharp, and under the rest of the sky, whose shadows are
+/// A receiver under lights with sharp shadows, and under the rest of the sky, whose shadows are
 /// soft enough for a coarser lattice.
 #[derive(Debug)]
 pub(super) struct ReceiverIrradiance {
     pub(super) fine: Receiver,
     pub(super) coarse: Receiver,
-    /// The share of open irradiance is requested, not irradiance itself.
+    /// Whether the share of open irradiance is requested, instead of irradiance itself.
     pub(super) relative: bool,
-    /// How the light is spread; the plate of a surface shows its own.
+    /// Distribution of the light; the plate of a surface shows its own.
     light_grid: Option<LightGrid>,
 }
 
 impl ReceiverIrradiance {
-    /// No light shines on it.
+    /// Whether no light shines on it.
     pub(super) fn is_dark(&self) -> bool {
         self.fine.groups.is_empty() && self.coarse.groups.is_empty()
     }
 
-    /// Spreads the light at the requested nodes of a row as the shot says.
+    /// Applies the shot's distribution of light to the requested nodes of a row.
     pub(super) fn spread_light(&self, row: &mut RowSums, out: &mut [Float4]) {
         let Some(grid) = &self.light_grid else {
             return;
@@ -92,7 +92,7 @@ impl ReceiverIrradiance {
     }
 }
 
-/// What receivers are made from.
+/// Inputs shared by all receivers.
 pub(super) struct LightingContext<'a> {
     pub(super) fine: Lattice,
     coarse: Lattice,
@@ -101,7 +101,7 @@ pub(super) struct LightingContext<'a> {
     options: RenderOptions,
 }
 
-/// The lights that a receiver's shadows are computed for, and the irradiance of the whole sky.
+/// The lights for whose shadows a receiver is computed, and the irradiance of the whole sky.
 #[derive(Clone, Copy)]
 struct SelectedLights<'a> {
     groups: &'a [LightGroup],
@@ -125,8 +125,8 @@ impl<'a> LightingContext<'a> {
         }
     }
 
-    /// What lights a plane, as far as it matters, on the side of the camera; none where it is seen
-    /// edge-on. The normal is that of every lattice.
+    /// The relevant light on a plane, on the side of the camera; none if it is seen edge-on. The
+    /// normal is that of every lattice.
     fn light_samples(
         &self,
         plane: &ScenePlane,
@@ -144,8 +144,8 @@ impl<'a> LightingContext<'a> {
         Some(LightSamples::above(self.shot, &self.options, &patch))
     }
 
-    /// Card number `own`, at the nodes where anything is seen on it and one around. None where the
-    /// card is not seen at all.
+    /// Card number `own`, at the nodes where its texture is not empty and one around. None if the
+    /// card is not visible at all.
     pub(super) fn card(&self, own: usize, seen: &VisibleSide<'_>) -> Option<ReceiverIrradiance> {
         let plane = &self.occluders.cards[own].plane;
         let lights = self.light_samples(plane, plane.center, plane.half_length())?;
@@ -177,10 +177,10 @@ impl<'a> LightingContext<'a> {
         Some(self.receiver(projected, groups, lights, (outline, area)))
     }
 
-    /// The surface, at the nodes where a shadow may fall on it. None where there is no shadow, or
-    /// none to be seen.
+    /// The surface, at the nodes where a shadow may fall on it. None if there is no shadow, or no
+    /// visible one.
     pub(super) fn surface(&self) -> Option<ReceiverIrradiance> {
-        // The surface may have no end; its shadows are as large as cards.
+        // The surface may be infinite; its shadows are as large as cards.
         let cards = self.occluders.cards.iter();
         let reach = cards.map(|c| c.plane.half_length()).fold(0.0, f64::max);
         let center = self.occluders.middle_on_surface();
@@ -254,16 +254,16 @@ impl<'a> SelectedLights<'a> {
     }
 }
 
-/// The side of a card that is turned to the camera.
+/// The side of a card that faces the camera.
 pub(super) struct VisibleSide<'a> {
     pub(super) texture: &'a BakedTexture,
-    /// Its texture runs the other way.
+    /// Whether its texture is mirrored.
     pub(super) mirrored: bool,
 }
 
 impl VisibleSide<'_> {
-    /// The requested nodes of a card: two further out than anything is seen on it, for the finer
-    /// lattice's one that lies between them.
+    /// The requested nodes of a card: two beyond its visible part, so that those of the finer
+    /// lattice in between are included.
     fn outline(&self, plane: &ProjectedPlane) -> ConvexShape {
         let sides = self.texture.sides_on(&plane.mirrored_if(self.mirrored));
         ConvexShape::new(&sides.map(|side| grown_side(&side, 2.0)))
@@ -296,7 +296,7 @@ fn finer_nodes(coarse: &Range<usize>) -> Range<usize> {
     }
 }
 
-/// Scratch of one task.
+/// Scratch memory of one task.
 #[derive(Default)]
 pub(super) struct BandBuffers {
     /// The rows of the band.
@@ -306,35 +306,35 @@ pub(super) struct BandBuffers {
     ray: RayBuffers,
 }
 
-/// What is added up for a row: a value per requested node.
+/// Sums of a row: a value per requested node.
 #[derive(Default)]
 pub(super) struct RowSums {
-    /// Its number.
+    /// Its index.
     j: usize,
     pub(super) requested: Range<usize>,
     /// World position.
     position: [Vec<f32>; 3],
-    /// Irradiance by unit radiance of all rays of a group of faces, in the open.
+    /// Irradiance for unit radiance from all rays of a group of faces, in the open.
     group: Vec<f32>,
     /// Irradiance in the open.
     pub(super) open: Vec<Float4>,
-    /// Irradiance that occluders take away.
+    /// Irradiance that occluders block.
     pub(super) hidden: Vec<Float4>,
 }
 
-/// A row of one ray.
+/// A row for one ray.
 #[derive(Default)]
 struct RayBuffers {
-    /// Irradiance by unit radiance.
+    /// Irradiance for unit radiance.
     strength: Vec<f32>,
-    /// Share that passes the occluders, per channel.
+    /// Transmittance of the occluders, per channel.
     through: Vec<Float4>,
     /// Nodes of each row of the band that each shadow touches.
     touched: Vec<Vec<(usize, Range<usize>)>>,
     counts: RayCounts,
 }
 
-/// What some rows took.
+/// Work done for some rows.
 #[derive(Default)]
 struct RayCounts {
     light: usize,
@@ -362,7 +362,7 @@ impl Receiver {
     /// Open and hidden irradiance at the requested nodes of some rows: the open sky and this
     /// receiver's own lights.
     ///
-    /// Ray by ray, so that the part of a texture that throws a shadow on the rows is read at once.
+    /// Ray by ray, so that the part of a texture that shadows the rows is read at once.
     pub(super) fn gather_band(&self, rows: Range<usize>, buffers: &mut BandBuffers) {
         buffers.rows.resize_with(rows.len(), RowSums::default);
         let has_faces = self.groups.iter().any(RayGroup::has_faces);
@@ -378,13 +378,13 @@ impl Receiver {
         work::add_all(std::mem::take(&mut buffers.ray.counts).into_work());
     }
 
-    /// Whether there are two nodes along each side.
+    /// Whether there are at least two nodes along each side.
     fn has_cells(&self) -> bool {
         self.rows.len() > 1 && self.columns.len() > 1
     }
 
-    /// With the nodes that a receiver on the coarser lattice needs around its own, as far as the
-    /// picture goes.
+    /// Adds the nodes that a receiver on the coarser lattice needs around its own, clipped to the
+    /// picture.
     fn grown_around(self, coarse: &Self, view: &CameraView) -> Self {
         let rows = finer_union(&self.rows, &coarse.rows);
         let columns = finer_union(&self.columns, &coarse.columns);
@@ -409,7 +409,7 @@ impl Receiver {
     }
 }
 
-/// Adds up a group of rays.
+/// Sums a group of rays.
 fn gather_group(group: &RayGroup, rows: &mut [RowSums], buffers: &mut RayBuffers) {
     let has_faces = group.has_faces();
     let radiance = group.radiance.into();
@@ -430,26 +430,26 @@ fn gather_group(group: &RayGroup, rows: &mut [RowSums], buffers: &mut RayBuffers
 }
 
 impl RowSums {
-    /// Empties what is added up: nothing but the open sky, and nothing hidden.
+    /// Resets the sums: only the open sky, and nothing hidden.
     fn start(&mut self, j: usize, requested: Range<usize>, open_sky: Float4) {
         refill(&mut self.open, requested.len(), open_sky);
         refill(&mut self.hidden, requested.len(), Float4::ZERO);
         (self.j, self.requested) = (j, requested);
     }
 
-    /// Empties what is added up for one group of faces.
+    /// Resets the sums of one group of faces.
     fn start_faces(&mut self) {
         refill(&mut self.group, self.requested.len(), 0.0);
     }
 
-    /// Adds a group of faces of this radiance to the irradiance in the open.
+    /// Adds a group of faces with this radiance to the irradiance in the open.
     fn add_faces(&mut self, radiance: Float4) {
         for (open, &e) in self.open.iter_mut().zip(&self.group) {
             *open = open.add_scaled(e, radiance);
         }
     }
 
-    /// Adds a ray of this radiance to the row with this number in its band.
+    /// Adds a ray with this radiance to the row with this index in its band.
     fn add_ray(
         &mut self,
         (ray, n): (&ShadowRay, usize),
@@ -476,7 +476,7 @@ impl RowSums {
         buffers.counts.light += buffers.strength.len();
     }
 
-    /// Adds what is hidden of a piece of the sky; what it gives in the open is in the open sky.
+    /// Adds the hidden part of a piece of the sky; its open irradiance is part of the open sky.
     fn hide_sky(&mut self, ray: (&ShadowRay, usize), irradiance: Float4, buffers: &mut RayBuffers) {
         let Some(nodes) = buffers.see_through(ray, self.j, &self.requested) else {
             return;
@@ -484,7 +484,7 @@ impl RowSums {
         add_hidden(&mut self.hidden[nodes], &buffers.through, irradiance);
     }
 
-    /// Adds what is hidden of a piece of an area light, by its strength at each node.
+    /// Adds the hidden part of a piece of an area light, by its strength at each node.
     fn hide_face(&mut self, ray: (&ShadowRay, usize), radiance: Float4, buffers: &mut RayBuffers) {
         let Some(nodes) = buffers.see_through(ray, self.j, &self.requested) else {
             return;
@@ -495,7 +495,7 @@ impl RowSums {
     }
 }
 
-/// Adds what does not pass of an even irradiance.
+/// Adds the blocked part of a constant irradiance.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
@@ -507,7 +507,7 @@ fn add_hidden(hidden: &mut [Float4], through: &[Float4], irradiance: Float4) {
     }
 }
 
-/// Adds what does not pass of a radiance that has a strength at each node.
+/// Adds the blocked part of a radiance with a strength at each node.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
@@ -525,7 +525,7 @@ fn add_hidden_by_strength(
 }
 
 impl RayBuffers {
-    /// Notes which nodes of each row of a band a ray's shadows touch.
+    /// Records which nodes of each row of a band a ray's shadows touch.
     fn touch_shadows(&mut self, ray: &ShadowRay, rows: &[RowSums]) {
         self.touched.resize_with(rows.len(), Vec::new);
         self.touched.iter_mut().for_each(Vec::clear);
@@ -539,7 +539,7 @@ impl RayBuffers {
         }
     }
 
-    /// Notes which nodes of these rows, of those of a band, a shadow touches.
+    /// Records which nodes of some rows of a band a shadow touches.
     fn touch_shadow(
         &mut self,
         (k, shadow): (usize, &ProjectedShadow),
@@ -556,8 +556,8 @@ impl RayBuffers {
         }
     }
 
-    /// Computes what passes all shadows of a ray in a row, the `n`-th of its band; at which of the
-    /// requested nodes, counted from the first. None where there is no shadow.
+    /// Computes the transmittance of all shadows of a ray in a row, the `n`-th of its band; returns
+    /// at which of the requested nodes, counted from the first. None if there is no shadow.
     fn see_through(
         &mut self,
         (ray, n): (&ShadowRay, usize),
@@ -570,7 +570,7 @@ impl RayBuffers {
         Some(all.start - requested.start..all.end - requested.start)
     }
 
-    /// Computes what passes all shadows of a ray at these nodes.
+    /// Computes the transmittance of all shadows of a ray at these nodes.
     fn fill_through(&mut self, (ray, n): (&ShadowRay, usize), j: usize, all: &Range<usize>) {
         self.counts.shadow += all.len();
         refill(&mut self.through, all.len(), Float4::ONE);
@@ -581,7 +581,7 @@ impl RayBuffers {
     }
 }
 
-/// Quotients along a row: of two numbers and their steps, the divisor never below a bound.
+/// Quotients along a row, from two numbers and their steps; the divisor is never below a bound.
 #[inline]
 fn fill_quotients(p: (f64, f64), w: (f64, f64), lowest: f64, out: &mut [f32]) {
     for (i, out) in out.iter_mut().enumerate() {

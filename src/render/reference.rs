@@ -1,4 +1,4 @@
-//! The definition, sample by sample: slow and obviously right.
+//! The definition, sample by sample: slow and obviously correct.
 
 use crate::asset::Texture;
 use crate::camera::RadialDistortion;
@@ -18,12 +18,12 @@ use crate::scene::{Card, Shot};
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
-/// Renders a shot without any shortcut: every sub-sample of every pixel sends a ray to every light
-/// sample.
+/// Renders a shot without approximations: every sub-sample of every pixel sends a ray to every
+/// light sample.
 ///
-/// Textures are read at full size, colours are graded after interpolation, `cell_px` is not used.
-/// Takes minutes where [`render`](super::render) takes milliseconds; its error against the
-/// definition falls with the numbers in `options`.
+/// Textures are read at full size, colours are graded after interpolation, and `cell_px` is not
+/// used. Takes minutes where [`render`](super::render) takes milliseconds; its error against the
+/// definition falls as the numbers in `options` grow.
 pub fn render_reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
     let shot = &*retouched_fully(shot, &options);
@@ -48,7 +48,7 @@ fn deep_image(shadow: Image<LinearRgb>, lists: Vec<Vec<ReferenceSample>>) -> Dee
     DeepImage::from_pixels(shadow, samples)
 }
 
-/// A deep sample and what it hides per channel.
+/// A deep sample and what it hides, per channel.
 struct ReferenceSample {
     deep: DeepSample,
     hidden: LinearRgb,
@@ -67,19 +67,19 @@ impl ReferenceSample {
         }
     }
 
-    /// Adds what film covers, and what it hides of what passes to it.
+    /// Adds what film covers, and what it hides of the light that passes to it.
     fn add_film(&mut self, weight: f32, film: &Film, through: LinearRgb) {
         self.deep.alpha += weight * channel_mean(film.opacity);
         self.hidden = self.hidden.add_scaled(weight, through * film.opacity);
     }
 
-    /// What is seen of it is what it hides.
+    /// Sets its visible part to what it hides.
     fn finish(&mut self) {
         self.deep.visible = channel_mean(self.hidden);
     }
 }
 
-/// A card with everything that a ray asks of it.
+/// A card with everything that rays need.
 struct ReferenceCard<'a> {
     card: &'a Card,
     plane: ScenePlane,
@@ -97,14 +97,14 @@ struct ReferenceWorld<'a> {
     tinted: bool,
 }
 
-/// Where a camera ray meets a card.
+/// Intersection of a camera ray with a card.
 struct CardHit {
     uv: [f64; 2],
     depth: f64,
     normal: Vector3<f64>,
 }
 
-/// Irradiance without and with the cards in the way.
+/// Irradiance without and with occluders.
 #[derive(Default)]
 struct PointIrradiance {
     open: LinearRgb,
@@ -161,13 +161,12 @@ impl<'a> ReferenceWorld<'a> {
         (samples, shadow.ratio())
     }
 
-    /// Where the camera without its lens sees what the picture shows at a position.
+    /// Maps a position in the picture to where the camera without its lens sees the same.
     fn ideal_px(&self, px: [f64; 2]) -> [f64; 2] {
         self.lens.undistort(px.into()).into()
     }
 
-    /// The cards that are not edge-on, the nearest at a pixel's centre first, with their depths
-    /// there.
+    /// The cards that are not edge-on, with their depths at a pixel's centre, the nearest first.
     fn depth_order(&self, x: f64, y: f64) -> Vec<(usize, f64)> {
         let mut order: Vec<_> = (0..self.cards.len())
             .filter_map(|k| Some((k, self.cards[k].depth_at(x, y)?)))
@@ -186,8 +185,7 @@ impl<'a> ReferenceWorld<'a> {
             .collect()
     }
 
-    /// Adds what the cards do along one ray, front to back; returns what passes through all of
-    /// them.
+    /// Adds the cards along one ray, front to back; returns the transmittance of all of them.
     fn trace_cards(
         &self,
         [x, y]: [f64; 2],
@@ -218,7 +216,7 @@ impl<'a> ReferenceWorld<'a> {
         light.shadowed.scale(factor)
     }
 
-    /// Irradiance of the surface where a camera ray meets it; none beside it.
+    /// Irradiance of the surface where a camera ray meets it; none outside it.
     fn surface_light(&self, [x, y]: [f64; 2]) -> PointIrradiance {
         let hit = self.surface.as_ref().and_then(|s| s.intersect_px(x, y));
         hit.map_or_else(PointIrradiance::default, |(_, depth)| {
@@ -272,7 +270,7 @@ impl<'a> ReferenceWorld<'a> {
     }
 }
 
-/// Texture coordinates where the way from a point to a light sample crosses a plane.
+/// Texture coordinates where the line from a point to a light sample crosses a plane.
 fn crossing_uv(plane: &ScenePlane, p: &Vector3<f64>, sample: &LightSample) -> Option<[f64; 2]> {
     let way = sample.at.xyz() - p * sample.at.w;
     let s = plane.normal.dot(&(plane.center - p)) / plane.normal.dot(&way);
@@ -306,7 +304,7 @@ impl<'a> ReferenceCard<'a> {
         self.card.texture.is_film() || self.card.back.as_ref().is_some_and(Texture::is_film)
     }
 
-    /// Depth of its plane at a picture position; as far as can be where it is behind the camera.
+    /// Depth of its plane at a picture position; the maximum if it is behind the camera.
     fn depth_at(&self, x: f64, y: f64) -> Option<f64> {
         let projected = self.projected.as_ref()?;
         Some(projected.depth_at(&Vector3::new(x, y, 1.0)))
@@ -322,7 +320,7 @@ impl<'a> ReferenceCard<'a> {
         })
     }
 
-    /// Share of a sample's light that it lets through to a point; none where it is not in the way.
+    /// Share of a sample's light that it transmits to a point; none if it is not in the way.
     fn passes(&self, p: &Vector3<f64>, sample: &LightSample) -> Option<LinearRgb> {
         let uv = crossing_uv(&self.plane, p, sample)?;
         Some(self.texel(uv, p).transmittance())
@@ -333,7 +331,7 @@ impl<'a> ReferenceCard<'a> {
     }
 }
 
-/// A ratio of averages, per channel; 1 where there is nothing to average.
+/// A ratio of averages, per channel; 1 if there is nothing to average.
 #[derive(Default)]
 struct ShadowRatio {
     open: LinearRgb,
@@ -343,8 +341,8 @@ struct ShadowRatio {
 }
 
 impl ShadowRatio {
-    /// Adds what passes to the surface, and the light there; where no light is, the plate stays as
-    /// it is.
+    /// Adds the light at the surface, with the transmittance to it as weight; without light, the
+    /// plate is unchanged.
     fn add(&mut self, weight: LinearRgb, light: &PointIrradiance) {
         if light.open == LinearRgb::BLACK {
             self.outside = self.outside + weight;

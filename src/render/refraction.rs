@@ -1,11 +1,12 @@
-//! What is seen through cards that bend light: it is read where the lines of sight through them end.
+//! Refraction: what is seen through cards with a flow is read where the lines of sight through them
+//! end.
 //!
-//! A card with a flow looks as it does without; what lies behind it is displaced. Over a pixel that
-//! changes the picture by what the card and all in front of it let pass, times the difference of
-//! what lies behind at the displaced place and straight on. That difference becomes light of the
-//! card's own sample, so that pictures stay sums of light, and labels, which look at coverage alone,
-//! stay what they are. What of it is the plate's is known apart: it is as sharp as the photo that it
-//! is from, whatever becomes of the objects.
+//! A card with a flow itself looks the same as without; what is behind it is displaced. This
+//! changes a pixel by the transmittance of the card and of everything in front of it, times the
+//! difference between what is behind at the displaced place and straight on. The difference becomes
+//! light of the card's own sample, so that pictures remain sums of light, and labels, which depend
+//! on coverage alone, are unaffected. The part of it that belongs to the plate is stored
+//! separately: it is as sharp as the photo, whatever is done to the objects.
 
 use crate::camera::RadialDistortion;
 use crate::deep::{DeepImage, DeepSample, SeenBehind};
@@ -23,20 +24,20 @@ use crate::work::{self, Kind};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Pixels around a place that a reading between pixels looks at.
+/// Pixels around a position that an interpolated reading uses.
 const READING_MARGIN_PX: f64 = 3.0;
 
-/// The picture with all that is seen through its bending cards displaced.
+/// Displaces everything seen through the picture's refracting cards.
 ///
-/// `shot` has the cards as they were given, `offsets` are the sub-samples along a side of a pixel,
-/// and `behind` renders the cards behind one of them, at least in a block.
+/// `shot` has the original cards, `offsets` are the sub-samples along a side of a pixel, and
+/// `behind` renders the cards behind one of them, at least in a block.
 ///
 /// # Method
-/// Back to front, once for each card with a flow: the picture of all that lies behind it, cards that
-/// bend included, is gathered at the displaced places. Measured on a display, the displacement d
-/// stands for a line of sight that leaves the object at its middle, h0 over the display; what lies
-/// at clearance c under the object is displaced by `d (h0 + c) / h0` along the card. That is the
-/// mean clearance of what is seen straight on, by how much is seen of each.
+/// Back to front, once for each card with a flow: the picture of everything behind it, including
+/// refracting cards, is read at the displaced places. Measured on a display, the displacement d
+/// stands for a line of sight that leaves the object at its middle, h0 above the display; what is
+/// at clearance c below the object is displaced by `d (h0 + c) / h0` along the card. The clearance
+/// is the mean of what is seen straight on, weighted by visibility.
 pub(super) fn refract(
     deep: DeepImage,
     shot: &Shot,
@@ -61,7 +62,7 @@ pub(super) fn refract(
     deep_with(deep, &changes, shot)
 }
 
-/// By how much what lies behind a card differs from what lies there straight on.
+/// Difference between what is displaced behind a card and what is straight behind it.
 struct Change {
     block: PixelBlock,
     pixels: Vec<SeenBehind>,
@@ -86,13 +87,13 @@ fn deep_with(deep: DeepImage, changes: &Changes, shot: &Shot) -> DeepImage {
     })
 }
 
-/// The pixels that have a sample of a card, and how near the nearest of them is.
+/// The pixels with a sample of a card, and the depth of the nearest.
 struct CardPlace {
     block: PixelBlock,
     nearest: f32,
 }
 
-/// Where cards are in the picture; those that are not have no place.
+/// Where cards are in the picture; cards outside it have no place.
 fn places_of(deep: &DeepImage, cards: &[BendingCard<'_>]) -> BTreeMap<ObjectId, CardPlace> {
     let mut places = BTreeMap::new();
     for y in 0..deep.height() {
@@ -121,24 +122,24 @@ fn include(places: &mut BTreeMap<ObjectId, CardPlace>, sample: &DeepSample, [x, 
     place.nearest = place.nearest.min(sample.depth.0);
 }
 
-/// A card that bends, its side that is seen.
+/// A refracting card and its visible side.
 struct BendingCard<'a> {
     id: ObjectId,
     plane: ScenePlane,
     projected: ProjectedPlane,
     flow: &'a Flow,
-    /// The side is a back with a flow of its own, which runs the other way.
+    /// Whether the side is a back with a flow of its own, which is mirrored.
     mirrored: bool,
     cylinder: Option<Cylinder>,
     /// The eye in the frame of the card.
     eye: Point3<f64>,
     /// How much larger the object is than it was on the display.
     scale: f64,
-    /// From the middle of the body to what it lies on.
+    /// From the middle of the body to what it rests on.
     resting_height: f64,
 }
 
-/// The cards of a shot that bend light, the farthest first.
+/// The refracting cards of a shot, the farthest first.
 fn bending_cards(shot: &Shot) -> Vec<BendingCard<'_>> {
     if shot.cards.iter().all(|card| card.refraction.is_none()) {
         return Vec::new();
@@ -176,8 +177,8 @@ impl<'a> BendingCard<'a> {
         })
     }
 
-    /// Where the light comes from that is seen at a picture position, by the object's own height;
-    /// along the card and down it, metres.
+    /// The light path at a picture position, at the object's own height; along the card and down
+    /// it, metres.
     fn path(&self, p: &Vector3<f64>) -> Option<LightPath> {
         let w = self.projected.w.dot(p);
         let [u, v] = self.on_card([self.projected.u.dot(p) / w, self.projected.v.dot(p) / w]);
@@ -191,7 +192,7 @@ impl<'a> BendingCard<'a> {
         })
     }
 
-    /// Texture coordinates of the point of a curved card that is seen where the flat one is.
+    /// Texture coordinates of the point of a curved card that is seen at a point of the flat one.
     fn on_card(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let Some(cylinder) = &self.cylinder else {
             return [u, v];
@@ -202,24 +203,24 @@ impl<'a> BendingCard<'a> {
         [seen.x / w + 0.5, 0.5 - seen.y / h]
     }
 
-    /// By how much displacements are larger at a point than on the display.
+    /// Factor on displacements at a point, relative to the display.
     fn growth_at(&self, point: &Vector3<f64>) -> f64 {
         let distance = self.plane.normal.dot(&(point - self.plane.center)).abs();
         self.growth((distance - self.resting_height).max(0.0))
     }
 
-    /// This far along the card and down it.
+    /// The vector of a displacement along the card and down it.
     fn along(&self, displacement: [f32; 2]) -> Vector3<f64> {
         let [along, down] = displacement.map(f64::from);
         self.plane.x * along - self.plane.y * down
     }
 
-    /// By how much a displacement is larger over what is farther away than the display was.
+    /// Factor on displacements for this clearance, relative to the display.
     fn growth(&self, clearance: f64) -> f64 {
         1.0 + clearance / (self.flow.height * self.scale)
     }
 
-    /// The pixels that its lines of sight may end in.
+    /// The pixels in which its lines of sight may end.
     fn reached(&self, place: &CardPlace, view: &CameraView) -> PixelBlock {
         let paths = self.flow.paths.pixels().iter();
         let longest = paths.fold(0.0_f64, |most, path| most.max(path.reach().into()));
@@ -232,7 +233,7 @@ impl<'a> BendingCard<'a> {
 }
 
 impl CameraView {
-    /// Pixels for a metre across the view at a depth.
+    /// Pixels per metre across the view at a depth.
     fn px_per_metre(&self, depth: f64) -> f64 {
         let focal_px = 1.0 / self.ray.column(0).norm();
         focal_px / depth
@@ -249,7 +250,7 @@ impl PixelBlock {
     }
 }
 
-/// What lies behind a card: what is seen of it in a block, and how far away it is.
+/// What is behind a card: what is visible in a block, and its depth.
 struct Backdrop {
     block: PixelBlock,
     seen: Pyramid<SeenBehind>,
@@ -274,7 +275,7 @@ impl Backdrop {
         }
     }
 
-    /// At a picture position, between pixels as well.
+    /// At a picture position, also between pixels.
     fn sharp_at(&self, at: Point2<f64>) -> SeenBehind {
         let [x, y] = self.in_block(at);
         let SeenBehind { light, plate } = sample_cubic_clamped(self.seen.base(), x, y);
@@ -301,7 +302,7 @@ impl Backdrop {
         self.seen.base()[(x - self.block.x.start, y - self.block.y.start)]
     }
 
-    /// Mean depth at a pixel by how much is seen; `surface` is that of the surface.
+    /// Mean depth at a pixel, weighted by visibility; `surface` is that of the surface.
     fn depth(&self, x: usize, y: usize, surface: f64) -> Option<f64> {
         let samples = self.deep.at(x, y);
         let hidden: f64 = samples.iter().map(|s| f64::from(s.visible)).sum();
@@ -323,7 +324,7 @@ struct Ending<'a> {
     card: &'a BendingCard<'a>,
     point: Vector3<f64>,
     depth: f64,
-    /// Of displacements, over that on the display.
+    /// Factor on displacements, relative to the display.
     growth: f64,
 }
 
@@ -354,7 +355,7 @@ impl<'a> Sight<'a> {
         }
     }
 
-    /// What a card changes in the pixels that have a sample of it.
+    /// What a card changes in the pixels with a sample of it.
     fn change(
         &self,
         card: &BendingCard<'_>,
@@ -378,8 +379,8 @@ impl<'a> Sight<'a> {
         Change { block, pixels }
     }
 
-    /// The mean over the sub-samples of a pixel, each at the place that its own line of sight leads
-    /// to from the pixel's middle: what is not bent stays as sharp as it was.
+    /// The mean over the sub-samples of a pixel, each at the place to which its own line of sight
+    /// leads from the pixel's middle, so that unrefracted light stays sharp.
     fn change_at(&self, card: &BendingCard<'_>, backdrop: &Backdrop, at: [usize; 2]) -> SeenBehind {
         let [x, y] = at;
         let middle = self.ideal(pixel_center(x, y).xy().into());
@@ -404,7 +405,7 @@ impl<'a> Sight<'a> {
         })
     }
 
-    /// What is seen along a path; none where that is from behind the eye.
+    /// What is seen along a path; none if the light comes from behind the eye.
     fn seen_along(
         &self,
         path: LightPath,
@@ -434,12 +435,12 @@ impl<'a> Sight<'a> {
         })
     }
 
-    /// Where a camera without the lens sees what the picture shows at a position.
+    /// Maps a position in the picture to that of a camera without the lens.
     fn ideal(&self, px: Point2<f64>) -> Vector3<f64> {
         self.lens.undistort(px).to_homogeneous()
     }
 
-    /// Where the picture shows a point of the world; none where it is not in front of the eye.
+    /// Where the picture shows a point of the world; none if it is not in front of the eye.
     fn seen_at(&self, point: &Vector3<f64>) -> Option<Point2<f64>> {
         let [px] = self.view.project_points(&[*point])?;
         Some(self.lens.distort(px.xy().into()))

@@ -1,15 +1,15 @@
-//! A level of a pyramid made up to two times smaller, with a transparent border.
+//! A mip level downsampled by a factor of up to two, with a transparent border.
 
 use crate::image::Image;
 use crate::pixel::Mix;
 use crate::render::texel_grid::BORDER_TEXELS;
 use bytemuck::Pod;
 
-/// A level of detail, and how much smaller the picture becomes.
+/// A mip level and a further downsampling factor.
 #[derive(Clone, Copy)]
 pub(super) struct DetailLevel {
     level: usize,
-    /// Texels of the level that make one, along each side: 1 up to 2.
+    /// Texels of the level per texel of the result, along each side: 1 up to 2.
     step: f64,
 }
 
@@ -21,7 +21,7 @@ pub(super) struct BorderedTexels<T> {
 }
 
 impl DetailLevel {
-    /// A level that need not be an integer: the one before it, averaged further.
+    /// A fractional level: the integer level before it, averaged further.
     pub(super) fn new(level: f64) -> Self {
         Self {
             level: level as usize,
@@ -29,7 +29,8 @@ impl DetailLevel {
         }
     }
 
-    /// Reads what is wanted of a picture of floats from its pyramid, and finishes it row by row.
+    /// Reads the required parts of a picture of floats from its pyramid, and finishes them row by
+    /// row.
     pub(super) fn resample<'a, P: Pod, T: Mix>(
         &self,
         level: impl Fn(usize) -> &'a Image<P>,
@@ -51,7 +52,7 @@ impl DetailLevel {
 }
 
 impl<T: Mix> BorderedTexels<T> {
-    /// Room for this many columns and rows inside of the border.
+    /// Room for this many columns and rows inside the border.
     fn transparent(columns: usize, rows: usize) -> Self {
         let (width, height) = (columns + 2 * BORDER_TEXELS, rows + 2 * BORDER_TEXELS);
         Self {
@@ -61,7 +62,7 @@ impl<T: Mix> BorderedTexels<T> {
         }
     }
 
-    /// Rows from the first inside of the border on, without the border on their left.
+    /// Rows from the first inside the border on, without the border on their left.
     fn inner_lines(&mut self) -> impl Iterator<Item = &mut [T]> {
         self.texels
             .chunks_exact_mut(self.width)
@@ -127,16 +128,16 @@ fn average_columns<T: Mix>(columns: &[TexelWeights], line: &[T], out: &mut [T]) 
     }
 }
 
-/// Up to three texels in a row and their weights, which add up to 1 (less at the end, where the
-/// picture ends).
+/// Up to three consecutive texels and their weights, which sum to 1 (less at the end of the
+/// picture).
 struct TexelWeights {
     first: usize,
     weights: [f32; 3],
     count: usize,
 }
 
-/// What each texel of a smaller picture takes from a larger one, along one side: averages over
-/// `step` texels (1 up to 2).
+/// Weights of each texel of a smaller picture along one side: averages over `step` texels (1 up to
+/// 2).
 fn downsample_axis(len: usize, step: f64) -> Vec<TexelWeights> {
     let count = (len as f64 / step).ceil() as usize;
     (0..count)
@@ -144,7 +145,7 @@ fn downsample_axis(len: usize, step: f64) -> Vec<TexelWeights> {
         .collect()
 }
 
-/// How much of a stretch lies on a texel, as a share of the stretch.
+/// Share of an interval that is on a texel.
 fn share_of_texel(texel: usize, start: f64, end: f64) -> f32 {
     let at = texel as f64;
     (((at + 1.0).min(end) - at.max(start)).max(0.0) / (end - start)) as f32

@@ -1,5 +1,4 @@
-//! Shadows of cards and of the surface on a receiver: where they are, and how much light they let
-//! through.
+//! Shadows of cards and of the surface on a receiver: where they are, and their transmittance.
 
 use crate::geom::Vector3;
 use crate::render::float4::Float4;
@@ -16,33 +15,33 @@ use nalgebra::Matrix3;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Heights and distances below this are contact.
+/// Heights and distances below this count as contact.
 pub(super) const CONTACT_EPSILON_M: f64 = 1e-9;
 
-/// How much of the blur by a piece of the sky is given to a card's shadow.
+/// Share of the blur by a piece of the sky that is applied to a card's shadow.
 ///
-/// All of it would be right for one card. Pieces are so wide, and shadows on each other so many,
-/// that pictures are darkened by it, since a product of blurred shadows is not the blurred product
-/// (bias -0.0005); a quarter takes the facets out of soft shadows and biases by 1e-4.
+/// For a single card, all of it would be right. But pieces are so wide and overlapping shadows so
+/// many that it darkens pictures, since a product of blurred shadows is not the blurred product
+/// (bias -0.0005); a quarter removes the facets of soft shadows with a bias of 1e-4.
 const SKY_BLUR_SHARE: f64 = 0.25;
 
-/// A receiver as shadows fall on it.
+/// A receiver of shadows.
 #[derive(Clone, Copy)]
 pub(super) struct ShadowedReceiver<'a> {
-    /// How it lies in the lattice.
+    /// Its plane in the lattice.
     pub(super) plane: &'a ProjectedPlane,
     /// The requested part of it.
     pub(super) area: &'a LatticeArea,
     /// The camera, in nodes.
     pub(super) view: &'a CameraView,
-    /// Its number among the cards; none for the surface.
+    /// Its index among the cards; none for the surface.
     pub(super) own: Option<usize>,
-    /// Distance on it that textures are read for.
+    /// Spacing on it that textures are read for.
     pub(super) cell_m: f64,
 }
 
 impl<'a> ShadowedReceiver<'a> {
-    /// Card number `own`, or the surface, where its nodes are as far apart as at `target`.
+    /// Card number `own`, or the surface, with the node spacing at `target`.
     pub(super) fn new(
         plane: &'a ProjectedPlane,
         area: &'a LatticeArea,
@@ -64,7 +63,7 @@ impl<'a> ShadowedReceiver<'a> {
         self.plane.normal.dot(&self.view.eye) - self.plane.height
     }
 
-    /// Numbers of the other cards that are at least partly above it.
+    /// Indices of the other cards that are at least partly above it.
     pub(super) fn cards_above(&self, occluders: &Occluders<'_>) -> Vec<usize> {
         let (normal, offset) = (&self.plane.normal, self.plane_offset());
         let cards = occluders.cards.iter().enumerate();
@@ -89,17 +88,16 @@ pub(super) struct ProjectedShadow {
     v: Vector3<f64>,
     w: Vector3<f64>,
     opacity: Option<Arc<OpacityLevel>>,
-    /// Where nothing gets through an opaque texture, whatever is read of it; none for one that is
-    /// see-through.
+    /// Where an opaque texture is certain to block all light; none for a see-through one.
     pub(super) inside: Option<[Vector3<f64>; 5]>,
 }
 
-/// Texels read, bilinearly, to know what gets through.
+/// Bilinear texel reads for transmittance.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TexelReads {
-    /// Of see-through cards.
+    /// Reads of see-through cards.
     pub(super) see_through: usize,
-    /// Of opaque ones, along their edges.
+    /// Reads of opaque ones, along their edges.
     pub(super) edges: usize,
 }
 
@@ -116,7 +114,7 @@ pub(super) struct ShadowProjection<'a> {
     sample: &'a LightSample,
     /// Offset of the receiver's plane along its normal.
     plane_offset: f64,
-    /// Of the sample over that plane, metres (a cosine for a direction).
+    /// Height of the sample above that plane, metres (a cosine for a direction).
     pub(super) height: f64,
 }
 
@@ -143,7 +141,7 @@ impl<'a> ShadowProjection<'a> {
         })
     }
 
-    /// The shadow of a card; none where it misses the receiver.
+    /// The shadow of a card; none if it misses the receiver.
     pub(super) fn project_card(&self, occluder: &Occluder<'_>) -> Option<ProjectedShadow> {
         let plane = &occluder.plane;
         let toward = self.height_over(plane);
@@ -185,14 +183,14 @@ impl<'a> ShadowProjection<'a> {
         CardMap { u, v, w, below }
     }
 
-    /// Distance of nodes on a card that their light crosses: the nearer to the light, the shorter.
+    /// Spacing of the nodes projected onto a card: the nearer to the light, the shorter.
     fn cell_m(&self, plane: &ScenePlane) -> f64 {
         let way = self.sample.at.w * self.height_of(&plane.center) / self.height;
         (1.0 - way).max(0.0) * self.receiver.cell_m
     }
 
-    /// How far the piece of light that a sample stands for blurs a card's shadow, metres on the
-    /// card, as the side of a texel whose bilinear reading has the same variance.
+    /// Blur of a card's shadow by the piece of light of a sample, metres on the card, as the side
+    /// of a texel whose bilinear reading has the same variance.
     ///
     /// A square of side b has variance `b^2 / 12`, texels of side t read bilinearly have `t^2 / 4`.
     fn blur_m(&self, plane: &ScenePlane) -> f64 {
@@ -200,9 +198,9 @@ impl<'a> ShadowProjection<'a> {
         self.sample.width * way * libm::sqrt(4.0 / 12.0)
     }
 
-    /// The height over the receiver by which a card's shadow is blurred. Cards that lean on the
-    /// receiver are sharp where they touch it and blurred at the other end: by a lamp all of the
-    /// shadow is as sharp as where it is sharpest.
+    /// The height above the receiver from which a card's shadow is blurred. The shadow of a card
+    /// that leans on the receiver is sharp where they touch and blurred at the other end: for a
+    /// lamp, all of it is as sharp as at its sharpest.
     fn blurring_height(&self, plane: &ScenePlane) -> f64 {
         let heights = plane.corners().map(|corner| self.height_of(&corner));
         let lowest = heights.into_iter().fold(f64::INFINITY, f64::min);
@@ -218,7 +216,7 @@ impl<'a> ShadowProjection<'a> {
         (self.receiver.plane.normal.dot(point) - self.plane_offset).max(0.0)
     }
 
-    /// The shadow of the surface, which stops what comes from below it.
+    /// The shadow of the surface, which blocks light from below it.
     pub(super) fn project_surface(&self, surface: &ScenePlane) -> ProjectedShadow {
         ProjectedShadow {
             rows: 0..self.receiver.view.height,
@@ -232,7 +230,7 @@ impl<'a> ShadowProjection<'a> {
         }
     }
 
-    /// Where the way to the light crosses the surface inside of its sides.
+    /// Where the line to the light crosses the surface inside its sides.
     fn surface_sides(&self, surface: &ScenePlane) -> Vec<Vector3<f64>> {
         let (foot, w) = self.foot_map();
         let mut sides = vec![self.receiver.plane.w, w];
@@ -245,8 +243,8 @@ impl<'a> ShadowProjection<'a> {
         sides
     }
 
-    /// From the lattice to the point of `z = 0` on the way from the light, times the row beside it,
-    /// which is positive above the light.
+    /// Map from the lattice to the point of `z = 0` on the line to the light, times the other
+    /// returned row, which is positive above the light.
     fn foot_map(&self) -> (Matrix3<f64>, Vector3<f64>) {
         let (point, depth) = (&self.receiver.plane.point, &self.receiver.plane.w);
         let (at, q) = (self.sample.at.xyz(), self.sample.at.w);
@@ -255,12 +253,12 @@ impl<'a> ShadowProjection<'a> {
         (foot, height * q - depth * at.z)
     }
 
-    /// The light comes from below the surface.
+    /// Whether the light comes from below the surface.
     pub(super) fn comes_from_below(&self) -> bool {
         self.receiver.own.is_some() && self.sample.at.z < 0.0
     }
 
-    /// Part of the lattice that a shadow lies in: bounds of the four corners projected onto the
+    /// Part of the lattice that contains a shadow: bounds of the four corners projected onto the
     /// receiver.
     fn shadow_area(&self, plane: &ScenePlane) -> LatticeArea {
         let view = self.receiver.view;
@@ -274,8 +272,8 @@ impl<'a> ShadowProjection<'a> {
         view.area_around(&corners)
     }
 
-    /// Where a point throws its shadow on the receiver's plane; none for one beside or above the
-    /// light, whose shadow falls away from it, while those around it fall without end.
+    /// Where a point casts its shadow on the receiver's plane; none for one level with or above the
+    /// light, whose shadow falls away from it, while shadows of points around it are unbounded.
     fn shadow_of(&self, point: &Vector3<f64>) -> Option<Vector3<f64>> {
         let h = self.receiver.plane.normal.dot(point) - self.plane_offset;
         let fall = self.height - self.sample.at.w * h;
@@ -295,7 +293,7 @@ impl CardMap {
         let inset = opacity.opaque_inset();
         let inside = inset.map(|inset| quad_sides(&u, &v, &w, inset.map(|by| -by)));
         let [u, v] = opacity.grid.texel_rows(&u, &v, &w);
-        // It ends where the card does, below the card, and in front of the eye.
+        // It ends at the card's edges, below the card, and in front of the eye.
         let [a, b, c, d, e, f, g, h] = opacity.extent.sides([&u, &v], &w);
         let sides = [a, b, c, d, e, f, g, h, below, depth];
         ProjectedShadow {
@@ -322,7 +320,7 @@ impl ProjectedShadow {
         self.shape.row_spans(first as f64)
     }
 
-    /// Multiplies what gets through to these nodes of a row; returns what had to be read for it.
+    /// Multiplies the transmittance at these nodes of a row; returns the reads that this needed.
     pub(super) fn attenuate(
         &self,
         j: usize,
@@ -357,7 +355,7 @@ impl ProjectedShadow {
         texel_line([self.u, self.v, self.w], &first)
     }
 
-    /// Where an opaque card surely lets nothing through, counted from the first of the nodes.
+    /// Where an opaque card is certain to block all light, counted from the first of the nodes.
     fn dark_nodes(&self, j: usize, nodes: &Range<usize>) -> Option<Range<usize>> {
         let dark = nodes_inside(self.inside.as_ref()?, j, nodes);
         Some(dark.start - nodes.start..dark.end - nodes.start)

@@ -8,9 +8,9 @@ use crate::render::shadow::{ProjectedShadow, ShadowProjection, ShadowedReceiver}
 #[derive(Debug)]
 pub(super) struct ShadowRay {
     sample: LightSample,
-    /// Of the sample over the receiver's plane, metres (a cosine for a direction).
+    /// Height of the sample above the receiver's plane, metres (a cosine for a direction).
     height: f64,
-    /// What may be in its way.
+    /// Shadows of what may be in its way.
     pub(super) shadows: Vec<ProjectedShadow>,
 }
 
@@ -51,16 +51,16 @@ impl ShadowRay {
         })
     }
 
-    /// It comes from an area light, not from the sky.
+    /// Whether it comes from an area light, not from the sky.
     pub(super) fn is_face(&self) -> bool {
         matches!(self.sample.kind, LightSampleKind::Face { .. })
     }
 
-    /// For the receiver it was made for.
+    /// Irradiance for the receiver that it was created for.
     pub(super) fn unit_irradiance(&self) -> UnitIrradiance {
         match self.sample.kind {
             LightSampleKind::Sky { share } => UnitIrradiance::Even(share as f32),
-            // All points of a plane see a light from the same height.
+            // All points of a plane have the same height below a light.
             LightSampleKind::Face { normal, area } => UnitIrradiance::Face(FaceIrradiance {
                 at: self.sample.at.xyz().map(|c| c as f32).into(),
                 normal: normal.map(|c| c as f32).into(),
@@ -70,16 +70,16 @@ impl ShadowRay {
     }
 }
 
-/// Irradiance by unit radiance of one light sample, at any point of a plane.
+/// Irradiance for unit radiance of one light sample, at any point of a plane.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum UnitIrradiance {
     /// The same everywhere.
     Even(f32),
-    /// By a piece of a light's face.
+    /// From a piece of a light's face.
     Face(FaceIrradiance),
 }
 
-/// Irradiance by unit radiance of a piece of a light's face.
+/// Irradiance for unit radiance of a piece of a light's face.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FaceIrradiance {
     /// Where it is.
@@ -141,7 +141,7 @@ mod tests {
         AreaLight::new([0.4, 0.3, 0.8], [0.3; 2], 9.0)
     }
 
-    /// A card of odd size, turned in every way.
+    /// A card of odd size, rotated about all axes.
     fn shot(tilt: f64) -> Shot {
         let turn = UnitQuaternion::from_euler_angles(tilt, 0.2, 0.7);
         let quad = Quad {
@@ -159,7 +159,7 @@ mod tests {
             .with_card(card)
     }
 
-    /// What lights the surface.
+    /// The light on the surface.
     fn samples(shot: &Shot, occluders: &Occluders<'_>, seen: &ProjectedPlane) -> LightSamples {
         let patch = LitPatch {
             center: occluders.surface.center,

@@ -1,24 +1,24 @@
-//! Where a texture has anything on it: an octagon around its texels.
+//! The non-empty part of a texture: an octagon around its texels.
 
 use crate::geom::Vector3;
 use crate::render::texel_grid::{BORDER_TEXELS, POSITION_ERROR_TEXELS, TexelGrid};
 
-/// How far from a texel it is read: bilinearly, at positions in single precision.
+/// Distance at which a texel is still read: bilinearly, at positions in single precision.
 const READ_TEXELS: f64 = 1.0 + POSITION_ERROR_TEXELS;
 
-/// What is bounded, as factors of `x` and `y`.
+/// The bounded quantities, as factors of `x` and `y`.
 const AXES: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, -1.0]];
 
-/// Lowest and highest `x`, `y`, `x + y` and `x - y` of the positions among bordered texels that read
-/// as more than nothing.
+/// Lowest and highest `x`, `y`, `x + y` and `x - y` of the positions among bordered texels with
+/// non-empty readings.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TexelExtent {
     bounds: [[f64; 2]; 4],
 }
 
 impl TexelExtent {
-    /// Around the texels that are not empty, in rows of `width`; of an empty texture it holds
-    /// nothing.
+    /// Around the texels that are not empty, in rows of `width`; contains nothing for an empty
+    /// texture.
     pub(super) fn around<T: Default + PartialEq>(
         texels: &[T],
         width: usize,
@@ -60,7 +60,7 @@ impl TexelExtent {
         }
     }
 
-    /// Linear conditions on what `u`, `v` and `w` give positions among bordered texels from.
+    /// Linear conditions on the positions among bordered texels that `u`, `v` and `w` give.
     pub(super) fn sides(&self, [u, v]: [&Vector3<f64>; 2], w: &Vector3<f64>) -> [Vector3<f64>; 8] {
         std::array::from_fn(|k| {
             let (axis, [low, high]) = (AXES[k / 2], self.bounds[k / 2]);

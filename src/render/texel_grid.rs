@@ -1,28 +1,28 @@
-//! Where a texture's texels lie, and how a line of positions falls between them.
+//! Positions of a texture's texels, and of a line of samples between them.
 
 use crate::geom::Vector3;
 use crate::render::float4::Blend;
 
-/// Transparent texels around a texture: what positions reach beyond its outermost ones, and one to
-/// read on.
+/// Transparent texels around a texture: one for positions beyond its outermost texels, and one more
+/// for bilinear reading.
 pub(super) const BORDER_TEXELS: usize = 2;
 
-/// Positions in single precision are off by less than this, texels.
+/// Maximum error of positions in single precision, texels.
 pub(super) const POSITION_ERROR_TEXELS: f64 = 1.0 / 8.0;
 
-/// Positions are worked out for this many samples at once: a register of AVX-512, two of AVX2.
+/// Number of samples whose positions are computed at once: a register of AVX-512, two of AVX2.
 pub(super) const SIMD_LANES: usize = 16;
 
-/// How far positions are kept from the first and the last texel, which are empty anyway.
+/// Minimum distance of positions from the first and the last texel, which are empty anyway.
 const INSET_TEXELS: f32 = 1.0 / 64.0;
 
 /// 2^23: floats from here on are integers, and their lowest bits count them.
 const TWO_POW_23: f32 = 8_388_608.0;
 
-/// Where a texture's pixels lie in its own coordinates.
+/// Positions of a texture's pixels in its own coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TexelGrid {
-    /// Texels that `u` and `v` from 0 to 1 run over; a fraction on halved levels of odd sizes.
+    /// Texels that `u` and `v` from 0 to 1 span; fractional at mip levels of odd sizes.
     pub(super) texels: [f64; 2],
     /// How far the texture reaches beyond 0..1, as a share of it.
     pub(super) reach: [f64; 2],
@@ -31,7 +31,7 @@ pub(super) struct TexelGrid {
 impl TexelGrid {
     /// The grid of a texture of some size, halved `level` times.
     ///
-    /// The full picture ends at its edge; smaller ones fade half a texel out.
+    /// The full texture ends at its edge; smaller ones fade over half a texel outside it.
     pub(super) fn new((width, height): (usize, usize), level: f64) -> Self {
         let scale = libm::exp2(-level);
         let texels = [width as f64 * scale, height as f64 * scale];
@@ -42,7 +42,8 @@ impl TexelGrid {
         }
     }
 
-    /// Rows that give positions among bordered texels, from rows that give texture coordinates.
+    /// Converts rows that give texture coordinates to rows that give positions among bordered
+    /// texels.
     pub(super) fn texel_rows(
         &self,
         u: &Vector3<f64>,
@@ -57,18 +58,18 @@ impl TexelGrid {
     }
 }
 
-/// Positions along a line over bordered texels: numbers that grow evenly, the third the divisor of
-/// the others.
+/// Positions along a line over bordered texels: three numbers that grow linearly, the third the
+/// divisor of the others.
 pub(super) type TexelLine = [(f32, f32); 3];
 
-/// The line from `first` on, one step to the right at a time; `u`, `v` and `w` give positions among
+/// The line from `first` on, in steps of one to the right; `u`, `v` and `w` give positions among
 /// bordered texels.
 pub(super) fn texel_line(rows: [Vector3<f64>; 3], first: &Vector3<f64>) -> TexelLine {
     rows.map(|row| (row.dot(first) as f32, row.x as f32))
 }
 
-/// Bilinear cells that a run of samples falls into: index of the first of the four texels, and the
-/// way to the others.
+/// Bilinear cells of a run of samples: index of the first of the four texels, and the fractions
+/// towards the others.
 #[derive(Default)]
 pub(super) struct BilinearCells {
     pub(super) at: [u32; SIMD_LANES],
@@ -77,8 +78,8 @@ pub(super) struct BilinearCells {
 }
 
 impl BilinearCells {
-    /// Samples `first`, `first + 1` and so on of a line; positions outside are moved to the nearest
-    /// inside.
+    /// Samples `first`, `first + 1` and so on of a line; positions outside are clamped to the
+    /// nearest inside.
     #[inline(always)]
     pub(super) fn along_line(
         [u, v, w]: &TexelLine,
@@ -99,7 +100,7 @@ impl BilinearCells {
         cells
     }
 
-    /// What a sample reads of texels whose rows are `stride` long.
+    /// Interpolates a sample in texels whose rows are `stride` long.
     #[inline(always)]
     pub(super) fn texel<T: Blend>(&self, lane: usize, texels: &[T], stride: usize) -> T {
         let at = self.at[lane] as usize;
@@ -113,10 +114,10 @@ impl BilinearCells {
     }
 }
 
-/// A position between texels 0 and `last` as the texel before it and the way on.
+/// A position between texels 0 and `last` as the texel before it and the fraction towards the next.
 ///
-/// By bits, since a conversion with all its checks keeps loops from being vectorised; a position on
-/// a texel may come as the one before and a way of 1, which is the same place.
+/// By bit operations, since a checked conversion keeps loops from being vectorised; a position on a
+/// texel may come as the one before and a fraction of 1, which is the same place.
 #[inline(always)]
 fn integer_and_fraction(x: f32, last: f32) -> (u32, f32) {
     let x = x.max(INSET_TEXELS).min(last);

@@ -1,5 +1,4 @@
-//! Textures made ready for one picture: one level of detail, a transparent border, the card's
-//! colours.
+//! Textures prepared for one picture: one level of detail, a transparent border, the card's grade.
 
 use crate::asset::Texture;
 use crate::geom::Vector3;
@@ -13,30 +12,30 @@ use crate::render::texel_grid::TexelGrid;
 use crate::render::view::ProjectedPlane;
 use crate::scene::Grade;
 
-/// Colour and opacity at the level of detail that a picture asks for.
+/// Colour and opacity at the level of detail that a picture needs.
 #[derive(Debug)]
 pub(super) struct BakedTexture {
     pub(super) grid: TexelGrid,
     width: usize,
     height: usize,
     pub(super) texels: BakedTexels,
-    /// Where there is anything on it.
+    /// Its non-empty part.
     extent: TexelExtent,
 }
 
-/// What of textures a picture needs.
+/// The parts of textures that a picture needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TexelContent {
     /// Colour and alpha.
     Alpha,
-    /// The same with the opacity of each channel, where some card is film.
+    /// The same with the opacity of each channel, if some card is film.
     Film,
-    /// Opacity alone, where some card is film and no light shines.
+    /// Opacity alone, if some card is film and no light shines.
     Opacity,
 }
 
 impl TexelContent {
-    /// What a picture needs.
+    /// The parts that a picture needs.
     pub(super) fn needed(with_film: bool, is_lit: bool) -> Self {
         match (with_film, is_lit) {
             (false, _) => Self::Alpha,
@@ -45,7 +44,7 @@ impl TexelContent {
         }
     }
 
-    /// What passes differs from channel to channel.
+    /// Whether transmittance differs between channels.
     pub(super) fn is_tinted(self) -> bool {
         self != Self::Alpha
     }
@@ -63,10 +62,10 @@ pub(super) enum BakedTexels {
 }
 
 impl BakedTexture {
-    /// A texture at a level of detail, which need not be an integer, in a card's own colours.
+    /// A texture at a level of detail, which need not be an integer, with a card's grade.
     ///
-    /// The level below is averaged further, so that there are no more texels than are needed and a
-    /// reading costs four of them.
+    /// The next finer integer level is averaged further, so that there are no more texels than
+    /// needed and a reading costs four of them.
     pub(super) fn new(texture: &Texture, grade: &Grade, level: f64, content: TexelContent) -> Self {
         let level = level.clamp(0.0, (texture.levels() - 1) as f64);
         let grid = TexelGrid::new(texture.size(), level);
@@ -98,14 +97,14 @@ impl BakedTexture {
         }
     }
 
-    /// Columns and rows with their border.
+    /// Columns and rows, including the border.
     #[inline(always)]
     pub(super) fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }
 
-    /// Linear conditions on `(x, y, 1)` where a plane shows anything of it, and is in front of the
-    /// eye.
+    /// Linear conditions on `(x, y, 1)` for where a plane shows a non-empty part of it in front of
+    /// the eye.
     pub(super) fn sides_on(&self, plane: &ProjectedPlane) -> [Vector3<f64>; 9] {
         let [u, v] = self.grid.texel_rows(&plane.u, &plane.v, &plane.w);
         let sides = self.extent.sides([&u, &v], &plane.w);

@@ -1,5 +1,4 @@
-//! What passes through the layers of a block so far, for each sub-sample, and a row of one more
-//! layer.
+//! Transmittance of the layers of a block so far, for each sub-sample, and a row of one more layer.
 
 #![expect(clippy::manual_clamp, reason = "turns NaN into 0")]
 
@@ -16,36 +15,37 @@ use crate::render::texture::{BakedTexels, BakedTexture, TexelContent};
 use crate::work::Kind;
 use std::ops::Range;
 
-/// Transmittance of each sub-sample of a block: a plane for each of the places inside a pixel.
+/// Transmittance of each sub-sample of a block: a plane for each position inside a pixel.
 #[derive(Debug)]
 pub(super) struct Transmittance {
     width: usize,
-    /// Pixels of a plane.
+    /// Number of pixels of a plane.
     area: usize,
-    /// One number for all channels; empty where there is film.
+    /// One number for all channels; empty if there is film.
     grey: Vec<f32>,
-    /// A number for each channel, and 1, by which alpha is added up as it is; empty where there is none.
+    /// A number for each channel, and 1, so that alpha is summed unchanged; empty if there is no
+    /// film.
     tinted: Vec<Float4>,
 }
 
-/// A row of one layer, a value for each pixel.
+/// A row of one layer, one value per pixel.
 #[derive(Debug, Default)]
 pub(super) struct LayerRow {
     /// Pixels that the layer touches.
     pub(super) touched: Range<usize>,
-    /// Sum over sub-samples of its colour, as far as it is seen; the fourth number is the same of
-    /// its alpha. Where there is no film. Of opacity alone it is what is hidden in each channel.
+    /// Without film: sum over sub-samples of its visible colour; the fourth number is that of its
+    /// visible alpha. For opacity alone, what is hidden in each channel.
     light: Vec<Float4>,
-    /// The same, and that of its opacity, where there is film.
+    /// With film: the same, and that of its opacity.
     seen: Vec<Float8>,
-    /// Sum of its alpha, whatever is in front. Where there is no film; else it is the fourth number of
-    /// what is seen.
+    /// Without film: sum of its alpha, whatever is in front. With film it is the fourth number of
+    /// `seen`.
     alpha: Vec<f32>,
-    /// Light on it at the sub-samples under work, where that is not the pixel's.
+    /// Light on it at the current sub-samples, if it differs from the pixel's.
     irradiance: Vec<Float4>,
     /// Factors on the light of the pixels that the layer touches.
     pub(super) pixel_light: Vec<Float4>,
-    /// Texture readings, and light looked up, for all rows so far.
+    /// Texture readings, and light lookups, for all rows so far.
     read: usize,
     /// See `read`.
     pub(super) lit: usize,
@@ -55,7 +55,7 @@ pub(super) struct LayerRow {
 pub(super) struct SubsampleRun<'a> {
     /// Texel positions, counted from the first of the pixels.
     pub(super) line: &'a TexelLine,
-    /// Number of the sub-sample inside its pixel.
+    /// Index of the sub-sample inside its pixel.
     pub(super) plane: usize,
     /// Row of the block.
     pub(super) y: usize,
@@ -64,7 +64,7 @@ pub(super) struct SubsampleRun<'a> {
 }
 
 impl LayerRow {
-    /// What all rows took.
+    /// Work done for all rows.
     pub(super) fn work_counts(&self, content: TexelContent) -> [(Kind, u64); 3] {
         let film = if content.is_tinted() { self.read } else { 0 };
         [
@@ -74,7 +74,7 @@ impl LayerRow {
         ]
     }
 
-    /// Empties a row of `n` pixels.
+    /// Resets to a row of `n` pixels.
     pub(super) fn start(&mut self, n: usize, content: TexelContent) {
         self.touched = 0..0;
         self.irradiance.clear();
@@ -88,14 +88,14 @@ impl LayerRow {
         refill(&mut self.alpha, alpha, 0.0);
     }
 
-    /// Notes that some pixels' sub-samples read the layer's texture.
+    /// Records that some pixels' sub-samples read the layer's texture.
     pub(super) fn touch(&mut self, pixels: &Range<usize>) {
         self.touched = range_union(self.touched.clone(), pixels.clone());
         self.read += pixels.len();
     }
 
-    /// Light of pixel `i` of the layer, and what it hides of all behind it, per channel, added up
-    /// over sub-samples.
+    /// Light of pixel `i` of the layer, and what it hides of everything behind it, per channel,
+    /// summed over sub-samples.
     #[inline(always)]
     pub(super) fn seen_at(&self, i: usize, content: TexelContent) -> (Float4, LinearRgb) {
         match content {
@@ -105,7 +105,7 @@ impl LayerRow {
         }
     }
 
-    /// Alpha of pixel `i` of the layer, whatever is in front, added up over sub-samples.
+    /// Alpha of pixel `i` of the layer, whatever is in front, summed over sub-samples.
     #[inline(always)]
     pub(super) fn alpha_at(&self, i: usize, content: TexelContent) -> f32 {
         match content {
@@ -132,7 +132,7 @@ impl LayerRow {
 }
 
 impl Transmittance {
-    /// Nothing in the way of `r` x `r` sub-samples a pixel.
+    /// Full transmittance for `r` x `r` sub-samples per pixel.
     pub(super) fn unobstructed(block: &PixelBlock, r: usize, content: TexelContent) -> Self {
         let (width, area) = (block.x.len(), block.len());
         let count = area * r * r;
@@ -157,8 +157,8 @@ impl Transmittance {
         grey.map(|&t| Float4([t; 4])).chain(tinted.copied())
     }
 
-    /// Passes a layer at one sub-sample of some pixels: adds to the row what is seen of the layer,
-    /// and takes away what it hides of all that comes later.
+    /// Composites a layer at one sub-sample of some pixels: adds its visible part to the row, and
+    /// multiplies in its transmittance.
     pub(super) fn pass_layer(
         &mut self,
         texture: &BakedTexture,
@@ -187,10 +187,10 @@ impl Transmittance {
     }
 }
 
-/// A layer in a picture without film; `through` is one number a pixel.
+/// A layer in a picture without film; `through` is one number per pixel.
 ///
-/// Dense since it is the renderer's innermost loop: it is compiled as one piece for each set of
-/// vector instructions.
+/// Dense since it is the renderer's innermost loop: it is compiled as one piece for each vector
+/// instruction set.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
@@ -223,11 +223,11 @@ fn pass_grey(
     }
 }
 
-/// A layer in a picture with film; `through` is a number for each channel, `seen` is light and
-/// what is hidden.
+/// A layer in a picture with film; `through` is a number for each channel, `seen` is light and what
+/// is hidden.
 ///
-/// Dense since it is the innermost loop where there is film: it is compiled as one piece for each
-/// set of vector instructions.
+/// Dense since it is the innermost loop for film: it is compiled as one piece for each vector
+/// instruction set.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
@@ -281,7 +281,7 @@ fn pass_opacity(
     }
 }
 
-/// A texel under some light; as it is where light comes later.
+/// A texel under some light; unchanged if light is applied later.
 #[inline(always)]
 fn lit_by(texel: Float4, irradiance: Option<&Float4>) -> Float4 {
     match irradiance {

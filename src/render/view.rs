@@ -1,5 +1,5 @@
-//! Cards and the surface as the camera sees them: every map is a row of three numbers times `(x, y,
-//! 1)`.
+//! Cards and the surface as seen by the camera: every map is a row of three numbers times
+//! `(x, y, 1)`.
 
 use crate::camera::Camera;
 use crate::geom::Vector3;
@@ -13,7 +13,7 @@ use std::ops::Range;
 const GEOMETRY_EPSILON: f64 = 1e-12;
 
 /// Depth beyond which a plane is its horizon, metres: keeps points finite where a plane is seen
-/// past its own edge.
+/// beyond its own edge.
 pub(super) const HORIZON_M: f64 = 1e6;
 
 /// A card or the surface as a plane in the world.
@@ -32,7 +32,7 @@ pub(super) struct ScenePlane {
 }
 
 impl ScenePlane {
-    /// A card's plane; none for a card without area or place.
+    /// A card's plane; none for a card without area or finite position.
     pub(super) fn from_card(card: &Card) -> Option<Self> {
         let pose = &card.quad.world_from_card;
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -59,7 +59,7 @@ impl ScenePlane {
             .all(|c| c.is_finite())
     }
 
-    /// The normal on the side of a point, and how far the point is from the plane.
+    /// The normal on the side of a point, and the point's distance from the plane.
     fn side_of(&self, point: &Vector3<f64>) -> (Vector3<f64>, f64) {
         let above = self.height_of(point);
         if above >= 0.0 {
@@ -69,19 +69,19 @@ impl ScenePlane {
         }
     }
 
-    /// A point sees its back.
+    /// Whether a point sees its back.
     #[inline]
     pub(super) fn is_seen_from_behind(&self, point: &Vector3<f64>) -> bool {
         self.height_of(point) < 0.0
     }
 
-    /// How far a point is in front of the plane.
+    /// Signed distance of a point in front of the plane.
     #[inline]
     fn height_of(&self, point: &Vector3<f64>) -> f64 {
         self.normal.dot(&(point - self.center))
     }
 
-    /// The plane `z = 0` as far as it receives shadows.
+    /// The plane `z = 0`, as far as it receives shadows.
     pub(super) fn shadow_catcher(size: [f64; 2]) -> Self {
         Self {
             center: Vector3::zeros(),
@@ -92,7 +92,7 @@ impl ScenePlane {
         }
     }
 
-    /// The same plane, reaching further out on each side by shares of its size.
+    /// The same plane, extended on each side by shares of its size.
     pub(super) fn grown_by(&self, reach: [f64; 2]) -> Self {
         Self {
             size: [0, 1].map(|k| self.size[k] * (1.0 + 2.0 * reach[k])),
@@ -154,13 +154,12 @@ impl CameraView {
         }
     }
 
-    /// The world point at a depth behind a picture position.
+    /// The world point at a depth on the ray through a picture position.
     pub(super) fn point_at(&self, x: f64, y: f64, depth: f64) -> Vector3<f64> {
         self.eye + self.ray * Vector3::new(x, y, 1.0) * depth
     }
 
-    /// Picture positions `(x, y, 1)` of world points; none where one of them is at or behind the
-    /// eye.
+    /// Picture positions `(x, y, 1)` of world points; none if one of them is at or behind the eye.
     pub(super) fn project_points<const N: usize>(
         &self,
         world: &[Vector3<f64>; N],
@@ -171,13 +170,14 @@ impl CameraView {
         in_front.then(|| seen.map(|p| p / p.z))
     }
 
-    /// One of these world points, at least, is in front of the eye.
+    /// Whether at least one of these world points is in front of the eye.
     pub(super) fn has_in_front(&self, world: &[Vector3<f64>]) -> bool {
         let mut points = world.iter();
         points.any(|point| self.project_points(&[*point]).is_some())
     }
 
-    /// Picture position `(x, y, 1)` of a world point; the middle where it is at or behind the eye.
+    /// Picture position `(x, y, 1)` of a world point; the picture's middle if it is at or behind
+    /// the eye.
     fn position_of(&self, point: &Vector3<f64>) -> Vector3<f64> {
         let middle = Vector3::new(0.5 * self.width as f64, 0.5 * self.height as f64, 1.0);
         self.project_points(&[*point]).map_or(middle, |[p]| p)
@@ -188,8 +188,8 @@ impl CameraView {
         (0..self.height, 0..self.width)
     }
 
-    /// Rows and columns of projected points, one more on each side; all where one of the points is
-    /// not in front.
+    /// Rows and columns of projected points, with one more on each side; all if one of the points
+    /// is not in front.
     pub(super) fn area_around(&self, points: &[Vector3<f64>; 4]) -> LatticeArea {
         let Some(px) = self.project_points(points) else {
             return self.whole_area();
@@ -203,7 +203,7 @@ fn is_in_front(p: &Vector3<f64>) -> bool {
     p.z > GEOMETRY_EPSILON && p.iter().all(|c| c.is_finite())
 }
 
-/// The integers below `count` between some numbers, and one more on each side.
+/// The integers below `count` between some numbers, with one more on each side.
 fn range_around(numbers: [f64; 4], count: usize) -> Range<usize> {
     let low = numbers.into_iter().fold(f64::INFINITY, f64::min);
     let high = numbers.into_iter().fold(f64::NEG_INFINITY, f64::max);
@@ -219,12 +219,13 @@ pub(super) fn pixel_center(x: usize, y: usize) -> Vector3<f64> {
 /// Rows and columns of the lattice, or pixels of a picture.
 pub(super) type LatticeArea = (Range<usize>, Range<usize>);
 
-/// Areas have something in common.
+/// Whether areas have something in common.
 pub(super) fn areas_meet(a: &LatticeArea, b: &LatticeArea) -> bool {
     ranges_meet(&a.0, &b.0) && ranges_meet(&a.1, &b.1)
 }
 
-/// Rows and columns that a plane is seen in, grown by shares of its size; one more on each side.
+/// Rows and columns in which a plane, extended by shares of its size, is seen; one more on each
+/// side.
 pub(super) fn rows_and_columns(
     plane: &ScenePlane,
     reach: [f64; 2],
@@ -249,7 +250,7 @@ fn ray_from_pixel(camera: &Camera) -> Matrix3<f64> {
     )
 }
 
-/// How a plane lies in the picture: with `p = (x, y, 1)`, texture coordinates are `u.p / w.p` and
+/// A plane in the picture: with `p = (x, y, 1)`, texture coordinates are `u.p / w.p` and
 /// `v.p / w.p`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ProjectedPlane {
@@ -259,7 +260,7 @@ pub(super) struct ProjectedPlane {
     pub(super) v: Vector3<f64>,
     /// Denominator; positive where the plane is in front of the eye.
     pub(super) w: Vector3<f64>,
-    /// Depth times `w.p`: the distance of the eye from the plane's plane.
+    /// Depth times `w.p`: the distance of the eye from the infinite plane.
     pub(super) height: f64,
     /// The world point is `point * p / w.p`.
     pub(super) point: Matrix3<f64>,
@@ -284,13 +285,13 @@ impl ProjectedPlane {
         })
     }
 
-    /// None for a plane that is not seen from above, either.
+    /// None also for a plane that is not seen from above.
     pub(super) fn from_above(plane: &ScenePlane, view: &CameraView) -> Option<Self> {
         Self::new(plane, view).filter(|plane| plane.normal.z > 0.0)
     }
 
-    /// Side of the square that a pixel (or lattice cell) covers on the plane's plane, metres, where
-    /// it shows `target`; in the middle of the picture where that is behind the eye.
+    /// Side of the square that a pixel (or lattice cell) covers on the infinite plane, metres,
+    /// where it shows `target`; in the middle of the picture if that is behind the eye.
     pub(super) fn cell_metres(&self, view: &CameraView, target: &Vector3<f64>) -> f64 {
         let p = view.position_of(target);
         let w = self.w.dot(&p).max(self.height / HORIZON_M);
@@ -306,7 +307,7 @@ impl ProjectedPlane {
         quad_sides(&self.u, &self.v, &self.w, reach)
     }
 
-    /// The same plane in a picture that an affine map leads to this one.
+    /// The same plane in a picture that an affine map takes to this one.
     pub(super) fn seen_through(&self, map: &Matrix3<f64>) -> Self {
         let transposed = map.transpose();
         Self {
@@ -318,7 +319,7 @@ impl ProjectedPlane {
         }
     }
 
-    /// The same plane, with its texture the other way round where that is asked for.
+    /// The same plane, with a mirrored texture if `mirrored`.
     pub(super) fn mirrored_if(self, mirrored: bool) -> Self {
         let u = if mirrored { self.w - self.u } else { self.u };
         Self { u, ..self }
@@ -330,7 +331,7 @@ impl ProjectedPlane {
         (w > 0.0).then(|| self.point * p / w)
     }
 
-    /// Depth at a pixel position `(x, y, 1)`; as far as can be behind the eye.
+    /// Depth at a pixel position `(x, y, 1)`; the maximum behind the eye.
     #[inline]
     pub(super) fn depth_at(&self, p: &Vector3<f64>) -> f64 {
         let w = self.w.dot(p);
@@ -350,13 +351,13 @@ impl ProjectedPlane {
     }
 }
 
-/// Texture coordinates are those of a point of the texture.
+/// Whether texture coordinates are on the texture.
 #[inline]
 pub(super) fn is_on_texture(uv: [f64; 2]) -> bool {
     uv.iter().all(|c| (0.0..=1.0).contains(c))
 }
 
-/// Rows of the texture coordinates' numerators, for points `point * p / w.p` of a plane's plane.
+/// Rows of the texture coordinates' numerators, for points `point * p / w.p` of the infinite plane.
 pub(super) fn texture_rows(
     plane: &ScenePlane,
     point: &Matrix3<f64>,
@@ -368,13 +369,13 @@ pub(super) fn texture_rows(
             [plane.x, plane.y].map(|axis| point.transpose() * axis - w * axis.dot(&plane.center));
         [x / a + w * 0.5, w * 0.5 - y / b]
     } else {
-        // An endless plane has no edges: everything is its middle.
+        // An infinite plane has no edges: every point is its middle.
         [w * 0.5, w * 0.5]
     }
 }
 
-/// The cards of a shot that have an area, a place and texels, with their planes, in the order of
-/// their ids.
+/// The cards of a shot that have an area, a finite position and texels, with their planes, in the
+/// order of their ids.
 pub(super) fn visible_planes(shot: &Shot) -> Vec<(&Card, ScenePlane)> {
     let mut planes: Vec<_> = shot.cards.iter().filter_map(visible_plane).collect();
     planes.sort_by_key(|plane| plane.0.id);

@@ -1,4 +1,4 @@
-//! Curved cards as flat ones that look alike.
+//! Curved cards as flat ones that look the same.
 
 use super::Darkroom;
 use super::painted_plane::PaintedPlane;
@@ -12,22 +12,21 @@ use crate::render::view::ScenePlane;
 use crate::scene::{Card, Cylinder};
 use std::f32::consts::PI;
 
-/// Places along a bend that light is computed at: over 60 degrees, 4 degrees apart, where a line
-/// between two of them is off by 6e-4 of it.
+/// Positions along a bend at which light is computed: over 60 degrees they are 4 degrees apart, and
+/// linear interpolation between two is off by a share of 6e-4.
 const SHADING_NODES: usize = 17;
-/// Points along each side of a card whose places bound those of all of it.
+/// Points along each side of a card from which its extent is bounded.
 const SIDE_POINTS: usize = 17;
 
-/// What the eye sees of a curved card, painted on the plane of the flat one.
+/// The view of a curved card, painted on the plane of the flat one.
 ///
 /// # Method
-/// Every texel of the plane shows the point of the cylinder on its ray from the eye, so that the
-/// picture has the cylinder's outline, foreshortening and parallax, exactly as long as the card
-/// hides no part of itself. Approximate are: the light, which is that on the flat card, shadows
-/// included, times what the turn of the normal makes of unobstructed light; the shadow that the card
-/// throws, which is that of what is painted; and depth, which is that of the plane. Each is off by
-/// about the height of the arc, an eighth of the angle times the length: 9 mm for 200 mm bent by 20
-/// degrees.
+/// Every texel of the plane shows the point of the cylinder on its ray from the eye, so the picture
+/// has the cylinder's exact outline, foreshortening and parallax as long as the card hides no part
+/// of itself. Approximate are: the light, which is that on the flat card, shadows included, times
+/// the change of unobstructed light with the normal; the card's shadow, which is that of the
+/// painted plane; and depth, which is that of the plane. Each is off by about the height of the
+/// arc, an eighth of the angle times the length: 9 mm for 200 mm bent by 20 degrees.
 pub(super) fn bend(
     flat: &PaintedPlane,
     card: &Card,
@@ -48,7 +47,7 @@ pub(super) fn bend(
     PaintedPlane { film, ..empty }
 }
 
-/// An empty plane, its texels as large as those of another, where the eye sees a curved card.
+/// An empty plane with texels as large as those of another, where the eye sees a curved card.
 fn seen_area(
     flat: &PaintedPlane,
     card: &Card,
@@ -83,7 +82,7 @@ pub(super) struct BentShading {
 }
 
 impl BentShading {
-    /// That of a card on the side of the camera.
+    /// For a card on the side of the camera.
     pub(super) fn new(
         darkroom: &Darkroom<'_>,
         card: &Card,
@@ -113,7 +112,7 @@ impl BentShading {
         }
     }
 
-    /// The share at a place along the bend; that of the nearer end beyond them.
+    /// The share at a position along the bend; beyond the ends, that of the nearer one.
     fn at(&self, arc: f64) -> LinearRgb {
         let place = 0.5 * (arc / self.reach + 1.0) * (SHADING_NODES - 1) as f64;
         let place = place.clamp(0.0, (SHADING_NODES - 1) as f64).max(0.0);
@@ -124,10 +123,10 @@ impl BentShading {
     }
 }
 
-/// Irradiance in the middle of a patch over the surface with nothing but the surface in the way.
+/// Irradiance in the middle of a patch over the surface, obstructed only by the surface.
 fn open_irradiance(darkroom: &Darkroom<'_>, patch: &LitPatch) -> LinearRgb {
     let (shot, options, normal) = (darkroom.shot, darkroom.options, &patch.normal);
-    // A plane at an angle to the surface sees this share of the sky over it.
+    // A plane at an angle to the surface sees this share of the sky above it.
     let sky = shot.ambient.scale(PI * (0.5 + 0.5 * normal.z) as f32);
     let faces = LightSamples::faces_above(shot, options, patch);
     let lit = faces.iter().fold(sky, |sum, group| {
@@ -141,7 +140,7 @@ fn open_irradiance(darkroom: &Darkroom<'_>, patch: &LitPatch) -> LinearRgb {
         .fold(lit, |sum, piece| sum + piece.irradiance)
 }
 
-/// 1 where the flat card is in the dark.
+/// 1 if the flat card is in the dark.
 fn ratio(light: LinearRgb, flat: LinearRgb) -> LinearRgb {
     let pairs = [(light.r, flat.r), (light.g, flat.g), (light.b, flat.b)];
     pairs

@@ -5,13 +5,14 @@ use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, Mix};
 use crate::scene::Grade;
 
-/// Dyes what is see-through and changes the strength of glints.
+/// Dyes see-through plastic and changes the strength of glints.
 ///
 /// # Method
-/// A dye multiplies what the plastic lets pass by its transmittance (Beer and Lambert). Of a texel
-/// only the part that the object covers is dyed, and of that only what is clear, which is how much
-/// of the covered part is not opaque: paint, labels and caps keep their colours, soft borders do
-/// not colour what is beside them. Light that comes back out of the plastic is multiplied alike;
+/// A dye multiplies the plastic's transmittance by its own (Beer and Lambert). Only the part of a
+/// texel that the object covers is dyed, and of that only the clear part, which is the covered part
+/// less what is opaque: paint, labels and caps keep their colours, and soft borders do not tint
+/// what is next to them. Light that comes back out of the plastic is multiplied likewise; glints
+/// come from its surface and keep the colour of the light.
 /// glints come from its surface and keep the colour of the light.
 pub(super) fn dye(film: &mut Image<Film>, surface: &Image<SurfaceTexel>, grade: &Grade) {
     let texels = film.pixels_mut().iter_mut().zip(surface.pixels());
@@ -65,7 +66,7 @@ mod tests {
     fn what_passes_a_clear_bottle_is_multiplied() {
         let dyed = texel(0.1, 0.2, 1.0, 0.0, tinted());
         assert_near(dyed.transmittance(), TINT.scale(0.8));
-        // Light from within: a fifth comes from what is opaque.
+        // Light from within: a fifth comes from opaque parts.
         assert_near(
             dyed.color,
             (TINT.scale(0.8) + LinearRgb::grey(0.2)).scale(0.1),
@@ -81,7 +82,7 @@ mod tests {
         );
         let outside = texel(0.0, 0.0, 0.0, 0.0, tinted());
         assert_eq!(outside, Film::default());
-        // Half covered by opaque paint: nothing of it is clear.
+        // Half covered by opaque paint: none of it is clear.
         let border = texel(0.3, 0.5, 0.5, 0.0, tinted());
         assert_near(border.transmittance(), LinearRgb::grey(0.5));
         // Half covered by plastic of transmittance 0.8.

@@ -1,4 +1,4 @@
-//! Edges of cut-outs, softer or further in.
+//! Edges of cut-outs, softened or moved inwards.
 
 use super::painted_plane::{PaintedPlane, padded};
 use crate::asset::SurfaceTexel;
@@ -7,20 +7,20 @@ use crate::image::Image;
 use crate::pixel::{Film, Mix};
 use crate::scene::EdgeTreatment;
 
-/// Standard deviation of what edges are softened and eroded by, pixels of the picture.
+/// Standard deviation of the blur for softening and eroding edges, pixels of the picture.
 const SIGMA_PX: f32 = 0.5;
-/// How far from an edge it is softened, as the standard deviation of a Gaussian, pixels.
+/// Width of the softened band around an edge, as the standard deviation of a Gaussian, pixels.
 const BAND_SIGMA_PX: f32 = 1.0;
-/// Blurred coverage at which nothing is left of an eroded edge, and at which all of it is: a
-/// quarter and three quarters of a pixel further in, `Phi(0.5)` and `Phi(1.5)`.
+/// Blurred coverage at which nothing of an eroded edge is left, and at which all of it is: a
+/// quarter and three quarters of a pixel inwards, `Phi(0.5)` and `Phi(1.5)`.
 const ERODED: [f32; 2] = [0.691_5, 0.933_2];
 
-/// Treats the edges of what is painted on a plane; `pixel` is the side of the picture's pixels in texels.
+/// Treats the edges of a painted plane; `pixel` is the side of the picture's pixels in texels.
 ///
 /// # Method
-/// The edge is where the coverage by the object, blurred by a Gaussian, is a half; along a straight
-/// one the blurred coverage tells the distance. An eroded matte is one of the blurred coverage with
-/// a higher threshold.
+/// The edge is where the object's coverage, blurred by a Gaussian, is a half; along a straight one
+/// the blurred coverage gives the distance. An eroded matte thresholds the blurred coverage at a
+/// higher value.
 pub(super) fn treat(
     plane: &mut PaintedPlane,
     surface: &Image<SurfaceTexel>,

@@ -1,9 +1,9 @@
-//! Cut-outs retouched: dyed, with other glints, other edges, or curved.
+//! Retouched cut-outs: with other dyes, glints or edges, or curved.
 //!
-//! What a card asks for beyond its own texture is done to the texture before anything is rendered,
-//! at the level of detail that the picture reads and on that part of the card's plane that it is
-//! seen in. All that follows knows flat cards in their own colours, other renderers included; what
-//! asks for nothing is passed on as it is.
+//! Whatever a card needs beyond its own texture is done to the texture before anything is rendered,
+//! at the level of detail that the picture reads and on the visible part of the card's plane. All
+//! later stages, other renderers included, only see flat cards in their own colours; cards that
+//! need nothing are passed on unchanged.
 
 mod bend;
 mod dye;
@@ -22,12 +22,12 @@ use painted_plane::PaintedPlane;
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// A shot whose cards are flat and have their final textures, as finely as a picture needs.
+/// A shot with flat cards and final textures, at the detail that a picture needs.
 pub(super) fn retouched<'a>(shot: &'a Shot, options: &RenderOptions) -> Cow<'a, Shot> {
     retouch(shot, options, Some(filter_quantiles(options.subsamples)))
 }
 
-/// The same at full detail, for renderers that read nothing coarser.
+/// A shot with flat cards and final textures at full detail, for renderers without mip levels.
 pub fn retouched_fully<'a>(shot: &'a Shot, options: &RenderOptions) -> Cow<'a, Shot> {
     retouch(shot, &options.clamped(), None)
 }
@@ -58,7 +58,7 @@ fn asks_for_retouch(card: &Card, shot: &Shot) -> bool {
     card.grade.changes_surface() || !card.bend.is_flat() || shot.edges.reshape_cut_outs()
 }
 
-/// What cards are retouched by.
+/// The context of retouching.
 struct Darkroom<'a> {
     shot: &'a Shot,
     options: &'a RenderOptions,
@@ -67,17 +67,17 @@ struct Darkroom<'a> {
     view: CameraView,
 }
 
-/// The side of a card that is seen, and how large its texels are.
+/// The visible side of a card, and the size of its texels.
 struct SeenSide<'a> {
     texture: &'a Texture,
     surface: &'a SurfaceCache,
-    /// It is the back, whose texture runs the other way.
+    /// Whether it is the back, whose texture is mirrored.
     mirrored: bool,
     texels_per_pixel: f64,
 }
 
 impl Darkroom<'_> {
-    /// Cards that cannot be seen stay as they are.
+    /// Invisible cards are unchanged.
     fn retouch_card(&self, card: &Card) -> Card {
         let seen = ScenePlane::from_card(card)
             .filter(|_| asks_for_retouch(card, self.shot) && !card.texture.is_empty())
@@ -89,7 +89,7 @@ impl Darkroom<'_> {
         )
     }
 
-    /// None where the card is seen edge-on.
+    /// None if the card is seen edge-on.
     fn seen_side<'c>(&self, card: &'c Card, plane: &ScenePlane) -> Option<SeenSide<'c>> {
         let projected = ProjectedPlane::new(plane, &self.view)?;
         let behind = plane.is_seen_from_behind(&self.view.eye);
@@ -109,8 +109,8 @@ impl Darkroom<'_> {
         })
     }
 
-    /// The level that the nearest corner of a card is read from, or the one before it where texels
-    /// are moved.
+    /// The mip level that the nearest corner of a card is read from, or the next finer one if
+    /// texels are moved.
     fn level(&self, card: &Card, side: &SeenSide<'_>) -> usize {
         let Some(offsets) = &self.offsets else {
             return 0;
@@ -143,7 +143,7 @@ impl Darkroom<'_> {
             dye::dye(&mut painted.film, &side.surface_level(level), &card.grade);
         }
         if edges.reshape_cut_outs() {
-            // Of a card smaller than a pixel the edges are as those of one that fills it.
+            // The edges of a card smaller than a pixel are those of one that fills it.
             let longest = painted.film.width().max(painted.film.height()) as f64;
             let pixel = (side.texels_per_pixel / libm::exp2(level as f64)).min(longest);
             edges::treat(
@@ -158,7 +158,7 @@ impl Darkroom<'_> {
 }
 
 impl SeenSide<'_> {
-    /// What the texels at a level of detail are of.
+    /// The surface map at a mip level.
     fn surface_level(&self, level: usize) -> Image<SurfaceTexel> {
         let surface = self.surface.of(self.texture);
         painted_plane::turned(surface.level(level).clone(), self.mirrored)

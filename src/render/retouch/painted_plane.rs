@@ -7,7 +7,7 @@ use crate::pixel::{Film, LinearRgb};
 use crate::scene::{Bend, Card, Grade};
 use std::sync::Arc;
 
-/// What is painted on a card's plane, x right and y up from its middle, metres.
+/// A picture on a card's plane, x right and y up from its middle, metres.
 pub(super) struct PaintedPlane {
     pub(super) film: Image<Film>,
     /// Upper left corner.
@@ -17,8 +17,7 @@ pub(super) struct PaintedPlane {
 }
 
 impl PaintedPlane {
-    /// What a texture shows on its card at a level of detail. Texels of halved odd sizes reach
-    /// beyond the card.
+    /// A texture on its card at a mip level. Texels of halved odd sizes reach beyond the card.
     pub(super) fn new(card: &Card, texture: &Texture, mirrored: bool, level: usize) -> Self {
         let film = turned(texture.film_level(level), mirrored);
         let ([w, h], (columns, rows)) = (card.quad.size, texture.size());
@@ -53,7 +52,7 @@ impl PaintedPlane {
         )
     }
 
-    /// The same with empty texels on each side.
+    /// The same with empty texels added on each side.
     pub(super) fn padded(&self, margin: usize) -> Self {
         let by = margin as f64;
         Self {
@@ -63,7 +62,7 @@ impl PaintedPlane {
         }
     }
 
-    /// A flat card that shows it where another one is, seen through from its back.
+    /// A flat card with this picture in place of another one, whose back is the front seen through.
     pub(super) fn into_card(self, card: &Card) -> Card {
         Card {
             quad: self.quad(&card.quad),
@@ -81,7 +80,7 @@ impl PaintedPlane {
         }
     }
 
-    /// Where it lies, in the plane of a card.
+    /// Its quad, in the plane of a card.
     fn quad(&self, card: &Quad) -> Quad {
         let size = [
             self.texel[0] * self.film.width() as f64,
@@ -105,7 +104,7 @@ impl PaintedPlane {
     }
 }
 
-/// A picture with empty pixels on each side.
+/// A picture with empty pixels added on each side.
 pub(super) fn padded<P: Copy + Default + Send + Sync>(image: &Image<P>, margin: usize) -> Image<P> {
     let (width, height) = (image.width() + 2 * margin, image.height() + 2 * margin);
     Image::from_fn(width, height, |x, y| {
@@ -118,7 +117,7 @@ pub(super) fn padded<P: Copy + Default + Send + Sync>(image: &Image<P>, margin: 
     })
 }
 
-/// A picture, the other way round where it is that of a back.
+/// A picture, mirrored for a back.
 pub(super) fn turned<P: Copy + Send + Sync>(image: Image<P>, mirrored: bool) -> Image<P> {
     if !mirrored {
         return image;

@@ -1,4 +1,4 @@
-//! Retouched cards beside what they stand for.
+//! Retouched cards compared with what they stand for.
 
 use super::*;
 use crate::camera::Camera;
@@ -31,7 +31,7 @@ fn is_inside(u: f64, v: f64) -> bool {
     ((u - 0.5) / 0.42).powi(2) + ((v - 0.5) / 0.36).powi(2) < 1.0
 }
 
-/// An opaque ellipse of odd size, turned in every way.
+/// An opaque ellipse of odd size, rotated about all axes.
 fn card(bend: Bend, roll: f64) -> Card {
     let rotation = UnitQuaternion::from_euler_angles(0.2 + roll, -0.15, 0.5);
     let quad = Quad {
@@ -58,8 +58,8 @@ fn shot(card: Card) -> Shot {
     Shot::new(camera()).with_card(card)
 }
 
-/// Pixels that the card covers by more than a half: of four by four parts of a pixel, those that
-/// points of it fall into.
+/// Pixels of which the card covers more than half: of four by four parts of a pixel, those that
+/// contain points of it.
 fn pixels_hit(card: &Card) -> Mask {
     let (camera, mut hit) = (camera(), Image::filled(960, 720, 0.0_f32));
     for i in 0..3000 {
@@ -205,7 +205,7 @@ fn a_card_behind_the_camera_is_not_seen_whatever_is_asked_of_it() {
         ),
         (Card { grade, ..plain }, EdgeTreatment::AsIs),
     ];
-    // The same view in a usual picture and in a tiny one.
+    // The same view in a normal picture and in a tiny one.
     for (focal_px, image) in [(280.0, [320, 240]), (7.0, [8, 6])] {
         let camera = Camera::look_at(eye, target, focal_px, image);
         for (card, edges) in cards.clone() {
@@ -235,7 +235,7 @@ fn edges_of_a_card_smaller_than_a_pixel_stay_close_to_it() {
 
 #[test]
 fn light_on_a_bent_card_follows_its_normal() {
-    // So far away that its direction is the same all over the card.
+    // So far away that its direction is the same everywhere on the card.
     let sun = AreaLight::new([60.0, 10.0, 60.0], [0.1; 2], 1e5);
     let quad = Quad {
         world_from_card: Pose::translation(0.0, 0.0, 0.06),
@@ -275,7 +275,7 @@ fn retouching_nothing_at_another_level_changes_next_to_nothing() {
         glints: 0.5,
         ..Grade::default()
     };
-    // No texel of it is a glint.
+    // None of its texels is a glint.
     let retouched = Card {
         grade,
         ..plain.clone()

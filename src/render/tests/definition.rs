@@ -1,4 +1,4 @@
-//! The definition's own tests: the numbers that both ways of rendering must hit.
+//! Tests of the definition itself: the numbers that both renderers must reproduce.
 
 use crate::asset::{Panorama, Texture};
 use crate::camera::Camera;
@@ -43,7 +43,7 @@ pub(super) fn above(width: u32, height: u32, focal_px: f64) -> Camera {
     }
 }
 
-/// A light whose irradiance at five points was worked out by hand and checked in Cycles.
+/// A light whose irradiance at five points was computed by hand and verified in Cycles.
 fn square_light() -> AreaLight {
     AreaLight::new([0.3, 0.2, 0.9], [0.4; 2], 10.0)
 }
@@ -65,7 +65,7 @@ pub(super) fn card(
     }
 }
 
-/// A level card of one colour, with enough texels that the fade at its edge is nothing.
+/// A level card of one colour, with enough texels that the fade at its edge is negligible.
 fn level(id: u32, center: [f64; 3], size: f64, texel: PremulRgba) -> Card {
     card(
         id,
@@ -91,7 +91,7 @@ fn sharp() -> RenderOptions {
     }
 }
 
-/// The factor at a point of the surface, looked at from right above.
+/// The factor at a point of the surface, seen from straight above.
 fn factor_at(
     shot: &Shot,
     options: &RenderOptions,
@@ -125,8 +125,7 @@ fn shadows_of_a_square_hit_the_published_numbers() {
         for (alpha, s) in [(1.0, opaque), (0.6, translucent)] {
             let shot = Shot::new(above(3, 3, 100.0)).with_light(square_light());
             let caster = level(1, [0.06, 0.02, 0.1], 0.1, grey(alpha));
-            // The card would hide the surface from above; looked at from a slant it is out of the
-            // way.
+            // The card would hide the surface from above; seen at an angle it is out of the way.
             let shot = seen_from_the_side(shot.with_card(caster), x, y);
             for way in [render, render_reference] {
                 let found = way(&shot, &sharp()).shadow()[(1, 1)].g;
@@ -195,8 +194,8 @@ fn each_layer_takes_its_share() {
         for way in [render, render_reference] {
             let deep = way(&shot, &RenderOptions::default());
             let left = 0.8f32.powi(n as i32);
-            // All cards cover the whole light: the surface keeps the same share, the eye sees it
-            // through the same.
+            // All cards cover the whole light: the surface keeps the same share, and the eye sees
+            // it through the same.
             assert!(
                 (deep.shadow()[(2, 2)].r - left).abs() < 1e-5,
                 "{n} layers, light"
@@ -252,7 +251,7 @@ fn ambient_alone_lights_a_card_by_its_albedo() {
     }
 }
 
-/// The light map's cells are as large as pixels; shadows of the plate stay.
+/// The light map's cells are as large as pixels; the plate's shadows are unchanged.
 #[test]
 fn a_light_map_is_a_factor_on_the_light_of_cards_alone() {
     let factors = [vec![0.5, 1.0], vec![2.0, 4.0]];
@@ -288,8 +287,8 @@ fn a_light_map_is_a_factor_on_the_light_of_cards_alone() {
     }
 }
 
-/// A 4 x 4 texture of all different texels, one texel to 10 pixels, under even light that shows
-/// colours as they are.
+/// A 4 x 4 texture of all different texels, 10 pixels per texel, under constant light that shows
+/// colours unchanged.
 fn magnified() -> (Shot, Image<PremulRgba>) {
     let texture = Image::from_fn(4, 4, |x, y| {
         let v = 0.05 * (4 * y + x) as f32;
@@ -354,7 +353,7 @@ fn an_edge_is_as_soft_as_the_window() {
     for (t, coverage) in table {
         // The card's right edge lies t pixels right of the centre of pixel 4.
         let size = 2.0;
-        // Texels of a hundredth of a pixel: the fade of the outermost half is nothing.
+        // Texels of a hundredth of a pixel: the fade of the outermost half is negligible.
         let texture = Image::filled(20_000, 4, grey(1.0));
         let edge = card(
             1,
@@ -500,7 +499,7 @@ fn crossing_cards_swap_places_where_they_cross() {
     }
 }
 
-/// More than any card of a shot may show: whitest texel, nearest to the light, facing it.
+/// An upper bound for any card of a shot: whitest texel, nearest to the light, facing it.
 fn brightest(shot: &Shot, light: &AreaLight) -> f32 {
     let corners = shot.cards.iter().flat_map(|c| c.quad.corners());
     let nearest = corners
@@ -580,8 +579,8 @@ fn a_finite_catcher_ends_the_shadow() {
     }
 }
 
-/// Shots in which something is missing or of one colour; `petcomp-report stability` has those that
-/// are hard to look at.
+/// Shots with something missing or of one colour; `petcomp-report stability` has the visually
+/// difficult ones.
 fn awkward() -> Vec<(&'static str, Shot)> {
     let base = || {
         Shot::new(above(16, 12, 20.0))
@@ -638,7 +637,7 @@ fn awkward_shots_give_defined_pictures() {
     }
 }
 
-/// A card whose film keeps back most of the green, over a card with alpha, with a back of its own.
+/// A card whose film absorbs most of the green, over a card with alpha, with a back of its own.
 fn tinted(make: impl Fn(Image<Film>) -> Texture) -> Shot {
     let film = Image::from_fn(32, 24, |x, y| {
         let cover = if (4..28).contains(&x) && (3..21).contains(&y) {
@@ -748,7 +747,7 @@ pub(super) fn difference(a: &Image<PremulRgba>, b: &Image<PremulRgba>) -> f64 {
 
 #[test]
 fn interreflection_brightens_the_surface_under_a_card_alone() {
-    // A wide white card of alpha 1/2 sends half of the light back: 1 / (1 - 0.8 * 0.5).
+    // A wide white card of alpha 1/2 reflects half of the light: 1 / (1 - 0.8 * 0.5).
     let shot = Shot::new(above(21, 21, 100.0))
         .with_ambient(LinearRgb::WHITE)
         .with_card(level(
@@ -866,8 +865,8 @@ fn the_shadow_of_a_sun_lies_across_from_it_at_any_rotation() {
         let shot =
             Shot::new(above(81, 81, 100.0)).with_card(level(1, [0.0, 0.0, 0.1], 0.1, grey(1.0)));
         let shot = shot.with_environment(sun(rotation));
-        // A direction of the world is turned by the rotation before it is looked up: the sun stands
-        // at minus that.
+        // A direction of the world is rotated before it is looked up: the sun is at minus that
+        // rotation.
         let (sin, cos) = libm::sincos(-rotation);
         let (x, y) = (-0.1 * cos, -0.1 * sin);
         let pixel = ((40.5 + 100.0 * x) as usize, (40.5 - 100.0 * y) as usize);
@@ -983,7 +982,7 @@ fn leaning() -> Shot {
     Shot::new(above(5, 5, 400.0)).with_card(card(1, [0.0, 0.0, 0.3], lean, [0.1; 2], white))
 }
 
-/// What comes from a lamp of this height, its middle this high, 1 m beside that card.
+/// Light from a lamp of this height, its middle this high, 1 m to the side of that card.
 fn light_from_beside(middle: f64, height: f64, catcher: [f64; 2], way: Rendering) -> f32 {
     let lamp = AreaLight {
         target: [0.0, 0.0, middle],

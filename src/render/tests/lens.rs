@@ -1,4 +1,4 @@
-//! Pictures through a lens that bends them, against the formula written out.
+//! Pictures through a lens with distortion, compared with the explicit formula.
 
 use super::definition::{HIGH, above, card, difference, pile, plate, same};
 use crate::camera::Camera;
@@ -11,11 +11,12 @@ use crate::pixel::PremulRgba;
 use crate::render::{RenderOptions, render, render_coverage, render_reference};
 use crate::scene::{AreaLight, Shot};
 
-/// A barrel and a pincushion that move the corners of the pictures here by a tenth of the way.
+/// A barrel and a pincushion distortion that move the corners of the pictures here by a tenth of
+/// their radius.
 const BARREL: f64 = -0.25;
 const PINCUSHION: f64 = 0.25;
 
-/// OpenCV's projection, by its documentation.
+/// OpenCV's projection, from its documentation.
 fn opencv_px(camera: &Camera, k1: f64, world: Point3<f64>) -> Point2<f64> {
     let seen = camera.camera_from_world * world;
     let (x, y) = (seen.x / seen.z, seen.y / seen.z);
@@ -127,7 +128,7 @@ fn a_straight_edge_becomes_the_curve_of_the_formula() {
             };
             let expected = curve.iter().min_by(nearest).unwrap().y;
             let rows: f64 = (0..120).map(|y| found[(x, y)]).sum();
-            // 0.1 px is what the texture's own border and a step of the curve leave.
+            // 0.1 px is the contribution of the texture's own border and a step of the curve.
             assert!(
                 (rows - expected).abs() < 0.1,
                 "{k1}: {x}: {rows} {expected}"
@@ -208,7 +209,7 @@ fn a_lens_that_bends_nothing_changes_no_bit() {
     let options = RenderOptions::default();
     let plain = render(&pile(), &options);
     assert!(same(&plain, &render(&pile().with_k1(0.0), &options)));
-    // One that bends by a millionth of a pixel changes coverage by as little.
+    // A distortion of a millionth of a pixel changes coverage by as little.
     let bent = render_coverage(&pile().with_k1(1e-9), &options);
     let [a, b] = [&plain, &bent].map(coverage);
     let pairs = a.pixels().iter().zip(b.pixels());
@@ -220,7 +221,7 @@ fn a_lens_that_bends_nothing_changes_no_bit() {
 fn shadows_are_bent_with_what_they_fall_on() {
     let lamp = AreaLight::new([0.0, 0.0, 3.0], [0.01; 2], 10.0);
     let at = Vector3::new(0.3, 0.2, 0.0);
-    // Close over the surface: the shadow is where the card is, and seen through it.
+    // Just above the surface: the shadow is where the card is, and seen through it.
     let half = Image::filled(64, 64, PremulRgba::new(0.2, 0.2, 0.2, 0.5));
     let dot = card(
         1,

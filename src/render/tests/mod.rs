@@ -1,4 +1,4 @@
-//! The renderer against its definition.
+//! Tests of the renderer against its definition.
 
 mod definition;
 mod lens;

@@ -1,4 +1,4 @@
-//! Cards that bend light, against what their displacement does to a plate that grows evenly.
+//! Refracting cards, tested by their displacement of a plate that is a linear gradient.
 
 use super::definition::{above, card, pile, plate, same};
 use crate::composite::{self, Exposed};
@@ -13,13 +13,13 @@ use crate::scene::{Bend, Blur, Card, PostProcess, Refraction, Shot, ThinLens};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// Focal length over the height of the camera, a metre: pixels for a metre of the surface.
+/// Focal length over the height of the camera, a metre: pixels per metre of the surface.
 const PX_PER_METRE: f64 = 100.0;
-/// What the plate grows by in a pixel to the right, and in a pixel down.
+/// Gradient of the plate per pixel to the right, and per pixel down.
 const GROWTH: [f64; 2] = [0.004, 0.002];
-/// Height of bodies as they lay on the display, and of their cards over what they lie on.
+/// Height of bodies when they lay on the display, and of their cards above what they rest on.
 const HEIGHT: f64 = 0.03;
-/// What a card lets pass.
+/// Transmittance of a card.
 const PASSES: f64 = 0.75;
 
 fn even_plate() -> Arc<Image<LinearRgb>> {
@@ -45,7 +45,7 @@ fn flow(displacement: [f32; 2]) -> Option<Arc<Flow>> {
     }))
 }
 
-/// A dark sheet that bends, this high over the surface.
+/// A dark refracting sheet, this high above the surface.
 fn sheet(id: u32, height: f64, displacement: [f32; 2]) -> Card {
     let dark = Image::filled(64, 64, PremulRgba::new(0.0, 0.0, 0.0, 1.0 - PASSES as f32));
     Card {
@@ -68,8 +68,8 @@ fn shot(cards: impl IntoIterator<Item = Card>) -> Shot {
     cards.into_iter().fold(shot, Shot::with_card)
 }
 
-/// By how many pixels the plate is displaced in the middle, as the growth of a dark picture tells
-/// it; the growth along both axes in one number.
+/// Displacement of the plate in the middle, pixels, from the brightness of a dark picture; along
+/// both axes in one number.
 fn shift(shot: &Shot, passes: f64) -> f64 {
     let seen = composite::picture(shot, &RenderOptions::default())[(32, 24)].g;
     let straight = even_plate()[(32, 24)].g;
@@ -90,7 +90,7 @@ fn assert_shift(cards: impl IntoIterator<Item = Card>, expected: f64) {
 fn what_lies_behind_is_seen_where_lines_of_sight_end() {
     assert_shift([sheet(1, HEIGHT, [0.02, 0.0])], 2.0);
     assert_shift([sheet(1, HEIGHT, [-0.03, 0.0])], -3.0);
-    // A pixel down is worth half a pixel to the right; the surface's y points up the picture.
+    // A pixel down counts as half a pixel to the right; the surface's y points up the picture.
     assert_shift([sheet(1, HEIGHT, [0.0, 0.02])], 1.0);
 }
 
@@ -137,7 +137,7 @@ fn a_larger_object_bends_as_much_more() {
 #[test]
 fn displacements_of_a_stack_add_up() {
     let low = sheet(1, HEIGHT, [0.02, 0.0]);
-    // It is 0.04 m higher; of what lies behind it 3/4 is the surface, and the rest the lower sheet.
+    // It is 0.04 m higher; 3/4 of what is behind it is the surface, and the rest the lower sheet.
     let growth = 1.0 + (PASSES * 0.04 + (1.0 - PASSES) * 0.01) / HEIGHT;
     let depth = 1.0 - (1.0 - PASSES) * HEIGHT;
     let high = sheet(2, HEIGHT + 0.04, [0.01, 0.0]);
@@ -173,12 +173,12 @@ fn a_back_without_a_flow_of_its_own_bends_like_the_front() {
         card
     };
     assert_shift([turned(sheet(1, HEIGHT, [0.02, 0.0]))], 2.0);
-    // Down on the front is up as seen from behind, about the axis that it was turned by.
+    // Down on the front is up as seen from behind, about the axis of rotation.
     assert_shift([turned(sheet(1, HEIGHT, [0.0, 0.02]))], -1.0);
     let mut backed = turned(sheet(1, HEIGHT, [0.0, 0.02]));
     backed.back = Some(backed.texture.clone());
     assert_shift([backed.clone()], 0.0);
-    // Its own raster shows the back the right way round: right is towards the card's left.
+    // Its own texels show the back the right way round: right is towards the card's left.
     backed.refraction.flows[1] = flow([0.02, 0.0]);
     assert_shift([backed], -2.0);
 }
@@ -255,7 +255,7 @@ fn what_is_seen_through_a_soft_object_is_as_sharp_as_the_photo() {
     }
 }
 
-/// A sheet that is opaque left of its middle, and bends to the left.
+/// A sheet that is opaque left of its middle, and displaces to the left.
 fn half_painted() -> Card {
     let mut card = sheet(1, HEIGHT, [-0.05, 0.0]);
     let paint = |x: usize| {
