@@ -1,5 +1,4 @@
-//! Attempts at letting a scene come to rest: from which heights, with which steps, and how each
-//! ended.
+//! Attempts to bring a scene to rest: from which heights, with which steps, and how each ended.
 
 use super::bodies::{is_dropped, max_overlap, touch_distance, typical_length};
 use super::overlap::{self, Solid, Touch};
@@ -11,19 +10,18 @@ use crate::error::Result;
 use crate::geom::Pose;
 use crate::scene::{Draws, Object, Placement, Scene, SettleMode, SettleOptions};
 
-/// Most times that attempts halve the step of the first one.
+/// Maximum number of times that attempts halve the first one's step.
 const MAX_STEP_HALVINGS: u32 = 3;
-/// Seed of the heights that attempts after the first start from.
+/// Seed of the starting heights of attempts after the first.
 const RETRY_SEED: u64 = 0x5e771e;
-/// Most that one card of a stack is raised in another attempt, as a share of the typical card's
-/// length.
+/// Maximum rise of one card of a stack in another attempt, as a share of the typical card's length.
 const MAX_RAISE_RATIO: f64 = 0.1;
 
 /// The attempts at one scene.
 pub(super) struct AttemptSeries<'a> {
     pub(super) scene: &'a Scene,
     pub(super) options: &'a SettleOptions,
-    /// Steps between samples of the motion; none where it is 0.
+    /// Steps between samples of the motion; 0 for no samples.
     pub(super) sample_every: usize,
     pub(super) allowance: &'a Allowance<'a>,
 }
@@ -113,10 +111,10 @@ impl AttemptSeries<'_> {
             || count >= self.options.attempts as usize
     }
 
-    /// Times that the next attempt halves the step.
+    /// Number of times that the next attempt halves the step.
     ///
-    /// Bodies that have sunk in need stiffer contacts, which shorter steps bear; those that have
-    /// gained energy hit too hard in one step, and would again from most heights.
+    /// Bodies that have sunk in need stiffer contacts, which shorter steps allow; those that have
+    /// gained energy hit too hard in one step, and would do so again from most heights.
     fn next_halvings(&self, attempt: &Attempt, halvings: u32) -> u32 {
         let sank = attempt.overlap.is_finite() && self.is_too_deep(attempt.overlap);
         let exploded = matches!(attempt.verdict, SettleVerdict::Exploded(_));
@@ -151,7 +149,7 @@ impl AttemptSeries<'_> {
         }
     }
 
-    /// Whether bodies that lie still are supported. What was laid without physics always is.
+    /// Whether bodies at rest are supported. Those laid without physics always are.
     fn judge_support(&self, bodies: &[Solid], touching: &[Touch]) -> SettleVerdict {
         if self.options.mode == SettleMode::Flat {
             return SettleVerdict::Rested;
@@ -169,9 +167,9 @@ impl AttemptSeries<'_> {
     }
 }
 
-/// The heights that an attempt starts from: first those of the scene; then each object, from the
-/// lowest up, is raised by somewhat more than the one below it, so that what starts apart in height
-/// stays apart.
+/// The heights that an attempt starts from: in the first one those of the scene; in later ones each
+/// object, from the lowest up, is raised by somewhat more than the one below it, so that objects
+/// that start apart in height stay apart.
 pub(super) fn start_heights(scene: &Scene, attempt: usize) -> Vec<f64> {
     let mut heights: Vec<f64> = scene.objects.iter().map(own_height).collect();
     if attempt > 0 {
@@ -184,7 +182,7 @@ pub(super) fn start_heights(scene: &Scene, attempt: usize) -> Vec<f64> {
     heights
 }
 
-/// Raises each height by its own amount above the raise of the next lower one.
+/// Raises each height by its own amount, on top of the raise of the next lower one.
 fn raise_from_lowest(heights: &mut [f64], amount: impl Fn(usize) -> f64) {
     let mut raise = 0.0;
     for i in overlap::ascending_by(heights.len(), |i| heights[i]) {
@@ -201,7 +199,7 @@ fn own_height(object: &Object) -> f64 {
     }
 }
 
-/// The scene with these poses for the objects that fall, in their order; those without one are
+/// The scene with these poses for the objects that fall, in their order; objects without one are
 /// gone.
 fn with_poses(mut scene: Scene, poses: &[Option<Pose>]) -> Scene {
     let falling = scene.objects.iter_mut().filter(|object| is_dropped(object));

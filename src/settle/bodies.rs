@@ -1,14 +1,14 @@
-//! The bodies that represent a scene's objects, and the lengths that a scene's tolerances scale
-//! with.
+//! The bodies that represent a scene's objects, and the lengths that a scene's tolerances are
+//! relative to.
 
 use super::overlap::Solid;
 use crate::geom::{Pose, Vector3};
 use crate::quantile::median;
 use crate::scene::{Object, Placement, Scene, SettleOptions};
 
-/// Gap below which bodies at rest touch, as a share of the typical card's longer side: 3 mm for
-/// 200 mm. They keep 0.4 mm; what the engine has put to sleep on its way to a support may lack some
-/// more.
+/// Gap below which bodies at rest touch, as a share of the typical card's longer side: 3 mm for 200
+/// mm. They keep 0.4 mm apart; a body that the engine has put to sleep on its way to a support may
+/// lack somewhat more.
 const TOUCH_GAP_RATIO: f64 = 0.015;
 
 pub(super) fn is_dropped(object: &Object) -> bool {
@@ -37,18 +37,18 @@ pub(super) fn touch_distance(scene: &Scene) -> f64 {
     TOUCH_GAP_RATIO * typical_length(scene)
 }
 
-/// Deepest accepted overlap, metres.
+/// Maximum accepted overlap, metres.
 pub(super) fn max_overlap(scene: &Scene, options: &SettleOptions) -> f64 {
     options.max_overlap * typical_length(scene)
 }
 
-/// The bodies at the end of a fall; those fell that fall at its start.
+/// The bodies at the end of a fall; those that fall in `start` count as dropped.
 pub(super) fn solids_at_rest(start: &Scene, end: &Scene, options: &SettleOptions) -> Vec<Solid> {
     let poses: Vec<Option<Pose>> = end.objects.iter().map(current_pose).collect();
     solids(start, options, &poses)
 }
 
-/// Where an object is, or from where it falls; none where it is gone.
+/// Pose of an object, or the one that it falls from; none if it is gone.
 pub(super) fn current_pose(object: &Object) -> Option<Pose> {
     match object.placement {
         Placement::Gone => None,

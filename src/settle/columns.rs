@@ -1,8 +1,8 @@
-//! Falls of objects that cannot touch, separate from each other.
+//! Separate falls of objects that cannot touch each other.
 //!
-//! Cards in columns of their own fall in worlds of their own; a card that has a column to itself
-//! needs none. That is checked afterwards: where the spaces that two columns swept overlap, they
-//! fall again, together.
+//! Cards in separate columns fall in separate worlds; a card that has a column to itself needs
+//! none. This is checked afterwards: if the spaces swept by two columns overlap, they fall again,
+//! together.
 
 use super::level;
 use super::world::{Drop, Fall};
@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::geom::Pose;
 use crate::scene::{Scene, SettleOptions};
 
-/// Objects that fall together, and how that ended.
+/// Objects that fall together, and how their fall ended.
 struct FallenColumn {
     members: Vec<usize>,
     fall: Fall,
@@ -45,7 +45,7 @@ impl FallenColumn {
     }
 }
 
-/// The fall of a card that can touch nothing; none where it may.
+/// The fall of a card that cannot touch anything; none if it may.
 fn fall_alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Fall> {
     let pose = level::rest_alone(scene, options, i)?;
     let radius = options.half_body(&scene.objects[i]).norm();
@@ -87,7 +87,7 @@ fn merge_columns(columns: Vec<FallenColumn>) -> Fall {
 }
 
 impl Fall {
-    /// Takes in how another fall went, apart from its poses.
+    /// Merges another fall into this one, except its poses.
     fn absorb(&mut self, other: Self) {
         self.rests &= other.rests;
         self.seconds = self.seconds.max(other.seconds);
@@ -150,7 +150,7 @@ mod tests {
 
     #[test]
     fn columns_that_spread_into_each_other_fall_together() {
-        // Two towers on edge, side by side, that topple.
+        // Two towers standing on edge, side by side, that topple.
         let mut scene = dropped(0, 8);
         for (i, object) in scene.objects.iter_mut().enumerate() {
             let side = if i % 2 == 0 { -0.12 } else { 0.12 };

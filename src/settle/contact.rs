@@ -1,29 +1,29 @@
-//! Where bodies at rest push on each other, on the floor and on the walls.
+//! Contacts of bodies at rest: with each other, with the floor and with the walls.
 
 use super::overlap::{Solid, Touch};
 use crate::geom::Vector3;
 use nalgebra::Vector2;
 
-/// Direction cosine up to which `x` is far enough from a direction to span the plane across it.
+/// Direction cosine up to which `x` is oblique enough to a direction to span the plane across it.
 const MAX_HELPER_COSINE: f64 = 0.6;
 
-/// A point where a body is pushed.
+/// A point at which a body is pushed.
 #[derive(Clone, Debug)]
 pub(super) struct Contact {
     /// The body, as its index.
     pub(super) body: usize,
-    /// The body that pushes back; none where it is the floor or a wall.
+    /// The body that pushes back; none for the floor or a wall.
     pub(super) by: Option<usize>,
     /// Position, metres.
     pub(super) point: Vector3<f64>,
-    /// Unit vector that it is pushed along.
+    /// Unit vector in the direction of the push.
     pub(super) normal: Vector3<f64>,
-    /// Whether there is friction: everywhere but at a wall.
+    /// Whether there is friction: everywhere except at walls.
     pub(super) rough: bool,
 }
 
-/// All contacts of bodies that fell: of the pairs that touch, and with the floor and the walls over
-/// the edges of a surface where those are `invisible`. What is nearer than `reach` (metres) touches.
+/// All contacts of bodies that fell: of the pairs that touch, and with the floor and, if they are
+/// `invisible`, the walls over the edges of a surface. Bodies nearer than `reach` (metres) touch.
 pub(super) fn contacts(
     solids: &[Solid],
     touching: &[Touch],
@@ -72,7 +72,7 @@ fn room_contacts(body: usize, solid: &Solid, surface: [f64; 2], reach: f64) -> V
         .collect()
 }
 
-/// Contacts of two bodies, of which the higher one is pushed.
+/// Contacts of two bodies; the higher one is pushed.
 fn pair_contacts(solids: &[Solid], touch: &Touch, reach: f64) -> Vec<Contact> {
     let [body, by] = touch.pair;
     let points = shared_points(&solids[body], &solids[by], &touch.towards, reach);
@@ -88,8 +88,8 @@ fn pair_contacts(solids: &[Solid], touch: &Touch, reach: f64) -> Vec<Contact> {
         .collect()
 }
 
-/// The corners of what the faces, edges or corners of two bodies that are turned to each other
-/// share, halfway between the bodies; `towards` is the direction from the first to the second.
+/// Corners of the intersection of the facing faces, edges or corners of two bodies, halfway between
+/// the bodies; `towards` is the direction from the first to the second.
 fn shared_points(a: &Solid, b: &Solid, towards: &Vector3<f64>, reach: f64) -> Vec<Vector3<f64>> {
     let near_a = NearestCorners::new(a, towards, reach);
     let near_b = NearestCorners::new(b, &-towards, reach);
@@ -102,7 +102,7 @@ fn shared_points(a: &Solid, b: &Solid, towards: &Vector3<f64>, reach: f64) -> Ve
         .collect()
 }
 
-/// Two unit vectors across another one.
+/// Two unit vectors perpendicular to another one and to each other.
 pub(super) fn perpendicular_axes(direction: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let helper = if direction.x.abs() < MAX_HELPER_COSINE {
         Vector3::x()
@@ -113,15 +113,15 @@ pub(super) fn perpendicular_axes(direction: &Vector3<f64>) -> (Vector3<f64>, Vec
     (u, direction.cross(&u))
 }
 
-/// The corners of a body that lie farthest in a direction.
+/// The corners of a body that are farthest in a direction.
 struct NearestCorners {
-    /// How far that is.
+    /// Their distance in that direction.
     height: f64,
     corners: Vec<Vector3<f64>>,
 }
 
 impl NearestCorners {
-    /// Those of a body, to within `reach`.
+    /// Those of a body, within `reach`.
     fn new(solid: &Solid, towards: &Vector3<f64>, reach: f64) -> Self {
         let heights = solid.corners().map(|corner| corner.dot(towards));
         let height = heights.fold(f64::NEG_INFINITY, f64::max);
@@ -145,7 +145,7 @@ fn turn(a: &Vector2<f64>, b: &Vector2<f64>, c: &Vector2<f64>) -> f64 {
     (b - a).perp(&(c - a))
 }
 
-/// The convex hull of some points, counter-clockwise; two points or one where they have no area.
+/// The convex hull of some points, counter-clockwise; two points or one if they have no area.
 ///
 /// # Method
 /// Andrew 1979: the lower and the upper chain of the points in order of x.
@@ -160,7 +160,7 @@ fn convex_hull(points: impl Iterator<Item = Vector2<f64>>) -> Vec<Vector2<f64>> 
     [lower, hull_chain(points.iter().rev())].concat()
 }
 
-/// The chain of a hull along sorted points, without its last one, where the other chain begins.
+/// The chain of a hull along sorted points, without its last point, where the other chain begins.
 fn hull_chain<'a>(points: impl Iterator<Item = &'a Vector2<f64>>) -> Vec<Vector2<f64>> {
     let mut chain: Vec<Vector2<f64>> = Vec::new();
     for p in points {
@@ -175,7 +175,7 @@ fn hull_chain<'a>(points: impl Iterator<Item = &'a Vector2<f64>>) -> Vec<Vector2
     chain
 }
 
-/// Corners of what two convex rings share, each widened by `reach`.
+/// Corners of the intersection of two convex rings, each widened by `reach`.
 fn shared_corners(a: &[Vector2<f64>], b: &[Vector2<f64>], reach: f64) -> Vec<Vector2<f64>> {
     let of_a = a.iter().filter(|p| is_near(p, b, reach));
     let of_b = b.iter().filter(|p| is_near(p, a, reach));
@@ -188,7 +188,7 @@ fn crossings(a: &[Vector2<f64>], b: &[Vector2<f64>]) -> impl Iterator<Item = Vec
     sides(a).flat_map(move |s| sides(b).filter_map(move |t| crossing(s, t)))
 }
 
-/// The sides of a ring; one of two points, none of one.
+/// The sides of a ring: a single one for two points, none for one.
 fn sides(ring: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 2]> {
     let count = match ring.len() {
         0 | 1 => 0,
@@ -203,7 +203,7 @@ fn is_inside(p: &Vector2<f64>, ring: &[Vector2<f64>]) -> bool {
     ring.len() > 2 && sides(ring).all(|[a, b]| turn(&a, &b, p) >= 0.0)
 }
 
-/// Whether a point lies in a ring, or outside by `reach` at most.
+/// Whether a point is in a ring, or outside by at most `reach`.
 fn is_near(p: &Vector2<f64>, ring: &[Vector2<f64>], reach: f64) -> bool {
     is_inside(p, ring)
         || sides(ring).any(|side| distance_to_side(p, side) <= reach)

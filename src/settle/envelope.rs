@@ -1,6 +1,6 @@
-//! Symmetric matrices that are zero away from the diagonal.
+//! Symmetric matrices with an envelope of zeros away from the diagonal.
 
-/// The lower half of a symmetric matrix: of each row what lies from its first entry to the
+/// The lower half of a symmetric matrix: for each row, the entries from its first one to the
 /// diagonal.
 #[derive(Clone, Debug)]
 pub(super) struct EnvelopeMatrix {
@@ -9,14 +9,14 @@ pub(super) struct EnvelopeMatrix {
 }
 
 impl EnvelopeMatrix {
-    /// Zeros, with room from each row's first entry.
+    /// A zero matrix with storage from each row's first entry on.
     pub(super) fn zeros(first: Vec<usize>) -> Self {
         let lengths = first.iter().enumerate().map(|(i, first)| i + 1 - first);
         let rows = lengths.map(|length| vec![0.0; length]).collect();
         Self { first, rows }
     }
 
-    /// Adds to an entry that there is room for, at or left of the diagonal.
+    /// Adds to a stored entry, at or left of the diagonal.
     pub(super) fn add(&mut self, row: usize, column: usize, value: f64) {
         self.rows[row][column - self.first[row]] += value;
     }
@@ -24,7 +24,7 @@ impl EnvelopeMatrix {
     /// Solves `A x = b` for a positive definite A.
     ///
     /// # Method
-    /// Cholesky by rows: what lies outside of the envelope stays zero (Jennings 1966).
+    /// Cholesky by rows: entries outside the envelope remain zero (Jennings 1966).
     pub(super) fn solve(mut self, mut b: Vec<f64>) -> Vec<f64> {
         for i in 0..self.rows.len() {
             self.factor_row(i);
@@ -67,14 +67,14 @@ impl EnvelopeMatrix {
     }
 }
 
-/// The product of two rows, each with its first column, up to a column.
+/// The dot product of two rows, each with its first column, up to a column.
 fn product_before(column: usize, a: (usize, &[f64]), b: (usize, &[f64])) -> f64 {
     let start = a.0.max(b.0);
     let [a, b] = [a, b].map(|(first, row)| &row[start - first..column - first]);
     dot(a, b)
 }
 
-/// In four sums, which processors add at once.
+/// In four partial sums, which processors compute in parallel.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     for (a, b) in a.chunks_exact(4).zip(b.chunks_exact(4)) {
@@ -102,7 +102,7 @@ mod tests {
         let mut whole = DMatrix::zeros(n, n);
         for i in 0..n {
             for j in first[i]..=i {
-                // Strong on the diagonal, hence positive definite.
+                // Diagonally dominant, hence positive definite.
                 let value = draws.unit(&format!("{i},{j}")) + if i == j { n as f64 } else { 0.0 };
                 a.add(i, j, value);
                 (whole[(i, j)], whole[(j, i)]) = (value, value);

@@ -1,4 +1,4 @@
-//! Heaps to measure the stage on.
+//! Heaps for measuring the stage.
 
 use crate::error::Result;
 use crate::scene::{AssetVariant, Background, CameraSource, Range, Recipe, Scene};

@@ -1,8 +1,8 @@
-//! Rest without physics: cards that lie level.
+//! Rest without physics: level cards.
 //!
-//! A card that falls alone onto the bare surface ends level where it began, turned as it was; that
-//! needs no simulation. The same closed form, each card on top of the highest one it meets, is the
-//! `flat` mode.
+//! A card that falls alone onto the bare surface comes to rest level below its start, with its
+//! rotation about the vertical; that needs no simulation. The same closed form, with each card on
+//! top of the highest one below it, is the `flat` mode.
 
 use super::bodies::{current_pose, is_dropped, rectangle, solids};
 use super::overlap::{Solid, falling_from_lowest, overlap_depth, past_walls};
@@ -11,8 +11,8 @@ use crate::error::Result;
 use crate::geom::{Pose, UnitQuaternion};
 use crate::scene::{Object, Scene, SettleOptions, level};
 
-/// Where a card comes to rest that falls alone onto the bare surface, clear of the walls and of all
-/// that already lies there; none if it may touch anything.
+/// Where a card comes to rest if it falls alone onto the bare surface, clear of the walls and of
+/// all objects at rest; none if it may touch anything.
 pub(super) fn rest_alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Pose> {
     let bodies = leveled_solids(scene, options);
     let falls_straight = options.gravity[..2] == [0.0; 2];
@@ -22,7 +22,7 @@ pub(super) fn rest_alone(scene: &Scene, options: &SettleOptions, i: usize) -> Op
     alone.then(|| rest_on(&bodies[i], 0.0))
 }
 
-/// Whether a body can touch one that does not fall.
+/// Whether a body can touch a stationary one.
 fn meets_standing(bodies: &[Solid], i: usize) -> bool {
     let mut standing = bodies.iter().filter(|other| stands(other));
     standing.any(|other| can_touch(&bodies[i], other))
@@ -32,8 +32,8 @@ fn is_past_walls(solid: &Solid, surface: [f64; 2]) -> bool {
     past_walls(solid, surface).iter().any(|&past| past > 0.0)
 }
 
-/// The falling objects, in groups that stand in columns of their own: however they turn in place,
-/// no card can touch one of another group.
+/// The falling objects, in groups of separate columns: however they rotate in place, no card can
+/// touch one of another group.
 pub(super) fn columns(scene: &Scene, options: &SettleOptions) -> Vec<Vec<usize>> {
     let bodies = leveled_solids(scene, options);
     let mut columns: Vec<Vec<usize>> = Vec::new();
@@ -44,7 +44,7 @@ pub(super) fn columns(scene: &Scene, options: &SettleOptions) -> Vec<Vec<usize>>
     columns
 }
 
-/// The columns with one more member, those that it meets joined into one.
+/// The columns with one more member; those that it can touch are joined into one.
 fn with_member(
     columns: Vec<Vec<usize>>,
     i: usize,
@@ -59,17 +59,17 @@ fn with_member(
     apart
 }
 
-/// Whether two bodies can touch, as seen from above, however they turn in place.
+/// Whether two bodies can touch, seen from above, however they rotate in place.
 fn can_touch(a: &Solid, b: &Solid) -> bool {
     (a.center() - b.center()).xy().norm() < a.half.norm() + b.half.norm()
 }
 
-/// Everything level on the surface, in the order of the heights it starts from, each on top of the
-/// highest it meets.
+/// Lays all falling objects level on the surface, in the order of their starting heights, each on
+/// top of the highest one below it.
 ///
-/// Cards that already are at rest are treated as the upright boxes around them. A card that reaches
-/// through a wall is moved in. The result is the poses of the objects that fall, in their order.
-/// Work is each object and each that it is laid on or beside.
+/// Cards that are already at rest count as the upright boxes around them. A card that reaches
+/// through a wall is moved inside. Returns the poses of the objects that fall, in their order. The
+/// work is one for each object plus one for each object that is already there.
 ///
 /// # Errors
 /// [`Allowance::take`].
@@ -90,7 +90,7 @@ pub(super) fn flat(
     Ok(fallen.map(|solid| solid.world_from_body).collect())
 }
 
-/// The upright boxes around what is at rest.
+/// The upright boxes around the objects at rest.
 fn boxes_at_rest(bodies: &[Solid]) -> Vec<Solid> {
     let at_rest = bodies.iter().filter(|solid| stands(solid));
     at_rest.map(upright_box).collect()
@@ -100,7 +100,7 @@ fn stands(solid: &Solid) -> bool {
     !solid.falls && !solid.is_gone
 }
 
-/// Height of the highest body that lies under one; 0 is the surface.
+/// Top of the highest body below one; 0 is the surface.
 fn top_below(solid: &Solid, lying: &[Solid]) -> f64 {
     let below = lying.iter().filter(|other| footprints_meet(solid, other));
     below
@@ -108,7 +108,7 @@ fn top_below(solid: &Solid, lying: &[Solid]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The bodies, those that fall turned level where they start.
+/// The bodies; falling ones are level where they start.
 fn leveled_solids(scene: &Scene, options: &SettleOptions) -> Vec<Solid> {
     let poses: Vec<Option<Pose>> = scene.objects.iter().map(leveled_pose).collect();
     solids(scene, options, &poses)
@@ -122,7 +122,7 @@ fn leveled_pose(object: &Object) -> Option<Pose> {
     Some(pose)
 }
 
-/// The pose with its underside at this height; that of a card at rest is unchanged.
+/// The pose with its underside at this height; for a card at rest, its own pose.
 fn rest_on(solid: &Solid, bottom: f64) -> Pose {
     let mut pose = solid.world_from_body;
     if solid.falls {
@@ -153,7 +153,7 @@ fn footprints_meet(a: &Solid, b: &Solid) -> bool {
     overlap_depth(&grounded(a), &grounded(b)) > 0.0
 }
 
-/// A body brought to the height of the surface.
+/// A body moved to the height of the surface.
 fn grounded(solid: &Solid) -> Solid {
     let mut down = solid.clone();
     down.world_from_body.translation.z = 0.0;

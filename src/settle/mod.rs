@@ -1,17 +1,17 @@
 //! Settle: dropped objects come to rest on the surface and on each other.
 //!
 //! [`settle`] turns every [`Placement::Drop`] into a [`Placement::At`] and leaves the rest of the
-//! scene alone; a scene in which nothing falls comes back unchanged and no physics world is built.
-//! Objects fall as thin boxes ([`SettleOptions::half_body`]) or as convex prisms
-//! ([`Object::outline`](crate::scene::Object::outline)), between smooth walls that stand on the
-//! edges of the surface and have no top, or between those that the surface has. A card
-//! lies in the *middle* plane of its body. Objects that are at rest already are obstacles that do
-//! not move; a card that can touch nothing needs no physics.
+//! scene unchanged; without falling objects it returns the scene as it is and builds no physics
+//! world. Objects fall as thin boxes ([`SettleOptions::half_body`]) or as convex prisms
+//! ([`Object::outline`](crate::scene::Object::outline)), between the surface's walls or, if it has
+//! none, between frictionless walls of infinite height on its edges. A card lies in the *middle*
+//! plane of its body. Objects already at rest are stationary obstacles; a card that cannot touch
+//! anything needs no physics.
 //!
-//! The result is judged by tests that share nothing with the physics engine: for overlap, for what
+//! The result is judged by tests that are independent of the physics engine: for overlap, for what
 //! supports each body, and by its energy. A failed attempt is repeated from other heights, with
-//! shorter steps where bodies sank into each other. Same scene, same bits: on every machine, at any
-//! thread count. Work is counted and bounded ([`Allowance`]).
+//! shorter steps if bodies sank into each other. Same scene, same bits: on every machine, with any
+//! number of threads. Work is counted and bounded ([`Allowance`]).
 //!
 //! # Examples
 //! A card dropped alone comes to rest flat on the surface, at half its thickness:
@@ -71,39 +71,39 @@ use room::bodies_in_room;
 /// The result of dropping a scene's objects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settled {
-    /// The scene at rest; as it was given unless the verdict is [`SettleVerdict::Rested`].
+    /// The scene at rest; the original scene unless the verdict is [`SettleVerdict::Rested`].
     pub scene: Scene,
     /// How the last attempt ended.
     pub verdict: SettleVerdict,
     /// How the attempts before the last one ended; none of them is [`SettleVerdict::Rested`].
     pub rejected: Vec<SettleVerdict>,
-    /// Length of the last fall, seconds.
+    /// Duration of the last fall, seconds.
     pub seconds: f64,
     /// Deepest overlap of a dropped body with another body, the floor or a wall at the end,
     /// metres.
     pub overlap: f64,
-    /// Largest energy gain between two steps of the last fall, as a share of the energy that the
-    /// drop released; a drop by less than a quarter of a card is treated as one by that much.
+    /// Largest energy gain between two steps of the last fall, as a share of the energy released by
+    /// the drop; a drop by less than a quarter of a card counts as one by that much.
     pub energy_rise: f64,
 }
 
 /// How a fall ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SettleVerdict {
-    /// Everything lies still, inside the walls, with no more than the accepted overlap.
+    /// Everything is at rest, inside the walls, with no more than the accepted overlap.
     Rested,
-    /// Something still moved at the time limit ([`SettleOptions::time_limit`]).
+    /// Something was still moving at the time limit ([`SettleOptions::time_limit`]).
     TimedOut,
     /// The centres of these objects (their ids: index + 1) left the walls or the floor other than
     /// over the rim, or are not finite.
     Escaped(Vec<usize>),
     /// Bodies overlap by this depth, metres.
     Penetrating(f64),
-    /// The energy rose between two steps by this share of what the drop released: the steps were
-    /// too long for the result to be trusted.
+    /// The energy rose between two steps by this share of the energy released by the drop: the
+    /// steps were too long for the result to be reliable.
     Exploded(f64),
-    /// These objects (their ids) are unsupported: no forces at their contacts, with smooth walls,
-    /// hold them in place.
+    /// These objects (their ids) are unsupported: no forces at their contacts hold them in place.
+    /// Walls count as frictionless.
     Hanging(Vec<usize>),
 }
 
@@ -111,7 +111,7 @@ impl Settled {
     /// The scene at rest.
     ///
     /// # Errors
-    /// [`Error::Unsettled`] for every other verdict.
+    /// [`Error::Unsettled`] for any other verdict.
     pub fn into_scene(self) -> Result<Scene> {
         let attempts = self.rejected.len() + 1;
         match self.verdict {
@@ -125,7 +125,7 @@ impl Settled {
         }
     }
 
-    /// The result of the last attempt at a scene, and the motion of that.
+    /// The result of the last attempt at a scene, and its motion.
     fn from_attempts(
         scene: Scene,
         last: Attempt,
@@ -142,7 +142,7 @@ impl Settled {
         (settled, last.fall.samples)
     }
 
-    /// A scene in which nothing falls.
+    /// The result for a scene in which nothing falls.
     fn unchanged(scene: Scene) -> Self {
         Self {
             scene,
@@ -156,7 +156,7 @@ impl Settled {
 }
 
 impl SettleVerdict {
-    /// What happened in a fall of this length, in words.
+    /// The cause of a failed fall of this duration, in words.
     fn reason(&self, seconds: f64) -> String {
         match self {
             Self::Rested => "everything is at rest".into(),
@@ -182,15 +182,15 @@ impl SettleVerdict {
 /// A failed fall is part of the result, not an error; [`Settled::into_scene`] makes it one.
 ///
 /// # Errors
-/// An impossible scene ([`Scene::check`]) or option; an object that starts outside the walls; more
+/// An invalid scene ([`Scene::check`]) or option; an object that starts outside the walls; more
 /// work than [`SettleOptions::most_work`].
 pub fn settle(scene: Scene, options: &SettleOptions) -> Result<Settled> {
     Ok(settle_traced(scene, options, 0)?.0)
 }
 
 /// Lets the dropped objects of a scene come to rest, and records the last fall: a sample of every
-/// object in each `every` steps, ordered by time, then by id; none for `every` 0 and for what needs
-/// no simulation.
+/// object every `every` steps, ordered by time, then by id; none for `every` 0 and for falls
+/// without simulation.
 ///
 /// # Errors
 /// As [`settle`].
@@ -203,10 +203,10 @@ pub fn settle_traced(
     settle_within(scene, options, every, &Allowance::new(options.most_work))
 }
 
-/// As [`settle_traced`], within an allowance that may be shared with other scenes and stopped.
+/// As [`settle_traced`], within an allowance that can be shared with other scenes and interrupted.
 ///
 /// # Errors
-/// As [`settle`]; [`Error::Interrupted`] when it is stopped.
+/// As [`settle`]; [`Error::Interrupted`] if it is interrupted.
 #[doc(hidden)]
 pub fn settle_within(
     scene: Scene,
@@ -231,13 +231,13 @@ pub fn settle_within(
 }
 
 /// Ids (index + 1) of objects that are unsupported at the end of a fall: no forces at their
-/// contacts hold them where they are, walls being smooth.
+/// contacts hold them in place. Walls count as frictionless.
 ///
-/// Objects that fall in `before` fell; the others stand where their author put them and support
-/// what lies on them. None where they were laid without physics ([`SettleMode::Flat`]).
+/// Objects that fall in `before` are the dropped ones; the others stay where their author put them
+/// and support what lies on them. None if objects were laid without physics ([`SettleMode::Flat`]).
 ///
 /// # Errors
-/// An impossible scene or option; scenes with different numbers of objects.
+/// An invalid scene or option; scenes with different numbers of objects.
 #[doc(hidden)]
 pub fn hanging(before: &Scene, after: &Scene, options: &SettleOptions) -> Result<Vec<usize>> {
     before.check()?;
@@ -339,7 +339,7 @@ mod tests {
         assert_eq!(after, before);
     }
 
-    /// The closed form leaves out the slip of the first touch: some millimetres.
+    /// The closed form neglects the slip at first contact: some millimetres.
     #[test]
     fn a_card_that_falls_alone_ends_where_physics_says() {
         let (scene, options) = (falling(&[([0.05, -0.02], 0.1)]), SettleOptions::default());
@@ -376,7 +376,7 @@ mod tests {
         }
         let settled = settled(scene);
         for i in 0..4 {
-            // Contacts push 0.2 mm before they touch, on either side.
+            // Contacts push from 0.2 mm before bodies touch, on either side.
             let (z, plates) = (pose(&settled, i).translation.z, i as f64 + 0.5);
             assert!(
                 (z - 0.005 * plates).abs() < 0.0004 * (plates + 0.5),
@@ -467,7 +467,7 @@ mod tests {
         assert!(rest.rejected.is_empty());
     }
 
-    /// Closed form: on a slope of a a plate stays if tan a < mu, and else slides.
+    /// Closed form: on a slope of angle a, a plate stays if tan a < mu, and slides otherwise.
     #[test]
     fn a_plate_on_a_slope_slides_if_it_is_steeper_than_friction_holds() {
         let slid = |friction: f64| {
@@ -503,8 +503,7 @@ mod tests {
         );
     }
 
-    /// What holds for the dimensions holds for the bits, where the factor on time is a power of
-    /// two.
+    /// What holds dimensionally holds for the bits, if the factor on time is a power of two.
     #[test]
     fn the_strength_of_gravity_sets_the_time_and_nothing_else() {
         let with = |factor: f64| {
@@ -591,7 +590,7 @@ mod tests {
         );
     }
 
-    /// The longest that is within bounds.
+    /// The longest within bounds.
     #[cfg(feature = "counters")]
     fn endless() -> SettleOptions {
         let slow = SettleOptions {
@@ -607,7 +606,7 @@ mod tests {
         }
     }
 
-    /// Counted as if all of it lay where it lands.
+    /// Counted as if everything came to rest where it lands.
     #[cfg(feature = "counters")]
     #[test]
     fn settings_without_an_end_are_refused_before_a_step_is_made() {
@@ -647,7 +646,7 @@ mod tests {
 
     #[test]
     fn work_is_shared_by_all_tries() {
-        // Never at rest: each try takes all of its time.
+        // Never at rest: each attempt takes all of its time.
         let options = SettleOptions {
             time_limit: 0.2,
             attempts: 100,
@@ -667,7 +666,7 @@ mod tests {
     #[test]
     fn what_sinks_in_is_tried_again_with_shorter_steps() {
         let heap = || dropped(2, 60);
-        // Three times as long as they should be for so many.
+        // Three times as long as they should be for this many objects.
         let options = SettleOptions {
             step: 1.0 / 240.0,
             iterations: 1,

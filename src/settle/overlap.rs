@@ -1,25 +1,25 @@
-//! Do bodies overlap, and how deep? In `f64`, independent of the physics engine, to judge its
-//! result.
+//! Overlap of bodies and its depth, in `f64` and independent of the physics engine, to judge the
+//! engine's result.
 
 use crate::geom::{Pose, Vector3};
 use crate::scene::half_extent;
 
-/// Sine of the angle up to which edges are treated as parallel: their normal would be noise, and
-/// other directions decide.
+/// Sine of the angle up to which edges count as parallel: their normal would be noise, and other
+/// directions decide.
 const PARALLEL_SINE: f64 = 1e-6;
 
-/// A body in the world: a convex prism, whose height is along its own `z`.
+/// A body in the world: a convex prism along its own `z`.
 #[derive(Clone, Debug)]
 pub(super) struct Solid {
     /// Its pose; the box around its card is centred in its own frame.
     pub(super) world_from_body: Pose,
     /// Half lengths of that box, metres.
     pub(super) half: Vector3<f64>,
-    /// Corners of its base, counter-clockwise; those of the box for a box.
+    /// Corners of its base, counter-clockwise; for a box, those of the box.
     pub(super) outline: Vec<[f64; 2]>,
-    /// Whether it was dropped; the others stand where their author put them.
+    /// Whether it was dropped; other bodies are stationary.
     pub(super) falls: bool,
-    /// Whether it went over the rim: it is nowhere and touches nothing.
+    /// Whether it went over the rim: it is in no place and touches nothing.
     pub(super) is_gone: bool,
 }
 
@@ -42,7 +42,7 @@ impl Solid {
         })
     }
 
-    /// Half lengths of the upright box around the box of its card.
+    /// Half lengths of the axis-aligned box around the box of its card.
     pub(super) fn extent(&self) -> Vector3<f64> {
         half_extent(&self.world_from_body.rotation, &self.half)
     }
@@ -52,7 +52,7 @@ impl Solid {
         self.center().z + self.extent().z
     }
 
-    /// Its projection onto a direction: from where to where.
+    /// Its projection onto a direction, as an interval.
     fn projection(&self, axes: &[Vector3<f64>; 3], direction: &Vector3<f64>) -> [f64; 2] {
         let [x, y, z] = axes.map(|axis| axis.dot(direction));
         let at = self.center().dot(direction);
@@ -70,8 +70,7 @@ impl Solid {
         })
     }
 
-    /// Unit directions of the edges of its base, each once for opposite sides that are parallel; in
-    /// the world.
+    /// Unit directions of the edges of its base in the world; parallel opposite sides count once.
     fn base_edges(&self, axes: &[Vector3<f64>; 3]) -> Vec<Vector3<f64>> {
         let mut edges: Vec<Vector3<f64>> = Vec::with_capacity(self.outline.len() + 1);
         for side in self.base_sides(axes) {
@@ -102,7 +101,7 @@ pub(super) fn from_lowest(solids: &[Solid]) -> Vec<usize> {
     ascending_by(solids.len(), |i| solids[i].center().z)
 }
 
-/// The numbers up to `count`, by what `key` says of them; equal ones stay in order.
+/// The indices up to `count` in ascending order of `key`; equal ones stay in order.
 pub(super) fn ascending_by(count: usize, key: impl Fn(usize) -> f64) -> Vec<usize> {
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|&a, &b| key(a).total_cmp(&key(b)));
@@ -128,18 +127,18 @@ fn is_inside(center: &Vector3<f64>, limits: [f64; 2]) -> bool {
     center.x.abs() <= limits[0] && center.y.abs() <= limits[1] && center.z >= 0.0
 }
 
-/// Two bodies that are near to each other, one of which was dropped.
+/// Two bodies that are close to each other, at least one of which was dropped.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Touch {
     /// Their indices, the higher one first.
     pub(super) pair: [usize; 2],
-    /// How far they are apart, metres; negative where they overlap.
+    /// Gap between them, metres; negative if they overlap.
     pub(super) gap: f64,
-    /// Unit vector from the first to the second that the gap is measured along.
+    /// Unit vector from the first to the second along which the gap is measured.
     pub(super) towards: Vector3<f64>,
 }
 
-/// All pairs of bodies that are apart by less than `reach`, metres.
+/// All pairs of bodies with a gap below `reach`, metres.
 pub(super) fn touching_pairs(solids: &[Solid], reach: f64) -> Vec<Touch> {
     let pairs = (1..solids.len()).flat_map(|i| (0..i).map(move |j| [i, j]));
     pairs
@@ -153,7 +152,7 @@ fn can_touch(a: &Solid, b: &Solid) -> bool {
 }
 
 impl Touch {
-    /// That of two bodies, if they are apart by less than `reach`.
+    /// The touch of two bodies, if their gap is below `reach`.
     fn between(solids: &[Solid], pair: [usize; 2], reach: f64) -> Option<Self> {
         let [a, b] = pair.map(|i| &solids[i]);
         let (gap, towards) = separation(a, b, reach)?;
@@ -161,8 +160,8 @@ impl Touch {
     }
 }
 
-/// Deepest overlap of a dropped body with any other, and with the floor `z = 0` and the walls over
-/// the edges of a surface where those are `invisible`, metres; 0 when nothing overlaps.
+/// Deepest overlap of a dropped body with any other, and with the floor `z = 0` and, if they are
+/// `invisible`, the walls over the edges of a surface, metres; 0 if nothing overlaps.
 pub(super) fn deepest(solids: &[Solid], touching: &[Touch], invisible: Option<[f64; 2]>) -> f64 {
     let in_room = invisible.map_or(0.0, |surface| deepest_in_room(solids, surface));
     touching
@@ -178,7 +177,7 @@ fn deepest_in_room(solids: &[Solid], surface: [f64; 2]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// How far a body reaches through the floor or a wall, whichever is most; 0 inside.
+/// How far a body reaches through the floor or a wall, whichever is more; 0 inside.
 fn depth_in_room(solid: &Solid, surface: [f64; 2]) -> f64 {
     let axes = solid.axes();
     let [bottom, _] = solid.projection(&axes, &Vector3::z());
@@ -190,7 +189,7 @@ fn depth_in_room(solid: &Solid, surface: [f64; 2]) -> f64 {
         .max(past_wall(along_y, surface[1]))
 }
 
-/// How far a body reaches beyond the walls at both ends of this length; negative inside.
+/// How far an interval reaches beyond walls this far apart; negative inside.
 fn past_wall([low, high]: [f64; 2], length: f64) -> f64 {
     high.max(-low) - length / 2.0
 }
@@ -201,20 +200,19 @@ pub(super) fn past_walls(solid: &Solid, surface: [f64; 2]) -> [f64; 2] {
     [0, 1].map(|axis| center[axis].abs() + extent[axis] - surface[axis] / 2.0)
 }
 
-/// Shortest way to move one body out of another, metres; 0 when they are apart.
+/// Shortest distance by which one body must move to leave another, metres; 0 if they are apart.
 pub(super) fn overlap_depth(a: &Solid, b: &Solid) -> f64 {
     separation(a, b, 0.0).map_or(0.0, |(gap, _)| -gap)
 }
 
-/// How far two bodies are apart, metres, negative where they overlap, and the unit direction from
-/// the first to the second that this is measured along; none where they are apart by `reach` or
-/// more.
+/// Gap between two bodies, metres, negative if they overlap, and the unit direction from the first
+/// to the second along which it is measured; none if the gap is `reach` or more.
 ///
 /// # Method
-/// Separating axes: two convex bodies are apart if and only if their projections are, on one of
+/// Separating axes: two convex bodies are apart if and only if their projections are, along one of
 /// these directions: the faces' normals and the cross products of their edges ([Gottschalk, Lin and
-/// Manocha 1996]; 15 for two boxes). The greatest gap between projections is that of the bodies:
-/// the depth of an overlap, and a lower bound of a distance.
+/// Manocha 1996]; 15 for two boxes). The greatest gap between projections is used as that of the
+/// bodies: it is the depth of an overlap, and a lower bound of a distance.
 ///
 /// [Gottschalk, Lin and Manocha 1996]: https://doi.org/10.1145/237170.237244
 fn separation(a: &Solid, b: &Solid, reach: f64) -> Option<(f64, Vector3<f64>)> {
@@ -232,7 +230,7 @@ fn separation(a: &Solid, b: &Solid, reach: f64) -> Option<(f64, Vector3<f64>)> {
     Some(widest)
 }
 
-/// Whether the spheres around the boxes of two cards are apart by `reach` or more.
+/// Whether the bounding spheres of two cards' boxes are apart by `reach` or more.
 fn are_spheres_apart(a: &Solid, b: &Solid, reach: f64) -> bool {
     let apart = b.center() - a.center();
     apart.norm() >= a.half.norm() + b.half.norm() + reach
@@ -256,7 +254,7 @@ fn wider_gap(
     }
 }
 
-/// Directions of a prism in the world.
+/// Edge directions of a prism in the world.
 struct PrismDirections<'a> {
     solid: &'a Solid,
     axes: [Vector3<f64>; 3],
@@ -272,8 +270,7 @@ impl<'a> PrismDirections<'a> {
         Self { solid, axes, edges }
     }
 
-    /// How far another prism is ahead of this one in a direction, and how far behind it; negative
-    /// where they overlap.
+    /// Gaps to another prism ahead of and behind this one in a direction; negative if they overlap.
     #[inline]
     fn gaps_to(&self, other: &Self, direction: &Vector3<f64>) -> [f64; 2] {
         let [low, high] = self.solid.projection(&self.axes, direction);
@@ -290,7 +287,7 @@ impl<'a> PrismDirections<'a> {
         base.iter().map(|edge| edge.cross(&self.up()))
     }
 
-    /// The directions that two prisms can be apart along: normals of faces, then normals of pairs
+    /// The directions along which two prisms can be apart: normals of faces, then normals of pairs
     /// of edges.
     fn separating(&self, other: &Self) -> impl Iterator<Item = Vector3<f64>> {
         let faces = [self.up(), other.up()]
@@ -300,7 +297,7 @@ impl<'a> PrismDirections<'a> {
         faces.chain(self.edge_normals(other))
     }
 
-    /// Normals of an edge of each of two prisms, where they are not parallel.
+    /// Normals of an edge of each of two prisms, for pairs that are not parallel.
     fn edge_normals(&self, other: &Self) -> impl Iterator<Item = Vector3<f64>> {
         let edges = self.edges.iter();
         let crossed = edges.flat_map(|a| other.edges.iter().map(move |b| a.cross(b)));
@@ -424,7 +421,7 @@ mod tests {
         );
     }
 
-    /// The closed form: how far a corner of a triangle reaches into a box depends on its slope.
+    /// Closed form: how far a corner of a triangle reaches into a box depends on its slope.
     #[test]
     fn a_prism_is_as_wide_as_its_outline_and_not_as_its_card() {
         let triangle = |x: f64| Solid {

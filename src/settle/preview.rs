@@ -1,5 +1,5 @@
-//! A picture of where everything lies, from above and from the side: no textures, to see a fall at
-//! a glance.
+//! A preview of a scene from above and from the side, without textures, to judge a fall at a
+//! glance.
 
 use super::bodies::solids_at_rest;
 use super::overlap::{Solid, from_lowest};
@@ -11,16 +11,16 @@ use crate::scene::{Scene, SettleOptions, Surface, Wall};
 
 /// Width of the picture, pixels.
 const WIDTH_PX: usize = 640;
-/// Space around each view, pixels.
+/// Margin around each view, pixels.
 const MARGIN_PX: f64 = 24.0;
-/// The surface's width over the least height of the front view.
+/// Maximum ratio of the surface's width to the height of the front view.
 const MAX_ASPECT_RATIO: f64 = 20.0;
 const PAPER_COLOR: Srgb8 = rgb(0xff, 0xff, 0xff);
 const WALL_COLOR: Srgb8 = rgb(0x60, 0x60, 0x60);
 
-/// The bodies of a scene as lines, display-encoded, 640 pixels wide: at the top, seen from above
-/// (`+y` up); below, seen from the front (`+z` up), to the same scale. What still falls is shown
-/// where it starts. Numbers are ids.
+/// Draws the bodies of a scene as lines, display-encoded, 640 pixels wide: at the top, seen from
+/// above (`+y` up); below, seen from the front (`+z` up), at the same scale. Falling objects are
+/// shown where they start. Numbers are ids.
 pub fn preview(scene: &Scene, options: &SettleOptions) -> Image<Srgb8> {
     let bodies = solids_at_rest(scene, scene, options);
     let views = Views::new(&scene.surface, &bodies);
@@ -37,13 +37,13 @@ pub fn preview(scene: &Scene, options: &SettleOptions) -> Image<Srgb8> {
 
 /// The view from above, and below it the view from the front.
 struct Views {
-    /// Of the surface, metres.
+    /// Size of the surface, metres.
     size: [f64; 2],
     /// Its walls.
     wall: Option<Wall>,
     /// Height of the highest point in the front view, metres.
     top: f64,
-    /// Pixels in a metre.
+    /// Pixels per metre.
     scale: f64,
     /// Height of the view from above, pixels.
     above_height: f64,

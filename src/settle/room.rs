@@ -1,9 +1,9 @@
-//! What objects fall into: the floor and its walls.
+//! The room that objects fall into: the floor and its walls.
 //!
-//! Walls that a scene names ([`Wall`](crate::scene::Wall)) are built: sheets of the friction of the
-//! surface that lean outwards, over whose rim things hang and fall. Beyond them there is nothing,
-//! neither floor nor table: what goes over the rim is gone. The walls of a scene that names none
-//! are planes without a top that everything slides along.
+//! Walls that a scene has ([`Wall`](crate::scene::Wall)) are built as sheets with the surface's
+//! friction that lean outwards; objects hang over their rim and fall off. Beyond them there is
+//! nothing, neither floor nor table: objects that go over the rim are gone. For a scene without
+//! walls, they are frictionless planes of infinite height.
 
 use super::bodies::{rectangle, solids_at_rest, typical_length};
 use super::overlap::Solid;
@@ -13,26 +13,26 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Thickness of walls, as a share of the typical card's longer side: 10 mm for 200 mm.
 const SHEET_RATIO: f64 = 0.05;
-/// Half the thickness of the floor, in the same: nothing passes through that in one step.
+/// Half the thickness of the floor, in the same unit: nothing passes through it in one step.
 const FLOOR_HALF_RATIO: f64 = 2.5;
 
 /// Floor and walls of a scene.
 pub(super) struct Room {
-    /// The surface over whose edges invisible walls stand; none where walls are built.
+    /// The surface with invisible walls over its edges; none if walls are built.
     pub(super) invisible: Option<[f64; 2]>,
     /// Half the sides of the surface.
     edges: [f64; 2],
-    /// Within what distance from the middle centres of objects are in the room, along x and y.
+    /// Distance from the middle within which centres of objects are in the room, along x and y.
     pub(super) limits: [f64; 2],
-    /// The floor, then the walls, where they are built; they do not move.
+    /// The floor, then the walls, if they are built; they do not move.
     pub(super) parts: Vec<Solid>,
 }
 
 impl Room {
-    /// That of a scene.
+    /// The room of a scene.
     ///
     /// # Panics
-    /// When walls are built and nothing falls.
+    /// If walls are built and nothing falls.
     pub(super) fn new(scene: &Scene) -> Self {
         let size = scene.surface.size;
         let half = size.map(|side| side / 2.0);
@@ -57,7 +57,7 @@ impl Room {
         }
     }
 
-    /// Whether a body with its centre here has gone over the rim, to where nothing is.
+    /// Whether a body with its centre here has gone over the rim.
     pub(super) fn is_gone(&self, center: &Vector3<f64>) -> bool {
         let [x, y] = self.edges;
         let is_beside = center.x.abs() > x || center.y.abs() > y;
@@ -65,15 +65,15 @@ impl Room {
     }
 }
 
-/// The bodies at the end of a fall, and behind them the floor and the walls that are built; those
-/// fell that fall at its start.
+/// The bodies at the end of a fall, followed by the floor and the walls that are built; those that
+/// fall in `start` count as dropped.
 pub(super) fn bodies_in_room(start: &Scene, end: &Scene, options: &SettleOptions) -> Vec<Solid> {
     let mut bodies = solids_at_rest(start, end, options);
     bodies.extend(Room::new(start).parts);
     bodies
 }
 
-/// One of four walls, as it stands on the edge at `+x`.
+/// One of four walls, placed on the edge at `+x`.
 struct Sheet {
     thickness: f64,
     /// Along the slope, from the edge to the rim.
@@ -97,7 +97,7 @@ impl Sheet {
     }
 
     /// The wall at this distance from the middle, in one of four directions. It begins below the
-    /// floor, so that no gap is left there.
+    /// floor, so that there is no gap.
     fn solid(&self, quarter: u32, distance: f64, half_width: f64) -> Solid {
         let turn = turned(&Vector3::z(), f64::from(quarter) * FRAC_PI_2);
         let rotation = turn * turned(&Vector3::y(), FRAC_PI_2 + self.slope);
@@ -113,7 +113,7 @@ impl Sheet {
     }
 }
 
-/// The floor, then the walls where they have any height.
+/// The floor, then the walls if they have any height.
 fn built_parts([x, y]: [f64; 2], sheet: &Sheet, floor_half: f64) -> Vec<Solid> {
     let floor = standing(
         Vector3::new(x, y, floor_half),
@@ -195,7 +195,7 @@ mod tests {
         rest.scene
     }
 
-    /// Cosine of the angle between a card and the floor, at rest; it started beside the wall at
+    /// Cosine of the angle between a card and the floor at rest; it starts next to the wall at
     /// `+x`, against which its upper edge falls.
     fn leaning_cosine(friction: f64, degrees: f64) -> f64 {
         let mut scene = walled(0.3, &[([0.0, 0.0], 0.1)]);
@@ -232,7 +232,7 @@ mod tests {
         }
     }
 
-    /// A card on a slope that friction does not hold.
+    /// A card on a slope too steep for friction to hold it.
     fn sliding(height: f64) -> Placement {
         let mut scene = walled(height, &[([0.1, 0.0], 0.006)]);
         scene.surface.friction = 0.1;

@@ -1,16 +1,16 @@
-//! Does everything lie on something, down to the floor?
+//! Whether everything is supported, down to the floor.
 //!
-//! At rest is what forces can hold: pushes at the contacts, with friction, that balance the weight
-//! of every body and its moments. Walls are smooth, so they may prop up a card whose lower edge
-//! stands on something, and carry none in the air: nothing but a chain of contacts down to the
-//! floor bears a weight, and only where the centre of mass is over it.
+//! A body is at rest if forces can hold it: pushes at the contacts, with friction, that balance the
+//! weight and the moments of every body. Walls are frictionless, so they may prop up a card whose
+//! lower edge stands on something, but cannot hold a card in the air: only a chain of contacts down
+//! to the floor bears a weight, and only with the centre of mass above it.
 //!
 //! # Method
-//! Each contact becomes stiff springs that only push: along the edges of its cone of friction, a
-//! pyramid. Each body hangs on a spring of its own that is softer by [`CONTACT_STIFFNESS`]. What
-//! the contacts can hold hardly moves; what they cannot is left to the soft spring and moves by up
-//! to its weight over that spring: a share of it that is 1 for a body in free fall. The energy of
-//! such springs is convex and made of pieces of parabolas: Newton's method finds its minimum in a
+//! Each contact becomes stiff springs that only push: along the edges of its friction cone, a
+//! pyramid. Each body also hangs on a spring of its own that is softer by [`CONTACT_STIFFNESS`].
+//! Bodies that the contacts can hold hardly move; others are left to the soft spring and move by up
+//! to their weight over its stiffness, expressed as a share that is 1 for a body in free fall. The
+//! energy of such springs is convex and piecewise quadratic: Newton's method finds its minimum in a
 //! few steps.
 
 use super::bodies::{touch_distance, typical_length};
@@ -21,26 +21,26 @@ use super::room::Room;
 use crate::geom::Vector3;
 use crate::scene::{Scene, SettleOptions};
 
-/// Factor on friction: bodies that would fall are sought, not those that would creep.
+/// Factor on friction: the test is for bodies that would fall, not for those that would creep.
 const FRICTION_FACTOR: f64 = 2.0;
-/// Share of its weight above which a body that no contact supports counts as hanging. A card whose
-/// centre of mass is beyond what it lies on by a thirtieth of its length has as much; of 1,994
-/// heaps at rest one had more, 1,985 none to four digits.
+/// Share of its weight above which a body that no contact supports counts as hanging. A card
+/// reaches it with its centre of mass a thirtieth of its length beyond its support; of 1,994 heaps
+/// at rest one had more, 1,985 none to four digits.
 const UNSUPPORTED_SHARE: f64 = 0.1;
 /// Stiffness of a contact over that of a body's own spring.
 const CONTACT_STIFFNESS: f64 = 1e6;
-/// Most steps of Newton's method.
+/// Maximum number of steps of Newton's method.
 const MAX_NEWTON_STEPS: usize = 40;
-/// Most times that a step of Newton's method is halved.
+/// Maximum number of times that a step of Newton's method is halved.
 const MAX_HALVINGS: usize = 30;
-/// Share of the energy that one step must gain for another to follow.
+/// Share of the energy that a step must gain for another one to follow.
 const MIN_ENERGY_GAIN: f64 = 1e-6;
-/// Radius of gyration that rotations are measured by, as a share of the typical card's longer side:
-/// that of a rod.
+/// Radius of gyration that scales rotations, as a share of the typical card's longer side: that of
+/// a rod.
 const GYRATION_RATIO: f64 = 0.3;
 
-/// Ids (index + 1) of the bodies that fell and that nothing holds where they are; `touching` are
-/// the pairs of bodies nearer than [`touch_distance`].
+/// Ids (index + 1) of the dropped bodies that nothing holds in place; `touching` are the pairs of
+/// bodies nearer than [`touch_distance`].
 pub(super) fn unsupported(
     scene: &Scene,
     options: &SettleOptions,
@@ -61,22 +61,23 @@ const DOF_COUNT: usize = 6;
 /// A generalised force: along three axes and about them.
 type Wrench = [f64; DOF_COUNT];
 
-/// A push of one body on another, or on what does not move.
+/// A push of one body on another, or on something stationary.
 struct Spring {
     ends: [Option<SpringEnd>; 2],
 }
 
-/// Where a spring pushes.
+/// The end at which a spring pushes.
 struct SpringEnd {
-    /// Place of the body in the model's order.
+    /// Index of the body in the model's order.
     slot: usize,
     wrench: Wrench,
 }
 
-/// Bodies on springs; lengths are in typical cards, masses in the mean one, forces in its weight.
+/// Bodies on springs; lengths in units of the typical card, masses of the mean one, forces of its
+/// weight.
 struct SpringModel {
-    /// Index of each body that fell, from the lowest to the highest, which keeps what touches
-    /// together.
+    /// Index of each dropped body, from the lowest to the highest, so that touching bodies are
+    /// close together.
     order: Vec<usize>,
     masses: Vec<f64>,
     weights: Vec<f64>,
@@ -122,7 +123,7 @@ impl SpringModel {
         y
     }
 
-    /// Towards the minimum that the springs pressed at `y` would have; none where that gains
+    /// A step towards the minimum for the springs that are pressed at `y`; none if it gains
     /// nothing.
     fn newton_step(&self, y: &[f64], energy: f64) -> Option<(Vec<f64>, f64)> {
         let springs = self.springs.iter();
@@ -130,7 +131,7 @@ impl SpringModel {
         self.line_search(y, &self.quadratic_minimum(&pressed), energy)
     }
 
-    /// The minimum with all springs pressed, or no displacement where that has less energy.
+    /// The minimum with all springs pressed, or no displacement if that has less energy.
     fn start(&self) -> (Vec<f64>, f64) {
         let y = self.quadratic_minimum(&vec![true; self.springs.len()]);
         let energy = self.energy(&y);
@@ -141,7 +142,7 @@ impl SpringModel {
         }
     }
 
-    /// The minimum if just these springs pushed, and pulled.
+    /// The minimum if exactly these springs were active, both pushing and pulling.
     fn quadratic_minimum(&self, pressed: &[bool]) -> Vec<f64> {
         let mut matrix = self.own_stiffness();
         for (spring, pressed) in self.springs.iter().zip(pressed) {
@@ -152,9 +153,9 @@ impl SpringModel {
         matrix.solve(self.weights.clone())
     }
 
-    /// That of the bodies' own springs, with room for those of the contacts.
+    /// The stiffness of the bodies' own springs, with room for that of the contacts.
     fn own_stiffness(&self) -> EnvelopeMatrix {
-        // The row of a body begins with the lowest that it touches.
+        // The row of a body begins with the lowest one that it touches.
         let slots = self.lowest_coupled().into_iter();
         let first = slots.flat_map(|slot| [DOF_COUNT * slot; DOF_COUNT]);
         let mut matrix = EnvelopeMatrix::zeros(first.collect());
@@ -164,7 +165,7 @@ impl SpringModel {
         matrix
     }
 
-    /// For each body the slot of the lowest that it touches, or its own.
+    /// For each body the slot of the lowest one that it touches, or its own.
     fn lowest_coupled(&self) -> Vec<usize> {
         let mut lowest: Vec<usize> = (0..self.order.len()).collect();
         for [a, b] in self.springs.iter().filter_map(Spring::coupled_slots) {
@@ -183,13 +184,13 @@ impl SpringModel {
         0.5 * CONTACT_STIFFNESS * compressions.map(|c| c.powi(2)).sum::<f64>()
     }
 
-    /// Of the bodies' own springs, less what their weights release.
+    /// Energy of the bodies' own springs, less what their weights release.
     fn own_energy(&self, y: &[f64]) -> f64 {
         let loads = self.masses.iter().zip(&self.weights);
         loads.zip(y).map(|((m, w), y)| (0.5 * m * y - w) * y).sum()
     }
 
-    /// The first point of less energy on the way, halving it; none where there is none.
+    /// The first point with less energy along the way, halving the step; none if there is none.
     fn line_search(&self, from: &[f64], to: &[f64], energy: f64) -> Option<(Vec<f64>, f64)> {
         let shares = std::iter::successors(Some(1.0), |share| Some(share / 2.0));
         shares.take(MAX_HALVINGS).find_map(|share| {
@@ -215,7 +216,7 @@ fn relative_masses(scene: &Scene, order: &[usize]) -> Vec<f64> {
         .collect()
 }
 
-/// The pull of gravity in each degree of freedom.
+/// The weight in each degree of freedom.
 fn weights_along(gravity: [f64; 3], masses: &[f64]) -> Vec<f64> {
     let down = Vector3::from(gravity).normalize();
     masses
@@ -224,9 +225,9 @@ fn weights_along(gravity: [f64; 3], masses: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// What it takes to turn contacts into springs.
+/// What is needed to turn contacts into springs.
 struct SpringGeometry {
-    /// Place of each body in the model's order; none for those that stand.
+    /// Index of each body in the model's order; none for stationary ones.
     slots: Vec<Option<usize>>,
     centers_of_mass: Vec<Vector3<f64>>,
     /// Length that moments are divided by, metres.
@@ -292,7 +293,7 @@ impl Spring {
         self.stretch(y).min(0.0)
     }
 
-    /// The places of its two bodies, where both fell.
+    /// The slots of its two bodies, if both were dropped.
     fn coupled_slots(&self) -> Option<[usize; 2]> {
         let [a, b] = &self.ends;
         Some([a.as_ref()?.slot, b.as_ref()?.slot])
@@ -342,7 +343,7 @@ fn norm(y: &[f64]) -> f64 {
     y.iter().map(|y| y * y).sum::<f64>().sqrt()
 }
 
-/// Directions of the edges of a contact's cone of friction, the normal part of each 1.
+/// Directions of the edges of a contact's friction cone, with a normal component of 1 each.
 fn friction_pyramid(contact: &Contact, friction: f64) -> Vec<Vector3<f64>> {
     if !contact.rough || friction == 0.0 {
         return vec![contact.normal];
@@ -390,8 +391,8 @@ mod tests {
     use crate::settle::tests::{dropped, falling};
     use std::f64::consts::FRAC_PI_4;
 
-    /// Ids of what hangs among cards of 200 x 80 x 5 mm in a tray of 0.6 x 0.4 m, by their centres
-    /// and tilts about x.
+    /// Ids of hanging cards among cards of 200 x 80 x 5 mm in a tray of 0.6 x 0.4 m, given by their
+    /// centres and tilts about x.
     fn hang(cards: &[([f64; 3], f64)]) -> Vec<usize> {
         hang_in([0.6, 0.4], cards)
     }
@@ -407,7 +408,7 @@ mod tests {
         hanging(&before, &after, &SettleOptions::default()).unwrap()
     }
 
-    /// Height of the middle of a card that stands on the floor, 80 mm wide, tilted so.
+    /// Height of the middle of a card that stands on the floor, 80 mm wide, with this tilt.
     fn standing(tilt: f64) -> f64 {
         0.04 * libm::sin(tilt) + 0.0025 * libm::cos(tilt)
     }
@@ -421,10 +422,10 @@ mod tests {
         );
     }
 
-    /// The walls push as hard as one likes, and hold nothing.
+    /// The walls push with any force, and hold nothing.
     #[test]
     fn a_card_wedged_between_walls_hangs_and_so_does_what_lies_on_it() {
-        // As wide as it reaches from wall to wall at this tilt.
+        // As wide as the distance between the walls at this tilt.
         let tilt: f64 = 0.3;
         let room = 0.08 * libm::cos(tilt) + 0.005 * libm::sin(tilt);
         let upper = 0.4 + 0.0053 / libm::cos(tilt);
@@ -455,9 +456,9 @@ mod tests {
         let (base, over) = (([0.0, 0.0, 0.0027], 0.0), ([0.12, 0.0, 0.0081], 0.0));
         assert_eq!(hang(&[base, over]), [2]);
         assert!(hang(&[base, ([0.08, 0.0, 0.0081], 0.0)]).is_empty());
-        // The two cards over the base, taken together, have their middle at 0.08.
+        // The centre of mass of the two cards over the base is at 0.08.
         assert!(hang(&[base, over, ([0.04, 0.0, 0.0135], 0.0)]).is_empty());
-        // A counterweight whose own middle is not over what it lies on falls off.
+        // A counterweight whose own centre of mass is not over its support falls off.
         assert!(hang(&[base, over, ([0.0, 0.0, 0.0135], 0.0)]).contains(&3));
     }
 

@@ -5,11 +5,11 @@ use crate::geom::Pose;
 /// One object at one time of a fall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionSample {
-    /// Since the start, seconds.
+    /// Time since the start, seconds.
     pub seconds: f64,
     /// Id: index + 1.
     pub object: usize,
-    /// Where it is (`world_from_card`), metres.
+    /// Pose (`world_from_card`), metres.
     pub pose: Pose,
     /// Speed of its centre of mass, m/s.
     pub speed: f64,
@@ -17,7 +17,7 @@ pub struct MotionSample {
     pub spin: f64,
     /// Kinetic energy, joules.
     pub kinetic: f64,
-    /// Potential energy over the surface, joules.
+    /// Potential energy relative to the surface, joules.
     pub potential: f64,
 }
 

@@ -5,8 +5,8 @@ use crate::geom::Vector3;
 use crate::scene::{Object, doubled_area};
 use rapier3d::prelude::{ColliderBuilder, SharedShape};
 
-/// The collider of an object, `half` and `length` in the world's units: a prism where it has an
-/// outline, else a box; of this `mass`.
+/// The collider of an object with this `mass`, `half` and `length` in the world's units: a prism if
+/// it has an outline, else a box.
 pub(super) fn collider(
     object: &Object,
     half: &Vector3<f64>,
@@ -21,7 +21,7 @@ pub(super) fn collider(
         .mass(mass as f32)
 }
 
-/// None where the ring has no area or the engine finds the prism too thin a shape.
+/// None if the ring has no area or the engine considers the prism too thin.
 fn prism(ring: &[[f64; 2]], half_height: f64) -> Option<ColliderBuilder> {
     let has_area = ring.len() > 2 && doubled_area(ring) > 0.0;
     let prism = has_area.then(|| Prism::new(ring, half_height))??;

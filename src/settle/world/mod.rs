@@ -1,12 +1,12 @@
-//! The physics world. The only folder that knows rapier and glam.
+//! The physics world. The only folder that uses rapier and glam.
 //!
 //! # Method
-//! Rapier 0.36 with stiff, short contacts: its defaults are made for bodies of a metre and sink
-//! 200 mm cards into each other by more than their thickness. The numbers below were tried on 60
-//! boxes of 200 x 80 x 2-20 mm dropped from up to 8 m. The engine has absolute tolerances, so every
-//! scene is first brought to that scale ([`WorldUnits`]): lengths so that the typical card is 200
-//! mm long, masses so that the typical one is 30 g, and time so that gravity is 9.81 m/s^2. The
-//! result does not depend on the unit of length, of mass, or on the strength of gravity.
+//! Rapier 0.36 with stiff, short-range contacts: its defaults are made for bodies of a metre and
+//! let 200 mm cards sink into each other by more than their thickness. The numbers below were tuned
+//! on 60 boxes of 200 x 80 x 2-20 mm dropped from up to 8 m. The engine has absolute tolerances, so
+//! every scene is first scaled ([`WorldUnits`]): lengths so that the typical card is 200 mm long,
+//! masses so that the typical one is 30 g, and time so that gravity is 9.81 m/s^2. The result does
+//! not depend on the units of length and mass, or on the strength of gravity.
 
 mod collider;
 mod prism;
@@ -37,54 +37,55 @@ const LENGTH_UNIT_M: f64 = CARD_LENGTH_M / 4.0;
 const GRAVITY_M_PER_S2: f64 = 9.81;
 /// Mass of the typical card in the world, kilograms.
 const CARD_MASS_KG: f64 = 0.03;
-/// Lightest and heaviest body relative to the typical one. The solver holds heaps with a spread of
-/// 10 and sinks light bodies under ones 100 times heavier; a heap at rest looks the same.
+/// Maximum ratio of a body's mass to the typical one, and vice versa. The solver copes with heaps
+/// with a spread of 10 but lets light bodies sink under ones 100 times heavier; a heap at rest
+/// looks the same.
 const MASS_SPREAD: f64 = 3.2;
-/// Margin around every body in which contacts already push, metres in the world; bodies rest up to
-/// twice this apart.
+/// Margin around every body within which contacts already push, metres in the world; bodies come to
+/// rest up to twice this apart.
 const CONTACT_MARGIN_M: f32 = 0.0002;
-/// Nothing falls faster in the world, m/s.
+/// Maximum speed in the world, m/s.
 const MAX_SPEED_M_PER_S: f64 = 4.0;
-/// Longest that falls are waited for to land, seconds in the world: 1000 coins of 20 mm, stacked as
+/// Maximum time that a fall may take to land, seconds in the world: 1000 coins of 20 mm, stacked as
 /// recipes do, take less.
 const MAX_LANDING_S: f64 = 60.0;
-/// Share of its start's height that the highest object falls at least: what lies under it is no
-/// heap of that height.
+/// Minimum share of its starting height that the highest object falls: the heap below it is at most
+/// as high as the rest.
 const MIN_FALL_SHARE: f64 = 0.5;
-/// Objects that may lie on each other at the step of the options. What lies under many sinks in, by
-/// their weight over the square of the rate of steps and iterations: heaps of 100 do at 1/480 s and
-/// not at 1/960 s, heaps of 200 not at 1/1920 s.
+/// Number of objects that may lie on each other at the options' step. Those under many others sink
+/// in, by the weight above them over the square of the rate of steps and iterations: heaps of 100
+/// do at 1/480 s and not at 1/960 s, heaps of 200 not at 1/1920 s.
 const OBJECTS_PER_STEP_RATE: usize = 40;
-/// Parts that a step may be cut into where a body would fly through another.
+/// Parts that a step may be cut into for a body that would pass through another.
 const MAX_SUBSTEPS: u32 = 100;
 /// Iterations in a step that count as one of work.
 const ITERATIONS_PER_WORK: u32 = 4;
 /// Half the thickness of floor and walls, metres in the world.
 const WALL_HALF_M: f64 = 0.5;
-/// Damping of speed and of spin: without it one fall in 30 rocks forever. A card that falls flat at
-/// 2 m/s loses about as much to the air.
+/// Damping of linear and angular speed: without it one fall in 30 rocks forever. A card that falls
+/// flat at 2 m/s loses about as much to the air.
 const LINEAR_DAMPING: f32 = 0.5;
 const ANGULAR_DAMPING: f32 = 0.5;
-/// Speed below which bodies sleep, in units of length a second: 1 cm/s. At the default some bodies
-/// creep and never sleep.
+/// Speed below which bodies sleep, in units of length per second: 1 cm/s. At the default some
+/// bodies creep and never sleep.
 const SLEEP_SPEED: f32 = 0.2;
 /// Damping ratio of contacts.
 const CONTACT_DAMPING_RATIO: f32 = 2.0;
-/// Limits on what pushes bodies apart, which must not become speed. Of 150 heaps 19 gained more
-/// than 1 % of their energy in a step at 10 and one unbiased pass, and none at these; at 2 they
-/// overlap ten times as far, by 0.3 mm.
+/// Limits on the correction that pushes bodies apart, which must not become speed. Of 150 heaps 19
+/// gained more than 1 % of their energy in a step at 10 and one unbiased pass, and none at these;
+/// at 2 they overlap ten times as far, by 0.3 mm.
 const MAX_CORRECTIVE_SPEED: f32 = 4.0;
 const STABILIZATION_ITERATIONS: usize = 2;
 
-/// What falls together, and how it starts.
+/// Objects that fall together, and how they start.
 pub(super) struct Drop<'a> {
     pub(super) scene: &'a Scene,
     pub(super) options: &'a SettleOptions,
-    /// Height of each object's centre at the start, metres; where it falls.
+    /// Height of each object's centre at the start, metres; for those that fall.
     pub(super) heights: &'a [f64],
-    /// Steps between samples of the motion, at the step of the options; none where it is 0.
+    /// Steps (of the options) between samples of the motion; 0 for no samples.
     pub(super) sample_every: usize,
-    /// Times that the step is halved, beyond what the number of objects asks for.
+    /// Number of times that the step is halved, beyond what the number of objects requires.
     pub(super) halvings: u32,
     pub(super) allowance: &'a Allowance<'a>,
 }
@@ -92,14 +93,14 @@ pub(super) struct Drop<'a> {
 /// How a fall ended.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fall {
-    /// Pose of each of the objects that fell, in their order; metres of the scene.
-    /// None for what went over the rim.
+    /// Pose of each of the objects that fell, in their order; metres of the scene. None for those
+    /// that went over the rim.
     pub(super) poses: Vec<Option<Pose>>,
     /// Whether everything came to rest before the time limit.
     pub(super) rests: bool,
     /// Simulated time, seconds.
     pub(super) seconds: f64,
-    /// Largest energy gain between two steps, as a share of what the drop released.
+    /// Largest energy gain between two steps, as a share of the energy released by the drop.
     pub(super) energy_rise: f64,
     /// Least and greatest x and y of the swept space; metres of the scene.
     pub(super) swept: [[f64; 2]; 2],
@@ -107,7 +108,7 @@ pub(super) struct Fall {
     pub(super) samples: Vec<MotionSample>,
 }
 
-/// Times that the step must be halved for this number of objects.
+/// Number of times that the step must be halved for this number of objects.
 fn halvings_for(objects: usize) -> u32 {
     objects
         .div_ceil(OBJECTS_PER_STEP_RATE)
@@ -117,7 +118,7 @@ fn halvings_for(objects: usize) -> u32 {
 }
 
 impl Drop<'_> {
-    /// Lets some objects fall until they rest, among all that lies there already.
+    /// Lets some objects fall until they rest, among all that are already at rest.
     ///
     /// # Errors
     /// [`Allowance::take`].
@@ -144,7 +145,8 @@ impl Drop<'_> {
         }
     }
 
-    /// The room, all that stands in it, and what falls: the handles of that.
+    /// A world with the room, everything stationary, and the falling bodies; also returns the
+    /// handles of the latter.
     fn filled_world(
         &self,
         members: &[usize],
@@ -173,27 +175,28 @@ impl Drop<'_> {
         }
     }
 
-    /// Work of a step for each object and pair: iterations, as often as the options let a step be cut
-    /// at what is in the way.
+    /// Work of a step for each object and pair: iterations, times the number of parts that the
+    /// options let a step be cut into at obstacles.
     fn work_per_pair(&self) -> u64 {
         u64::from(self.options.iterations.div_ceil(ITERATIONS_PER_WORK))
             * u64::from(self.options.ccd.clamp(1, MAX_SUBSTEPS))
     }
 
-    /// Refuses at once what would take more work than is left even if it rested where it lands.
+    /// Rejects at once a fall that would take more work than is left even if it came to rest where
+    /// it lands.
     fn check_work(&self, members: &[usize], units: &WorldUnits, pace: &Pace) -> Result<()> {
         let steps = self.fewest_steps(members, units, pace);
         self.allowance
             .check(steps * members.len() as f64 * self.work_per_pair() as f64)
     }
 
-    /// Steps of a fall that ends where the highest of these objects lands.
+    /// Minimum number of steps of a fall: those until the highest of these objects lands.
     fn fewest_steps(&self, members: &[usize], units: &WorldUnits, pace: &Pace) -> f64 {
         let fall_time = self.landing_time(members, units).min(pace.time_limit);
         fall_time / pace.step * MIN_FALL_SHARE
     }
 
-    /// Seconds in the world before which the highest of these objects cannot have landed.
+    /// Time in the world before which the highest of these objects cannot have landed, seconds.
     fn landing_time(&self, members: &[usize], units: &WorldUnits) -> f64 {
         let highest = members.iter().map(|&i| self.heights[i]).fold(0.0, f64::max);
         highest * units.length / MAX_SPEED_M_PER_S
@@ -216,9 +219,10 @@ impl Drop<'_> {
         set_step(p, step, self.options.iterations);
     }
 
-    /// The engine stops bodies at what is fixed, which takes a quarter of a fall's time. Floor and
-    /// walls need no such search: of 600 falls into trays whose walls lean by 8 to 75 degrees 26
-    /// attempts were rejected with it, 29 without.
+    /// Substeps of continuous collision detection, by which the engine stops bodies at stationary
+    /// ones and which takes a quarter of a fall's time. Floor and walls do not need it: of 600
+    /// falls into trays whose walls lean by 8 to 75 degrees, 26 attempts were rejected with it, 29
+    /// without.
     fn ccd_substeps(&self) -> usize {
         let mut standing = self.standing();
         standing.next().map_or(0, |_| self.options.ccd as usize)
@@ -239,7 +243,7 @@ impl Drop<'_> {
         }
     }
 
-    /// Adds the floor or a wall that is built.
+    /// Adds the floor or a built wall.
     fn add_part(&self, world: &mut PhysicsWorld, part: &Solid, units: &WorldUnits) {
         let [hx, hy, hz] = (part.half * units.length)
             .map(|length| length as f32)
@@ -249,8 +253,8 @@ impl Drop<'_> {
         world.insert_collider(self.with_contacts(placed), None);
     }
 
-    /// Adds the floor and four walls, which reach above the highest start. The walls are smooth:
-    /// what is invisible supports nothing.
+    /// Adds the floor and four walls, which extend above the highest start. The walls are
+    /// frictionless: invisible walls support nothing.
     fn add_invisible_room(&self, world: &mut PhysicsWorld, units: &WorldUnits, members: &[usize]) {
         let surface = &self.scene.surface;
         let half_sides = surface.size.map(|length| length * units.length / 2.0);
@@ -262,7 +266,7 @@ impl Drop<'_> {
         }
     }
 
-    /// Height that no part of these objects starts above, metres.
+    /// Height above all parts of these objects at their start, metres.
     fn highest_top(&self, members: &[usize]) -> f64 {
         members
             .iter()
@@ -295,7 +299,7 @@ impl Drop<'_> {
         body
     }
 
-    /// The shape of an object, of its mass.
+    /// The collider of an object, with its mass.
     fn collider(&self, object: &Object, units: &WorldUnits) -> ColliderBuilder {
         let half = self.options.half_body(object) * units.length;
         self.with_contacts(collider::collider(
@@ -315,8 +319,8 @@ impl Drop<'_> {
     }
 }
 
-/// Sets the length of a step and its iterations, and contacts to match: the stiffest that still come
-/// to rest have a quarter and a half of the rate of iterations.
+/// Sets the length of a step and its iterations, and contacts to match: the stiffest that still
+/// come to rest have a quarter and a half of the rate of iterations.
 fn set_step(p: &mut IntegrationParameters, step: f32, iterations: u32) {
     p.dt = step;
     p.min_ccd_dt = step / MAX_SUBSTEPS as f32;
@@ -352,7 +356,7 @@ fn room_slabs([x, y]: [f64; 2], middle: f64) -> [Slab; 5] {
     .map(|(center, half)| Slab { center, half })
 }
 
-/// A body that stands, or falls from a height, damped.
+/// A stationary body, or one that falls from a height, damped.
 fn rigid_body(object: &Object, height: f64, units: &WorldUnits) -> RigidBodyBuilder {
     let (body, pose) = start_of(object, height);
     body.pose(units.to_world(&pose))
@@ -365,10 +369,10 @@ fn body_mass(object: &Object, units: &WorldUnits) -> f64 {
     (object.mass * units.mass).clamp(CARD_MASS_KG / MASS_SPREAD, CARD_MASS_KG * MASS_SPREAD)
 }
 
-/// A body that stands or falls, and its pose at the start.
+/// A stationary or falling body, and its pose at the start.
 ///
 /// # Panics
-/// When it is gone.
+/// If it is gone.
 fn start_of(object: &Object, height: f64) -> (RigidBodyBuilder, Pose) {
     match object.placement {
         Placement::Gone => unreachable!("what is gone is not in the world"),

@@ -1,4 +1,4 @@
-//! A convex prism that upright sides and two faces bound, as a shape of the engine.
+//! A convex prism, bounded by upright sides and two faces, as a shape of the engine.
 
 use rapier3d::parry::bounding_volume::{Aabb, BoundingSphere};
 use rapier3d::parry::mass_properties::MassProperties;
@@ -9,14 +9,15 @@ use rapier3d::parry::shape::{
 };
 use rapier3d::prelude::{Real, Vector};
 
-/// Corners that the engine takes of a face.
+/// Maximum number of corners of a face that the engine uses.
 const FACE_CORNERS: usize = 4;
 
 /// A convex prism around the `z` axis.
 ///
 /// # Method
-/// The engine makes contacts with four corners of a face and not more, so a plate with more corners
-/// would rest on a part of itself. Where its upper or lower face is touched it gets the largest part
+/// The engine makes contacts with at most four corners of a face, so a plate with more corners
+/// would rest on a part of itself. Where its upper or lower face is touched, the engine gets the
+/// largest part with four corners around that point.
 /// of four corners around that place.
 #[derive(Clone)]
 pub(super) struct Prism {
@@ -24,9 +25,9 @@ pub(super) struct Prism {
     ring: Vec<Vector>,
     /// Unit normal of the side from each corner to the next.
     outward: Vec<Vector>,
-    /// For each side the largest part of a face at it: up to four corners, as numbers.
+    /// For each side the largest part of a face next to it: up to four corners, as indices.
     parts: Vec<Vec<usize>>,
-    /// Number of the side whose part is largest.
+    /// Index of the side whose part is largest.
     largest: usize,
     hull: ConvexPolyhedron,
 }
@@ -40,8 +41,8 @@ enum Face {
 }
 
 impl Prism {
-    /// The prism over a convex ring, counter-clockwise; none where the engine finds it too thin a
-    /// shape.
+    /// The prism over a convex ring, counter-clockwise; none if the engine considers the shape too
+    /// thin.
     pub(super) fn new(ring: &[[f64; 2]], half_height: f64) -> Option<Self> {
         let ring = ring_at(ring, half_height);
         let lower = ring.iter().map(|corner| mirrored(*corner));
@@ -66,7 +67,7 @@ impl Prism {
         (corner + 1) % self.ring.len()
     }
 
-    /// The face that looks most into a direction.
+    /// The face whose normal is closest to a direction.
     fn support_face(&self, dir: Vector) -> Face {
         let side = self.side_towards(|k| self.outward[k].dot(dir));
         match (self.outward[side].dot(dir) > dir.z.abs(), dir.z > 0.0) {
@@ -88,7 +89,7 @@ impl Prism {
         best.0
     }
 
-    /// The corners of the upper or lower face that stand for it around a point.
+    /// The corners that represent the upper or lower face around a point.
     fn part_around(&self, point: Vector) -> &[usize] {
         let beyond = |k: usize| self.outward[k].dot(point - self.ring[k]);
         let largest = &self.parts[self.largest];
@@ -108,8 +109,8 @@ impl Prism {
         }
     }
 
-    /// Writes a part of the upper face, whose vertices count from 0, or of the lower one, whose
-    /// count from `first`.
+    /// Writes a part of the upper face, whose vertices are numbered from 0, or of the lower one,
+    /// whose vertices are numbered from `first`.
     fn write_part(&self, point: Vector, first: usize, out: &mut PolygonalFeature) {
         let part = self.part_around(point);
         out.num_vertices = part.len();
@@ -148,7 +149,7 @@ fn ring_at(ring: &[[f64; 2]], z: f64) -> Vec<Vector> {
         .collect()
 }
 
-/// At the other end of the prism.
+/// The corner at the other end of the prism.
 fn mirrored(corner: Vector) -> Vector {
     Vector::new(corner.x, corner.y, -corner.z)
 }
@@ -158,10 +159,10 @@ fn outward(ring: &[Vector], side: usize) -> Vector {
     Vector::new(along.y, -along.x, 0.0).normalize_or_zero()
 }
 
-/// The largest ring of up to four corners of a convex ring that a side of it is a side of.
+/// The largest ring of up to four corners of a convex ring that contains one of its sides.
 ///
-/// For each third corner the fourth is farther on than for the third before it, and the area has
-/// one maximum over it.
+/// As the third corner moves on, so does the best fourth one; for each third corner, the area has a
+/// single maximum over the fourth.
 fn largest_at(ring: &[Vector], side: usize) -> Vec<usize> {
     let n = ring.len();
     let corners = |c: usize, d: usize| [0, 1, c, d].map(|k| (side + k) % n).to_vec();
@@ -183,8 +184,8 @@ fn largest_at(ring: &[Vector], side: usize) -> Vec<usize> {
     with_widest_first(ring, corners(best.0, best.1))
 }
 
-/// The same corners from where the first three make the largest triangle: the engine takes the normal
-/// of a face from these.
+/// The same corners, starting where the first three form the largest triangle: the engine computes
+/// the normal of a face from these.
 fn with_widest_first(ring: &[Vector], mut corners: Vec<usize>) -> Vec<usize> {
     let area = |first: usize| {
         let triangle = [0, 1, 2].map(|k| corners[(first + k) % FACE_CORNERS]);
@@ -271,7 +272,7 @@ impl Shape for Prism {
         Box::new(self.clone())
     }
 
-    /// None: the world's shapes are made at their size.
+    /// None: the world's shapes are created at their final size.
     fn scale_dyn(&self, _: Vector, _: u32) -> Option<Box<dyn Shape>> {
         None
     }
@@ -313,7 +314,7 @@ impl Shape for Prism {
 mod tests {
     use super::*;
 
-    /// Corners on a circle, one after another at growing steps.
+    /// Corners on a circle, at growing steps.
     fn circle(n: usize) -> Vec<[f64; 2]> {
         let angle = |i: usize| std::f64::consts::TAU * (i as f64 / n as f64).powf(1.3);
         (0..n)
@@ -325,7 +326,7 @@ mod tests {
         Prism::new(&circle(n), 0.005).expect("a prism")
     }
 
-    /// The largest area of four corners, two of which follow each other, by trying all.
+    /// The largest area of four corners with this side, by brute force.
     fn largest_by_trying(ring: &[Vector], side: usize) -> Real {
         let n = ring.len();
         let thirds = (2..n).flat_map(|c| (c + 1..n).map(move |d| (c, d)));

@@ -1,8 +1,8 @@
 //! From the start of a fall to rest.
 //!
 //! # Method
-//! At rest is what the engine has put to sleep (every body slower than 1 cm/s and 0.5 rad/s for
-//! 0.5 s), and what only trembles: no end of a card has moved by [`REST_MOTION_M`] for
+//! A body is at rest if the engine has put it to sleep (every body slower than 1 cm/s and 0.5 rad/s
+//! for 0.5 s), or if it only trembles: no end of a card has moved by [`REST_MOTION_M`] for
 //! [`REST_TIME_S`] and the bodies together have less kinetic energy than if all of them moved at
 //! [`REST_SPEED_M_PER_S`]. A thin card between others may vibrate forever by hundredths of a
 //! millimetre, driven by the contact solver; damping does not stop it.
@@ -20,27 +20,28 @@ use rapier3d::prelude::{
     Aabb, PhysicsWorld, Pose as RapierPose, RigidBody, RigidBodyHandle, Rotation,
 };
 
-/// Motion of a card that still counts as rest, metres in the world: over [`REST_TIME_S`] that is the
-/// speed below which the engine lets bodies sleep.
+/// Motion of a card that still counts as rest, metres in the world: over [`REST_TIME_S`] it
+/// corresponds to the speed below which the engine lets bodies sleep.
 const REST_MOTION_M: f32 = 0.001;
-/// How long it must last, seconds in the world.
+/// Time that this must last, seconds in the world.
 const REST_TIME_S: f64 = 0.1;
 /// Mean speed that still counts as rest, m/s in the world.
 const REST_SPEED_M_PER_S: f64 = 0.01;
-/// Mean height in the world, metres, a quarter of a card: a drop by less is treated as one by this.
-/// Contacts may push bodies apart at 0.2 m/s, which is 2 mm of height, and that is no explosion.
+/// Minimum mean height of a drop in the world, metres, a quarter of a card: a smaller drop counts
+/// as this one. Contacts may push bodies apart at 0.2 m/s, which is 2 mm of height, and that is no
+/// explosion.
 const MIN_DROP_M: f64 = 0.05;
 
 /// A world in motion.
 pub(super) struct FallRun<'a> {
     pub(super) world: PhysicsWorld,
     pub(super) bodies: Vec<RigidBodyHandle>,
-    /// Of the objects that fall, in the order of `bodies`.
+    /// Ids of the objects that fall, in the order of `bodies`.
     pub(super) ids: Vec<usize>,
     pub(super) room: Room,
     pub(super) units: WorldUnits,
     pub(super) pace: Pace,
-    /// Of the contact solver, in a step of the options.
+    /// Iterations of the contact solver, in a step of the options.
     pub(super) iterations: u32,
     /// Work of a step, for each body and pair.
     pub(super) work_per_pair: u64,
@@ -49,15 +50,15 @@ pub(super) struct FallRun<'a> {
 
 /// Times of a fall, seconds in the world.
 pub(super) struct Pace {
-    /// The step of the options; a tick, of which a step lasts one or more.
+    /// The step of the options, called a tick; an actual step lasts one or more.
     pub(super) step: f64,
     pub(super) time_limit: f64,
-    /// Ticks between samples; none where it is 0.
+    /// Ticks between samples; 0 for no samples.
     pub(super) sample_every: usize,
 }
 
 impl FallRun<'_> {
-    /// Steps until everything rests or the time is over.
+    /// Steps until everything rests or the time limit is reached.
     pub(super) fn run_to_rest(mut self) -> Result<Fall> {
         let ticks = (self.pace.time_limit / self.pace.step).ceil() as usize;
         let mut record = FallRecord::new(&self);
@@ -77,7 +78,7 @@ impl FallRun<'_> {
         Ok(record.finish(&self))
     }
 
-    /// Makes a step, as long as what moves allows; returns how many ticks it lasts.
+    /// Makes a step, as long as the moving bodies allow; returns its length in ticks.
     fn step_world(&mut self) -> Result<usize> {
         self.allowance.take(self.step_work())?;
         let stride = Stride::longest(
@@ -97,7 +98,8 @@ impl FallRun<'_> {
         Ok(stride.ticks)
     }
 
-    /// Takes out of the world what has gone over the rim; returns whether anything has.
+    /// Removes from the world the bodies that have gone over the rim; returns whether there were
+    /// any.
     fn let_go(&mut self) -> bool {
         let gone = self.gone_bodies();
         for body in &gone {
@@ -126,13 +128,13 @@ impl FallRun<'_> {
         self.world.islands.active_bodies().count() == 0
     }
 
-    /// All that fell and is not gone.
+    /// All dropped bodies that are not gone.
     fn moving_bodies(&self) -> impl Iterator<Item = &RigidBody> {
         let bodies = self.bodies.iter().map(|body| &self.world.bodies[*body]);
         bodies.filter(|body| body.is_enabled())
     }
 
-    /// Where everything is that fell; none for what is gone.
+    /// Poses of everything that was dropped; none for what is gone.
     fn poses(&self) -> impl Iterator<Item = Option<Pose>> {
         let bodies = self.bodies.iter().map(|body| &self.world.bodies[*body]);
         bodies.map(|body| {
@@ -166,7 +168,7 @@ impl FallRun<'_> {
         }
     }
 
-    /// Records where everything is at the end of a step of some ticks, if a sample is due.
+    /// Records all poses at the end of a step of some ticks, if a sample is due.
     fn record_samples(&self, fall: &mut Fall, tick: usize, length: usize) {
         let every = self.pace.sample_every;
         if every > 0 && tick % every < length {
@@ -198,7 +200,7 @@ impl FallRun<'_> {
     }
 }
 
-/// What is recorded of a fall while it lasts.
+/// What is recorded during a fall.
 struct FallRecord {
     stillness: Stillness,
     energy: EnergyTrack,
@@ -219,7 +221,7 @@ impl FallRecord {
         }
     }
 
-    /// Takes in the state after a step of some ticks; returns whether everything is at rest.
+    /// Records the state after a step of some ticks; returns whether everything is at rest.
     fn add_step(&mut self, run: &FallRun, tick: usize, length: usize) -> bool {
         let now = tick as f64 * run.pace.step;
         let kinetic = self.energy.update(run);
@@ -285,7 +287,7 @@ impl EnergyTrack {
         }
     }
 
-    /// Takes in the energy after a step; returns the kinetic one.
+    /// Records the energy after a step; returns the kinetic one.
     fn update(&mut self, run: &FallRun) -> f64 {
         let kinetic = run.kinetic_energy();
         let now = kinetic + potential_of_all(run);
@@ -294,14 +296,14 @@ impl EnergyTrack {
         kinetic
     }
 
-    /// Goes on without what has just been taken out of the world.
+    /// Continues without the bodies that have just been removed from the world.
     fn rebase(&mut self, run: &FallRun) {
         let now = run.kinetic_energy() + potential_of_all(run);
         self.start += now - self.last;
         self.last = now;
     }
 
-    /// The greatest rise between two steps as a share of what the drop released.
+    /// The greatest rise between two steps as a share of the energy released by the drop.
     fn relative_rise(&self) -> f64 {
         self.max_rise / (self.start - self.last).max(self.min_drop)
     }
@@ -313,7 +315,7 @@ fn potential_of_all(run: &FallRun) -> f64 {
         .sum()
 }
 
-/// Since when, and where, nothing has moved.
+/// Since when, and at which poses, nothing has moved.
 #[derive(Default)]
 struct Stillness {
     poses: Vec<RapierPose>,
@@ -337,14 +339,14 @@ impl Stillness {
     }
 }
 
-/// How far the end of a card has moved, at most: its middle, and half a card times the angle (twice
+/// Maximum motion of an end of a card: that of its middle, plus half a card times the angle (twice
 /// the difference of the quaternions).
 fn motion_between(a: &RapierPose, b: &RapierPose) -> f32 {
     let turned = rotation_between(a.rotation, b.rotation);
     (a.translation - b.translation).length() + CARD_LENGTH_M as f32 * turned
 }
 
-/// How far two unit quaternions are apart; one and its negative are the same rotation.
+/// Distance of two unit quaternions; one and its negative are the same rotation.
 fn rotation_between(a: Rotation, b: Rotation) -> f32 {
     (a - b).length().min((a + b).length())
 }

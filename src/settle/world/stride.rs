@@ -1,19 +1,19 @@
-//! How long the next step may be.
+//! Length of the next step.
 //!
 //! # Method
-//! Impacts need the short step of the options; what slides, rolls and creeps does not. Longer steps
-//! make contacts softer, and what lies under others sinks in by their weight over the square of the
-//! rate of iterations: the higher the heap, the shorter its steps and the more iterations they have.
-//! Of 250 heaps of 5 to 15 prisms with a friction of 0.01, in trays with walls, 15 attempts are
-//! rejected, 16 with short steps alone, at less than half of the time. Where high heaps take three
-//! halves of the iterations for two steps, one in twenty sinks in.
+//! Impacts need the short step of the options; sliding, rolling and creeping do not. Longer steps
+//! make contacts softer, and bodies under others sink in by the weight above them over the square
+//! of the rate of iterations: the higher the heap, the shorter its steps and the more iterations
+//! they have. Of 250 heaps of 5 to 15 prisms with a friction of 0.01, in trays with walls, 15
+//! attempts are rejected, compared with 16 with short steps only, in less than half of the time. If
+//! high heaps got only three halves of the iterations for two steps, one in twenty would sink in.
 
 use rapier3d::prelude::RigidBody;
 
-/// Farthest way of any end of a card in a step longer than a tick, metres in the world.
+/// Maximum distance that any end of a card moves in a step longer than a tick, metres in the world.
 const MAX_WAY_M: f64 = 0.004;
 
-/// What may follow, the cheapest first.
+/// Possible steps, the cheapest first.
 const STRIDES: [Stride; 4] = [
     Stride::new(4, 2, 0.02),
     Stride::new(4, 3, 0.03),
@@ -31,7 +31,7 @@ pub(super) struct Stride {
     pub(super) ticks: usize,
     /// Its iterations, in halves of those of the options.
     half_iterations: u32,
-    /// Height that no middle of a body is above, metres in the world.
+    /// Maximum height of a body's middle, metres in the world.
     max_height: f64,
 }
 
@@ -44,7 +44,7 @@ impl Stride {
         }
     }
 
-    /// The longest for bodies that move so, `tick` being the step of the options in seconds.
+    /// The longest step for bodies with these speeds; `tick` is the step of the options in seconds.
     pub(super) fn longest<'a>(
         bodies: impl Iterator<Item = &'a RigidBody>,
         half_card: f32,
@@ -61,7 +61,7 @@ impl Stride {
         *STRIDES.iter().find(fits).unwrap_or(&TICK)
     }
 
-    /// Its iterations, by those of the options.
+    /// Its iterations, given those of the options.
     pub(super) fn iterations(&self, usual: u32) -> u32 {
         (usual * self.half_iterations).div_ceil(2)
     }

@@ -1,4 +1,4 @@
-//! From the scene's units to those of the world, and back.
+//! Conversion from the scene's units to those of the world, and back.
 
 use super::{CARD_LENGTH_M, CARD_MASS_KG, GRAVITY_M_PER_S2};
 use crate::geom::{Pose, UnitQuaternion, Vector3};
@@ -7,7 +7,7 @@ use crate::settle::bodies::{median_of_dropped, typical_length};
 use nalgebra::Quaternion;
 use rapier3d::prelude::{Pose as RapierPose, Rotation, Vector};
 
-/// What a unit of the scene is in the world.
+/// The scene's units, in those of the world.
 pub(super) struct WorldUnits {
     pub(super) length: f64,
     pub(super) mass: f64,
@@ -15,8 +15,8 @@ pub(super) struct WorldUnits {
 }
 
 impl WorldUnits {
-    /// Those that give the typical card of a scene a length of 200 mm and a mass of 30 g, under a
-    /// gravity of 9.81 m/s^2.
+    /// Units in which the typical card of a scene has a length of 200 mm and a mass of 30 g, under
+    /// a gravity of 9.81 m/s^2.
     pub(super) fn new(scene: &Scene, options: &SettleOptions) -> Self {
         let length = CARD_LENGTH_M / typical_length(scene);
         let gravity = Vector3::from(options.gravity).norm();
