@@ -18,11 +18,11 @@ use std::sync::Arc;
 
 pub(crate) const PAGES: &[Page] = &[crate::page!("capture.html"), crate::page!("capture.js")];
 
-/// Where frames for another display are written.
+/// Folder for the frames of another display.
 const FOLDER: &str = "capture";
 
-/// The page that shows frames has its style, script and pictures in itself. The sandbox keeps it
-/// from everything else: to the studio it is another site's page.
+/// Content security policy of the page that shows frames, which contains its style, script and
+/// pictures. The sandbox isolates it from everything else: to the studio it is another site's page.
 const ALONE: &str = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; \
      style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
@@ -32,7 +32,7 @@ pub(crate) fn routes() -> Router<Arc<Studio>> {
         .route("/write", post(write))
 }
 
-/// A display, and what it is to show.
+/// A display, and what it should show.
 #[derive(Deserialize)]
 struct FrameRequest {
     width_px: u32,
@@ -52,7 +52,7 @@ impl FrameRequest {
     }
 }
 
-/// The page that shows the frames full screen.
+/// Returns the page that shows the frames full screen.
 async fn show(Query(asked): Query<FrameRequest>) -> Answer<Response> {
     let page = blocking(move || {
         let folder = tempfile::tempdir().map_err(|e| Error::value("capture", e))?;
@@ -67,7 +67,7 @@ async fn show(Query(asked): Query<FrameRequest>) -> Answer<Response> {
     Ok((headers, page).into_response())
 }
 
-/// What was written.
+/// The written files.
 #[derive(Serialize)]
 struct WrittenFrames {
     page: String,
@@ -80,7 +80,7 @@ async fn write(
     blocking(move || {
         let folder = studio.folder.place(FOLDER)?;
         if folder.exists() {
-            // Not where a link leads out.
+            // Fails if a link leads outside the studio's folder.
             studio.folder.folder(FOLDER)?;
         }
         let page = write_frames(&folder, &asked.display(), asked.stripes)?;

@@ -1,4 +1,4 @@
-//! The folder that is worked on: the one place where a name from a browser becomes a path.
+//! The studio's folder: the only place where a name from a browser becomes a path.
 
 use crate::refusal::{Answer, Refusal};
 use axum::http::StatusCode;
@@ -8,20 +8,20 @@ use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// How deep below the folder files are looked for.
+/// Depth below the folder to which files are searched for.
 const MAX_DEPTH: usize = 4;
-/// Entries that are looked at, at most, when files are looked for: a dataset of 100,000 pictures has
-/// about as many.
+/// Maximum number of entries examined in a search: a dataset of 100,000 pictures has about as many.
 const MAX_ENTRIES: usize = 200_000;
 
-/// A folder; nothing outside of it is read or written.
+/// A folder; nothing outside it is read or written.
 pub(crate) struct Folder {
     root: PathBuf,
-    /// Between the look at a file's version and its replacement nobody else saves.
+    /// Held from the check of a file's version until its replacement, so that nobody else saves in
+    /// between.
     saving: Mutex<()>,
 }
 
-/// What a file holds, and a mark of that state of it.
+/// The contents of a file, and their version.
 #[derive(Debug, serde::Serialize)]
 pub(crate) struct Versioned {
     pub(crate) text: String,
@@ -30,12 +30,12 @@ pub(crate) struct Versioned {
 
 impl Folder {
     /// # Errors
-    /// [`Error::File`] where there is no such folder.
+    /// [`Error::File`] if there is no such folder.
     pub(crate) fn open(root: &Path) -> Result<Self> {
         if !root.is_dir() {
             return Err(Error::file(root, "no such folder"));
         }
-        // Files are then named as a person would name them.
+        // Files then have the names that a user would type.
         let root = if root == Path::new(".") {
             PathBuf::new()
         } else {
@@ -62,17 +62,18 @@ impl Folder {
         }
     }
 
-    /// A file that is there, by its name with slashes.
+    /// Path of an existing file, by its name with slashes.
     ///
     /// # Errors
-    /// 404 for one that is not there, and for a name that leads out, a link that does, and what is
+    /// 404 for a missing file, for a name or a link that leads outside the folder, and for anything
+    /// but a regular file.
     /// no regular file.
     pub(crate) fn file(&self, name: &str) -> Answer<PathBuf> {
         check_name(name)?;
         io::inside(&self.root, name).map_err(not_found)
     }
 
-    /// A folder that is there; the empty name is the folder itself.
+    /// Path of an existing folder; the empty name is the folder itself.
     ///
     /// # Errors
     /// As [`Folder::file`].
@@ -88,11 +89,11 @@ impl Folder {
         }
     }
 
-    /// Where a file may be written: in a folder that is there. A link in its place is replaced, not
+    /// Path for writing a file in an existing folder. A link in its place is replaced, not
     /// followed.
     ///
     /// # Errors
-    /// As [`Folder::file`] for the folder that it is to lie in.
+    /// As [`Folder::file`] for the containing folder.
     pub(crate) fn place(&self, name: &str) -> Answer<PathBuf> {
         check_name(name)?;
         let path = io::below(&self.root, name).map_err(not_found)?;
@@ -101,8 +102,7 @@ impl Folder {
         Ok(path)
     }
 
-    /// Whether a path that a file of the folder names leads into the folder, whatever links there
-    /// are.
+    /// Whether a path in one of the folder's files leads into the folder, after resolving links.
     pub(crate) fn holds(&self, path: &Path) -> bool {
         match (self.here().canonicalize(), path.canonicalize()) {
             (Ok(root), Ok(target)) => target.starts_with(root),
@@ -110,7 +110,7 @@ impl Folder {
         }
     }
 
-    /// The name of a path inside, as browsers say it.
+    /// The name of a path inside, as browsers use it.
     pub(crate) fn name_of(&self, path: &Path) -> String {
         let inside = path.strip_prefix(&self.root).unwrap_or(path);
         let parts = inside.components();
@@ -118,8 +118,7 @@ impl Folder {
         parts.collect::<Vec<_>>().join("/")
     }
 
-    /// The name of a path that a list says (`./a.jpg`, `b/../a.jpg`, an absolute one), as browsers say
-    /// it.
+    /// The name of a path in a list (`./a.jpg`, `b/../a.jpg`, an absolute one), as browsers use it.
     pub(crate) fn name_of_listed(&self, path: &Path) -> String {
         match straightened(path).strip_prefix(straightened(self.here())) {
             Ok(inside) => self.name_of(&self.root.join(inside)),
@@ -127,20 +126,21 @@ impl Folder {
         }
     }
 
-    /// The text of a file, with its version.
+    /// The text of a file and its version.
     ///
     /// # Errors
-    /// As [`Folder::file`], and for what is no text.
+    /// As [`Folder::file`], and for a file that is not text.
     pub(crate) fn read_text(&self, name: &str) -> Answer<Versioned> {
         let text = io::read_text(self.file(name)?)?;
         let version = version_of(&text);
         Ok(Versioned { text, version })
     }
 
-    /// The text of a file, with its version; none where there is none, or only a link that leads out.
+    /// The text of a file and its version; none if there is no file or only a link that leads
+    /// outside.
     ///
     /// # Errors
-    /// For a file that is there and cannot be read: it must not be taken for none, and written over.
+    /// For an existing file that cannot be read: it must not be treated as missing and overwritten.
     pub(crate) fn text_if_any(&self, name: &str) -> Answer<Option<Versioned>> {
         match self.file(name) {
             Ok(_) => self.read_text(name).map(Some),
@@ -148,11 +148,11 @@ impl Folder {
         }
     }
 
-    /// Saves a text, whole or not at all, if the file is as it was when the page read it (`version`;
-    /// none: there was no file), and returns the new version.
+    /// Saves a text atomically if the file is unchanged since the page read it (`version`; none:
+    /// there was no file), and returns the new version.
     ///
     /// # Errors
-    /// [`Refusal::stale`] where it has changed since; as [`Folder::place`] and
+    /// [`Refusal::stale`] if it has changed since; as [`Folder::place`] and
     /// [`Folder::text_if_any`].
     pub(crate) fn save(&self, name: &str, text: &str, version: Option<&str>) -> Answer<String> {
         let path = self.place(name)?;
@@ -165,8 +165,8 @@ impl Folder {
         Ok(version_of(text))
     }
 
-    /// The names of all files below that `wanted` takes, sorted; hidden ones are left out, and so is
-    /// what links lead to.
+    /// The sorted names of all files below the folder that `wanted` accepts, without hidden files
+    /// and targets of links.
     pub(crate) fn find(&self, wanted: impl Fn(&Path) -> bool) -> Vec<String> {
         let files = self.files(MAX_ENTRIES).into_iter().map(without_dot);
         let wanted = files.filter(|path| wanted(path));
@@ -175,8 +175,8 @@ impl Folder {
         found
     }
 
-    /// The files among the first entries, the upper folders before those within them: what lies deep in
-    /// a large dataset hides nothing beside it.
+    /// The files among the first entries, breadth first, so that deep entries of a large dataset do
+    /// not hide anything next to it.
     fn files(&self, most: usize) -> Vec<PathBuf> {
         let mut files = Vec::new();
         let mut open = VecDeque::from([(self.here().to_path_buf(), 0)]);
@@ -202,7 +202,7 @@ impl Folder {
     }
 }
 
-/// `/a/c.jpg` of `/a/b/../c.jpg`.
+/// `/a/c.jpg` for `/a/b/../c.jpg`.
 fn straightened(path: &Path) -> PathBuf {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
     let mut straight = PathBuf::new();
@@ -216,7 +216,7 @@ fn straightened(path: &Path) -> PathBuf {
     straight
 }
 
-/// `a.jpg` of `./a.jpg`.
+/// `a.jpg` for `./a.jpg`.
 fn without_dot(path: PathBuf) -> PathBuf {
     match path.strip_prefix("./") {
         Ok(inside) => inside.into(),
@@ -229,7 +229,7 @@ fn visible_entries(folder: &Path) -> impl Iterator<Item = std::fs::DirEntry> {
     entries.filter(|entry| !entry.file_name().to_string_lossy().starts_with('.'))
 }
 
-/// A name as petcomp's own pages say it: parts between slashes, nothing hidden in them.
+/// Checks that a name has the form used by petcomp's own pages: parts between slashes, none hidden.
 fn check_name(name: &str) -> Answer<()> {
     let plain = |part: &str| !matches!(part, "" | "." | "..") && !part.contains(['\\', '\0']);
     if name.split('/').all(plain) {
@@ -249,7 +249,7 @@ fn not_found(error: Error) -> Refusal {
     Refusal::new(StatusCode::NOT_FOUND, error.to_string())
 }
 
-/// A mark of a text: FNV-1a of 64 bits (Fowler, Noll and Vo), with its length.
+/// Version of a text: FNV-1a of 64 bits (Fowler, Noll and Vo), with its length.
 fn version_of(text: &str) -> String {
     const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
     const PRIME: u64 = 0x0100_0000_01b3;

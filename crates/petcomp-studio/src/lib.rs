@@ -1,16 +1,17 @@
-//! `petcomp studio`: pages in the browser of this machine for what hands and eyes do better than a
-//! command line. A photo's corners, the scale of a photo, mattes, a recipe, a dataset.
+//! `petcomp studio`: pages in this machine's browser for interactive tasks: a photo's corners, the
+//! scale of a photo, mattes, a recipe, a dataset.
 //!
-//! Each page is a room of its own (`corners`, `scale`, `capture`, `mattes`, `recipe`, `dataset`) with routes, and
-//! pages of plain HTML, CSS and modules in `pages/` that are part of the program. What rooms share:
+//! Each page has a module of its own (`corners`, `scale`, `capture`, `mattes`, `recipe`, `dataset`)
+//! with routes; its plain HTML, CSS and JavaScript modules in `pages/` are part of the program.
+//! Shared by all pages:
 //!
-//! * [`Server`] listens on 127.0.0.1 and answers nobody without its token (`server`).
-//! * `folder` turns a name from a browser into a path, never out of the folder, and never lets a
+//! * [`Server`] listens on 127.0.0.1 and rejects requests without its token (`server`).
+//! * `folder` turns a name from a browser into a path, never outside the folder, and never lets a
 //!   page overwrite what another one has saved since.
-//! * `turn` keeps heavy work away from the threads that answer, and gives up what was asked for
-//!   again since.
-//! * `message` reads and writes what pages send and are sent.
-//! * `refusal` is what a page is told when something cannot be done.
+//! * `turn` runs heavy work outside the threads that answer, and cancels work that a newer request
+//!   replaces.
+//! * `message` reads requests and writes answers.
+//! * `refusal` is the error that a page receives.
 #![warn(clippy::unwrap_used, clippy::print_stderr, clippy::print_stdout)]
 
 mod capture;

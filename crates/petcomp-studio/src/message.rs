@@ -1,7 +1,7 @@
-//! What pages and routes tell each other: JSON, and the query of an address.
+//! Messages between pages and routes: JSON, and URL queries.
 //!
-//! In place of axum's extractors, which carry half a megabyte of code to say where in a message an
-//! error lies: the pages are our own, and serde says line and column.
+//! They replace axum's extractors, which add half a megabyte of code to report where in a message
+//! an error is: the pages are our own, and serde reports line and column.
 
 use crate::refusal::Refusal;
 use axum::body::Bytes;
@@ -16,13 +16,13 @@ use std::time::Duration;
 
 const JSON: &str = "application/json";
 
-/// How long a connection may be without a request, or with a part of one.
+/// Maximum idle time of a connection without a request, or with an incomplete one.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(10);
 
 /// The body of a request or an answer.
 pub(crate) struct Json<T>(pub(crate) T);
 
-/// What stands behind the question mark of an address.
+/// The query of a URL.
 pub(crate) struct Query<T>(pub(crate) T);
 
 impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Json<T> {
@@ -60,7 +60,7 @@ impl<T: DeserializeOwned, S: Sync> FromRequestParts<S> for Query<T> {
     }
 }
 
-/// A page of another site cannot send this type without asking the browser first.
+/// A page of another site cannot send this type without a preflight request.
 fn is_json(headers: &HeaderMap) -> bool {
     let told = headers
         .get(CONTENT_TYPE)

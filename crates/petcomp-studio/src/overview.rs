@@ -1,4 +1,4 @@
-//! The first page: what is in the folder, and what each page can do with it.
+//! The first page: the contents of the folder, and what each page can do with them.
 
 use crate::message::Json;
 use crate::photos::photos;
@@ -27,7 +27,7 @@ pub(crate) fn routes() -> Router<Arc<Studio>> {
     Router::new().route("/overview", get(overview))
 }
 
-/// What was found in the folder, names with slashes.
+/// The contents of the folder, names with slashes.
 #[derive(Serialize)]
 struct Overview {
     folder: String,

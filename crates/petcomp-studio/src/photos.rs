@@ -1,14 +1,14 @@
-//! The photos of a folder: not what petcomp writes beside them or makes of them.
+//! The photos of a folder, without files that petcomp generates from them or next to them.
 
 use crate::folder::Folder;
 use crate::picture::may_be_photo;
 use petcomp::asset::MANIFEST;
 use std::path::Path;
 
-/// Endings of pictures that petcomp writes beside photos.
+/// Name endings of pictures that petcomp writes next to photos.
 const OWN_ENDINGS: [&str; 3] = [".overlay", ".front", ".matte"];
 
-/// All photos below a folder, in order of name; no pictures of datasets and no cut-outs.
+/// All photos below a folder, sorted by name, without pictures of datasets and cut-outs.
 pub(crate) fn photos(folder: &Folder) -> Vec<String> {
     let (datasets, assets) = (
         folders_with(folder, "dataset.json"),
@@ -28,14 +28,14 @@ pub(crate) fn photos(folder: &Folder) -> Vec<String> {
     photos
 }
 
-/// The folders below one in which a file is; what is opened itself is looked at.
+/// The folders below one that contain a file; the opened folder itself does not count.
 fn folders_with(folder: &Folder, file: &str) -> Vec<String> {
     let found = folder.find(|path| path.ends_with(file));
     let folders = found.iter().map(|name| parent_of(name).to_owned());
     folders.filter(|folder| !folder.is_empty()).collect()
 }
 
-/// A list of photos of objects.
+/// Whether a file is a list of photos of objects.
 pub(crate) fn is_list(path: &Path) -> bool {
     ["photos.toml", "photos.csv"]
         .iter()

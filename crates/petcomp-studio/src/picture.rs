@@ -1,4 +1,4 @@
-//! Pictures for pages: a photo as the browser can show it, and small ones.
+//! Pictures for pages: a photo as the browser can show it, and small versions.
 
 use crate::message::Query;
 use crate::refusal::{Answer, Refusal};
@@ -17,20 +17,20 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::UNIX_EPOCH;
 
-/// Extensions of what may be a photo.
+/// Extensions of possible photos.
 const EXTENSIONS: [&str; 11] = [
     "jpg", "jpeg", "png", "tif", "tiff", "exr", "hdr", "webp", "heic", "heif", "hif",
 ];
 const JPEG_QUALITY: u8 = 88;
-/// Of a photo at its size, in which corners are looked for at eight times that.
+/// For a photo at full size, in which corners are picked at eight times magnification.
 const WHOLE_QUALITY: u8 = 95;
-/// The largest file that a browser gets as it is.
+/// Size limit of a file that is sent to a browser unchanged.
 const MAX_PLAIN_BYTES: u64 = 64 << 20;
-/// Longer sides of pictures that are made smaller, pixels.
+/// Longer sides of downsized pictures, pixels.
 const MIN_SIDE_PX: usize = 16;
 const MAX_SIDE_PX: usize = 4096;
 
-/// A file that is called as pictures are.
+/// Whether a file has a picture's extension.
 pub(crate) fn may_be_photo(path: &Path) -> bool {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     extension.is_some_and(|extension| EXTENSIONS.contains(&extension.as_str()))
@@ -49,7 +49,7 @@ fn of_type(kind: &'static str, bytes: Vec<u8>) -> Response {
     ([(CONTENT_TYPE, kind)], bytes).into_response()
 }
 
-/// A picture whose longer side has so many pixels at most.
+/// A picture downsized to at most this longer side.
 pub(crate) fn at_most<P: Mix>(image: Image<P>, side_px: usize) -> Image<P> {
     let (width, height) = image.size();
     let longer = width.max(height);
@@ -64,7 +64,7 @@ pub(crate) fn routes() -> Router<Arc<Studio>> {
     Router::new().route("/photo", get(photo))
 }
 
-/// A photo that a page asks about.
+/// A photo that a page requests.
 #[derive(Deserialize)]
 pub(crate) struct PhotoName {
     pub(crate) photo: String,
@@ -73,12 +73,12 @@ pub(crate) struct PhotoName {
 #[derive(Deserialize)]
 struct PhotoQuery {
     file: String,
-    /// Longer side, pixels; all of the photo without it.
+    /// Longer side, pixels; by default the full size.
     side: Option<usize>,
 }
 
-/// A photo: the file itself where the browser can show it whole, or else a JPEG of it. The browser
-/// may keep it, and asks every time whether it still is what the file holds.
+/// A photo: the file itself if the browser can show it whole, otherwise a JPEG of it. The browser
+/// may cache it, and checks every time whether the file has changed.
 async fn photo(
     State(studio): State<Arc<Studio>>,
     Query(query): Query<PhotoQuery>,
@@ -97,7 +97,7 @@ async fn photo(
     Ok((keeping, response).into_response())
 }
 
-/// A mark of the state of a file: when it was written, and its length.
+/// Entity tag of a file: its modification time and length.
 pub(crate) fn tag_of(path: &Path) -> Answer<String> {
     let meta = std::fs::metadata(path).map_err(unreadable)?;
     let written = meta.modified().map_err(unreadable)?;
@@ -108,8 +108,8 @@ pub(crate) fn tag_of(path: &Path) -> Answer<String> {
     Ok(format!("\"{nanos:x}-{:x}\"", meta.len()))
 }
 
-/// A picture as the browser can show it, small where a longer side is given. Otherwise it keeps its
-/// size, for pages take positions from it.
+/// A picture as the browser can show it, small if a longer side is given. Otherwise it keeps its
+/// size, since pages take positions from it.
 pub(crate) fn shown(path: &Path, side: Option<usize>) -> Answer<Response> {
     if let Some(side) = side {
         return over_black(path, side.clamp(MIN_SIDE_PX, MAX_SIDE_PX), JPEG_QUALITY);
@@ -149,9 +149,9 @@ const SOS: u8 = 0xda;
 const EOI: u8 = 0xd9;
 const APP1: u8 = 0xe1;
 
-/// A JPEG without EXIF data, XMP and what is behind the end of the picture: cameras put a smaller
-/// one there with EXIF data of its own. None of one that not every browser shows, or with something
-/// else than segments in it.
+/// A JPEG without EXIF data, XMP and anything after the end of the picture, where cameras put a
+/// smaller picture with EXIF data of its own. None for one that not every browser shows, or with
+/// anything but segments in it.
 fn without_metadata(jpeg: &[u8]) -> Option<Vec<u8>> {
     let (start, mut rest) = jpeg.split_at_checked(2)?;
     let mut kept = start.to_vec();
@@ -169,7 +169,7 @@ fn without_metadata(jpeg: &[u8]) -> Option<Vec<u8>> {
     Some(kept)
 }
 
-/// Length of the first segment of the rest of a JPEG, with the pixels that follow it.
+/// Length of the first segment of the rest of a JPEG, including the pixels that follow it.
 fn segment_bytes(jpeg: &[u8]) -> Option<usize> {
     let &[0xff, marker, high, low, ..] = jpeg else {
         return None;
@@ -179,13 +179,13 @@ fn segment_bytes(jpeg: &[u8]) -> Option<usize> {
         return Some(length);
     }
     let mut pairs = jpeg.get(length..)?.windows(2);
-    // Neither an escaped byte of pixels nor padding nor a restart.
+    // Not an escaped byte of pixels, padding or a restart marker.
     let end = pairs.position(|pair| pair[0] == 0xff && !matches!(pair[1], 0 | 0xff | 0xd0..=0xd7));
     Some(length + end?)
 }
 
-/// The header of a picture that not every browser shows: other than 8 bits, lossless,
-/// hierarchical, arithmetic-coded.
+/// Whether the header belongs to a picture that not every browser shows: other than 8 bits,
+/// lossless, hierarchical or arithmetic-coded.
 fn is_rare_frame(segment: &[u8]) -> bool {
     match segment[1] {
         DHT => false,
@@ -195,8 +195,9 @@ fn is_rare_frame(segment: &[u8]) -> bool {
     }
 }
 
-/// Whether browsers may turn or scale a picture by EXIF data otherwise than petcomp: by an
-/// orientation of an unusual type, a resolution beside a size, a second block of such data.
+/// Whether browsers may rotate or scale a picture by EXIF data differently from petcomp: by an
+/// orientation of an unusual type, a resolution together with a size, or a second block of such
+/// data.
 fn may_have_exif(bytes: &[u8]) -> bool {
     let mut places = bytes.windows(4);
     places.any(|place| place == b"Exif" || place == b"eXIf")
@@ -266,7 +267,7 @@ mod tests {
         assert_eq!((header.width, header.height), (20, 40));
     }
 
-    /// Encoding 12 megapixels anew took 0.6 s at each opening.
+    /// Re-encoding 12 megapixels took 0.6 s each time the photo was opened.
     #[test]
     fn an_upright_photo_with_exif_data_is_sent_without_them_and_not_encoded_anew() {
         let folder = tempfile::tempdir().unwrap();
@@ -279,7 +280,7 @@ mod tests {
         std::fs::write(&photo, &noted).unwrap();
         assert!(may_have_exif(&noted));
         assert_eq!(body_of(&photo, None), plain);
-        // A preview behind the picture, as many cameras write it.
+        // A preview after the picture, as many cameras write it.
         std::fs::write(&photo, [&noted[..], &noted].concat()).unwrap();
         assert_eq!(body_of(&photo, None), plain);
     }

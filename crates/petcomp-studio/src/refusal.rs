@@ -1,18 +1,18 @@
-//! What a page is told when something cannot be done: a status, and one line.
+//! Errors as pages receive them: a status and one line.
 
 use crate::message::Json;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
 
-/// A request that is refused, and why.
+/// A rejected request, and the reason.
 #[derive(Debug)]
 pub(crate) struct Refusal {
     pub(crate) status: StatusCode,
     pub(crate) what: String,
 }
 
-/// What a route answers.
+/// The result of a route.
 pub(crate) type Answer<T> = Result<T, Refusal>;
 
 impl Refusal {
@@ -21,19 +21,19 @@ impl Refusal {
         Self { status, what }
     }
 
-    /// Not for this caller.
+    /// The caller is not allowed to do this.
     pub(crate) fn forbidden(what: impl Into<String>) -> Self {
         Self::new(StatusCode::FORBIDDEN, what)
     }
 
-    /// The file is another one by now than the page has read.
+    /// The file has changed since the page read it.
     pub(crate) fn stale(name: &str) -> Self {
         let what =
             format!("{name}: has changed since this page loaded it; reload it, or overwrite it");
         Self::new(StatusCode::CONFLICT, what)
     }
 
-    /// A newer request of the same tab takes its place.
+    /// A newer request of the same tab replaces this one.
     pub(crate) fn superseded() -> Self {
         Self::new(StatusCode::GONE, "superseded by a newer request")
     }

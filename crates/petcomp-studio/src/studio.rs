@@ -1,4 +1,4 @@
-//! What all requests share: the folder, and what each room keeps between them.
+//! State shared by all requests: the folder, and what each page keeps between them.
 
 use crate::corners::Corners;
 use crate::dataset::Catalogs;
@@ -8,19 +8,20 @@ use crate::recipe::Recipe;
 use std::sync::atomic::{AtomicU64, Ordering};
 use tokio::sync::Semaphore;
 
-/// Photos that are decoded at a time.
+/// Maximum number of photos decoded at the same time.
 const MAX_DECODING: usize = 2;
 
-/// A number that nothing else of this process has.
+/// A number that is unique in this process.
 pub(crate) fn next_number() -> u64 {
     static NEXT: AtomicU64 = AtomicU64::new(1);
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
-/// The folder that is worked on, and the state of each room.
+/// The studio's folder, and the state of each page.
 pub(crate) struct Studio {
     pub(crate) folder: Folder,
-    /// How many photos may be decoded at a time for pages: a large one takes half a gigabyte.
+    /// Limits how many photos are decoded at the same time for pages: a large one takes half a
+    /// gigabyte.
     pub(crate) decoding: Semaphore,
     pub(crate) corners: Corners,
     pub(crate) mattes: Mattes,

@@ -1,4 +1,4 @@
-//! Heavy work: away from the threads that answer, and given up where a newer request of the same tab
+//! Heavy work: outside the threads that answer, and cancelled if a newer request of the same tab
 //! replaces it.
 
 use crate::refusal::{Answer, Refusal};
@@ -9,10 +9,10 @@ use std::collections::HashMap;
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The header by which a tab says which one it is.
+/// The header with the name of a tab.
 const TAB_HEADER: &str = "x-tab";
 
-/// Runs heavy work where it holds up nobody else.
+/// Runs heavy work on a thread where it blocks no other request.
 pub(crate) async fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> Answer<T> + Send + 'static,
 ) -> Answer<T> {
@@ -25,12 +25,13 @@ fn broken() -> Refusal {
     Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, what)
 }
 
-/// Which tab of the browser asks. What does not say so replaces nothing, and nothing replaces it.
+/// The browser tab of a request. A request without the header replaces nothing and is never
+/// replaced.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct Tab(Option<String>);
 
 impl Tab {
-    /// A part of the tab, whose requests replace each other and none of another part.
+    /// A part of the tab, whose requests replace each other but none of another part.
     pub(crate) fn part(&self, name: &str) -> Self {
         Self(self.0.as_ref().map(|tab| format!("{tab}/{name}")))
     }
@@ -46,8 +47,8 @@ impl<S: Sync> FromRequestParts<S> for Tab {
     }
 }
 
-/// Requests of which only the newest of each tab matters: a slider that moves, a corner that is
-/// dragged.
+/// Requests of which only the newest of each tab matters: from a moving slider, or a dragged
+/// corner.
 #[derive(Clone, Default)]
 pub(crate) struct Turns(Arc<Mutex<HashMap<Tab, u64>>>);
 
@@ -60,7 +61,7 @@ pub(crate) struct Turn {
 }
 
 impl Turns {
-    /// Runs heavy work, unless a newer request of the tab came before it began. Long work asks
+    /// Runs heavy work, unless a newer request of the tab arrives before it begins. Long work calls
     /// [`Turn::check`] now and then.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
@@ -89,7 +90,7 @@ impl Turns {
 
 impl Turn {
     /// # Errors
-    /// [`Refusal::superseded`] where the tab has asked again since.
+    /// [`Refusal::superseded`] if the tab has sent a newer request.
     pub(crate) fn check(&self) -> Answer<()> {
         let newest = self.turns.0.lock().unwrap_or_else(PoisonError::into_inner);
         match newest.get(&self.tab) {

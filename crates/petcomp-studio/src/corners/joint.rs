@@ -1,4 +1,4 @@
-//! Photos of one camera, solved together.
+//! Joint solution of the photos of one camera.
 
 use super::label_file::{labelled, remove_anothers, usable};
 use super::photos::beside;
@@ -9,16 +9,16 @@ use petcomp::{Error, io};
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// What became of one of the photos.
+/// Result for one of the photos.
 #[derive(Default, Serialize)]
 pub(super) struct JointPhoto {
     photo: String,
-    /// How many photos share its camera.
+    /// Number of photos that share its camera.
     together: usize,
     focal_px: Option<f64>,
     focal_sigma: Option<f64>,
     rms_px: Option<f64>,
-    /// Why it has no camera, or what is odd about it.
+    /// Why it has no camera, or a diagnostic about it.
     why: Option<String>,
 }
 
@@ -33,8 +33,9 @@ impl JointPhoto {
     }
 }
 
-/// Solves the labels of photos, those of each camera together and each once, and writes the cameras
-/// that `petcomp camera joint` writes. A label that cannot be read keeps no other from its camera.
+/// Solves the labels of photos, jointly for each camera and each label once, and writes the same
+/// cameras as `petcomp camera joint`. A label that cannot be read does not affect the other
+/// cameras.
 pub(super) fn solve(folder: &Folder, photos: &[String]) -> Answer<Vec<JointPhoto>> {
     let (mut names, mut all, mut solved) = (Vec::new(), Vec::new(), Vec::new());
     for photo in photos.iter().collect::<BTreeSet<_>>() {
@@ -77,15 +78,14 @@ fn solve_group(
         solved.push(written(folder, name, member, outcome, members)?);
     }
     for outlier in &joint.outliers {
-        // Why a photo has no camera at all says more.
+        // The reason for a missing camera takes precedence.
         let why = &mut solved[outlier.photo].why;
         why.get_or_insert_with(|| outlier.diagnostic().to_string());
     }
     Ok(solved)
 }
 
-/// Photos of which none has a camera, each with the reason that its own label gives where that has
-/// one.
+/// Photos that all have no camera, each with the error of its own label, if it has one.
 fn unsolved(
     folder: &Folder,
     names: &[String],
@@ -100,7 +100,7 @@ fn unsolved(
     photos.collect()
 }
 
-/// A photo whose label has no camera that fits; no camera of another label stays beside it.
+/// A photo whose label has no camera that fits; a camera file of another label is removed.
 fn refused(
     folder: &Folder,
     name: &str,
@@ -113,7 +113,7 @@ fn refused(
     Ok(JointPhoto::without_camera(name, together, why))
 }
 
-/// Writes the camera of a photo where it has one that fits.
+/// Writes the camera of a photo if one fits.
 fn written(
     folder: &Folder,
     name: &str,

@@ -1,4 +1,4 @@
-//! Label files: read or begun for a photo, and saved with their cameras.
+//! Label files: read or created for a photo, and saved with their cameras.
 
 use super::photos::{beside, file_name};
 use crate::folder::Folder;
@@ -10,25 +10,25 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
-/// The label of a photo, as its file says it or as it begins.
+/// The label of a photo, from its file or newly created.
 #[derive(Serialize)]
 pub(super) struct LabelFile {
     name: String,
     label: Label,
-    /// The state of the file; none where there is none yet.
+    /// Version of the file; none if there is no file yet.
     version: Option<String>,
-    /// Why the label of the other photo lent nothing.
+    /// Why nothing was copied from the other photo's label.
     remark: Option<String>,
 }
 
-/// Where the label of a photo lies.
+/// Path of a photo's label.
 pub(super) fn path(folder: &Folder, photo: &str) -> Answer<PathBuf> {
     folder.file(photo)?;
     folder.place(&beside(photo, "label.json"))
 }
 
-/// The label of a photo, or a new one, which the label of another photo (`like`) lends what they
-/// share. Where that one cannot be read, the new label begins without it, and says why.
+/// The label of a photo, or a new one with everything that it shares with the label of another
+/// photo (`like`). If that one cannot be read, the new label is created without it, with a remark.
 pub(super) fn read(folder: &Folder, photo: &str, like: Option<&str>) -> Answer<LabelFile> {
     let name = beside(photo, "label.json");
     if let Some(file) = folder.text_if_any(&name)? {
@@ -56,7 +56,7 @@ fn label_of(folder: &Folder, photo: &str) -> Answer<Label> {
     Ok(io::read_json(folder.file(&beside(photo, "label.json"))?)?)
 }
 
-/// What became of a save.
+/// Result of saving a label.
 #[derive(Serialize)]
 pub(super) struct SavedLabel {
     name: String,
@@ -67,9 +67,8 @@ pub(super) struct SavedLabel {
     why: Option<String>,
 }
 
-/// Saves a label, with the remarks that its file has, and then the camera that is solved from it.
-/// A label without a camera is saved, too, and the camera of before removed where it is another
-/// one's.
+/// Saves a label, with the remarks of the existing file, and then the camera that is solved from
+/// it. A label without a camera is saved, too; a camera of another label is then removed.
 pub(super) fn save(
     folder: &Folder,
     photo: &str,
@@ -89,7 +88,7 @@ pub(super) fn save(
     })
 }
 
-/// A label names the photo that it lies beside.
+/// Checks that a label names the photo next to it.
 fn check_photo(label: &Label, photo: &str) -> Answer<()> {
     let (named, file) = (&label.image.file, file_name(photo));
     if named == file {
@@ -100,7 +99,8 @@ fn check_photo(label: &Label, photo: &str) -> Answer<()> {
     Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
 }
 
-/// The text of a label as `petcomp camera init` writes it; remarks of the file that is there stay.
+/// The text of a label in the format of `petcomp camera init`, with the remarks of the existing
+/// file.
 fn text_of(folder: &Folder, name: &str, label: &Label) -> Answer<String> {
     let text = camera::commented(label)?;
     match stored_remarks(folder, name)? {
@@ -124,8 +124,8 @@ fn with_remarks(text: &str, remarks: Value) -> serde_json::Result<String> {
     Ok(camera::with_folded_lists(&text) + "\n")
 }
 
-/// What a person has written for persons: keys that begin with `_`, and the tables and lists that
-/// they are in. `_todo` is petcomp's own.
+/// Remarks that a person has written: keys that begin with `_`, and the tables and lists that
+/// contain them. `_todo` is petcomp's own.
 fn remarks_of(value: Value) -> Value {
     match value {
         Value::Object(table) => Value::Object(table.into_iter().filter_map(remark_at).collect()),
@@ -134,7 +134,7 @@ fn remarks_of(value: Value) -> Value {
     }
 }
 
-/// A key that is a remark, or has remarks in it.
+/// A key that is a remark or contains remarks.
 fn remark_at((key, value): (String, Value)) -> Option<(String, Value)> {
     if key.starts_with('_') && key != "_todo" {
         return Some((key, value));
@@ -151,7 +151,7 @@ fn is_without_remarks(remarks: &Value) -> bool {
     }
 }
 
-/// Puts remarks where they were; not into a list of another length, whose items are others.
+/// Merges remarks back to their positions; not into a list of another length, whose items differ.
 fn merge(label: &mut Value, remarks: Value) {
     match (label, remarks) {
         (Value::Object(label), Value::Object(remarks)) => merge_tables(label, remarks),
@@ -174,8 +174,8 @@ fn merge_tables(label: &mut Map<String, Value>, remarks: Map<String, Value>) {
     }
 }
 
-/// Solves the label of a photo and writes the camera beside it, as `petcomp camera solve` does.
-/// Where none fits, no camera of another label stays there.
+/// Solves the label of a photo and writes the camera next to it, as `petcomp camera solve` does. If
+/// none fits, a camera of another label is removed.
 fn write_camera(folder: &Folder, photo: &str) -> Answer<String> {
     let name = beside(photo, "camera.json");
     let place = folder.place(&name)?;
@@ -192,7 +192,8 @@ fn write_camera(folder: &Folder, photo: &str) -> Answer<String> {
     }
 }
 
-/// Removes the camera beside a label unless it was solved from that: alone, or with `--force`.
+/// Removes the camera next to a label unless it was solved from that label: alone, or with
+/// `--force`.
 pub(super) fn remove_anothers(folder: &Folder, photo: &str, label: &LabelledPhoto) -> Answer<()> {
     let name = beside(photo, "camera.json");
     let place = folder.place(&name)?;
@@ -226,7 +227,7 @@ pub(super) fn labelled(folder: &Folder, photo: &str) -> Answer<LabelledPhoto> {
     }
 }
 
-/// A camera that fits its label and can see objects on the surface.
+/// Checks that a camera fits its label and can see objects on the surface.
 pub(super) fn usable(outcome: Result<Solution, SolveError>) -> petcomp::Result<Solution> {
     let solution = outcome.and_then(Solution::fitting)?;
     camera::check_distance(&solution)?;

@@ -1,4 +1,4 @@
-//! The page `corners`: four clicks on a photo become a label, and its camera is seen at once.
+//! The page `corners`: four clicks on a photo become a label, and its camera is shown immediately.
 
 mod joint;
 mod label_file;
@@ -56,7 +56,7 @@ async fn list_photos(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<Photo
 #[derive(Deserialize)]
 struct LabelQuery {
     photo: String,
-    /// Another photo of the same rectangle: its label lends size, markers and camera.
+    /// Another photo of the same rectangle, from whose label size, markers and camera are copied.
     like: Option<String>,
 }
 
@@ -109,7 +109,7 @@ async fn snap(
     .await
 }
 
-/// Markers in a photo, and the label with their corners where it knows where they lie.
+/// Markers in a photo, and the label with their corners if it contains their positions.
 #[derive(Serialize)]
 struct FoundMarkers {
     markers: Vec<FoundMarker>,
@@ -152,7 +152,7 @@ async fn find_markers(
 struct NewLabel {
     photo: String,
     label: Label,
-    /// The state of the file that the page read; none: there was none.
+    /// Version of the file that the page read; none if there was no file.
     version: Option<String>,
 }
 
@@ -181,14 +181,14 @@ async fn solve_together(
 }
 
 impl Studio {
-    /// A photo of the folder, the last one read again only when its file has changed.
+    /// A photo of the folder; the most recent one is read again only if its file has changed.
     pub(crate) fn photo(&self, name: &str) -> Answer<Arc<Image<LinearRgb>>> {
         let path = self.folder.file(name)?;
         Ok(self.corners.photo.read(&path)?)
     }
 }
 
-/// The photo that was read last: a person stays with one for a while.
+/// The most recently read photo: users work on one for a while.
 #[derive(Default)]
 struct PhotoCache(Mutex<Option<CachedPhoto>>);
 

@@ -7,25 +7,27 @@ use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeSet;
 
-/// A photo, and how far it is.
+/// A photo and its progress.
 #[derive(Serialize)]
 pub(super) struct PhotoProgress {
     /// Its path with slashes.
     photo: String,
     label: bool,
     camera: bool,
-    /// The label beside it is another photo's.
+    /// Whether the label next to it is another photo's.
     taken: bool,
 }
 
-/// All photos below a folder, in order of name; those of objects, which a list names, come last.
+/// All photos below a folder, sorted by name; photos of objects, from folders with a list, come
+/// last.
 pub(super) fn list(folder: &Folder) -> Vec<PhotoProgress> {
     let json = folder.find(|path| path.extension().is_some_and(|ending| ending == "json"));
     let documents: BTreeSet<String> = json.into_iter().collect();
     let entry = |photo: String| {
         let label = beside(&photo, "label.json");
         let has_label = documents.contains(&label);
-        // Of photos that differ in their endings alone, the label and its camera are of one.
+        // If photos differ only in their extensions, the label and its camera belong to one of
+        // them.
         let is_anothers = has_label && names_another(folder, &label, &photo);
         PhotoProgress {
             label: has_label && !is_anothers,
@@ -48,8 +50,8 @@ fn photos_of_places_first(folder: &Folder) -> Vec<String> {
     photos
 }
 
-/// Whether the label beside a photo is of another one. Of one that cannot be read nobody knows: it
-/// stays with the photo, whose page says what is wrong with it.
+/// Whether the label next to a photo is another photo's. One that cannot be read counts as the
+/// photo's own: the photo's page then reports what is wrong with it.
 fn names_another(folder: &Folder, label: &str, photo: &str) -> bool {
     let path = folder.file(label).ok();
     let label = path.and_then(|path| io::read_json::<Value>(path).ok());
@@ -59,12 +61,12 @@ fn names_another(folder: &Folder, label: &str, photo: &str) -> bool {
     named.is_some_and(|named| !named.is_empty() && named != file_name(photo))
 }
 
-/// `a.jpg` of `sub/a.jpg`: what the label beside it calls it.
+/// `a.jpg` for `sub/a.jpg`: the photo's name in the label next to it.
 pub(super) fn file_name(photo: &str) -> &str {
     photo.rsplit('/').next().unwrap_or(photo)
 }
 
-/// `sub/a.label.json` of `sub/a.jpg`.
+/// `sub/a.label.json` for `sub/a.jpg`.
 pub(super) fn beside(photo: &str, ending: &str) -> String {
     let file = photo.rfind('/').map_or(0, |slash| slash + 1);
     let end = photo[file..].rfind('.').filter(|&dot| dot > 0);

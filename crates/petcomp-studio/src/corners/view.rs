@@ -1,34 +1,33 @@
-//! A solved camera as a person sees it: numbers with their errors, lines over the photo, advice in
-//! words.
+//! A solved camera for display: numbers with their errors, lines over the photo, advice in words.
 
 use crate::refusal::Answer;
 use petcomp::Error;
 use petcomp::camera::{self, Label, Sketch, Solution, SolveOptions};
 use serde::Serialize;
 
-/// A camera, and what to think of it.
+/// A camera and its assessment.
 #[derive(Serialize)]
 pub(super) struct CameraSummary {
-    /// Height of the lens over the surface, metres, and its standard deviation.
+    /// Height of the lens above the surface, metres, and its standard deviation.
     height: [f64; 2],
     /// Tilt from straight down, degrees.
     tilt_deg: [f64; 2],
-    /// Focal length, pixels; its error is relative, none where nothing constrains it.
+    /// Focal length, pixels; its error is relative, none if nothing constrains it.
     focal_px: f64,
     focal_sigma: Option<f64>,
-    /// How far the corners, or points where those alone are labelled, are from where the camera sees
-    /// them: root mean square, and of each corner, pixels.
+    /// Reprojection error of the corners, or of the points if only those are labelled: root mean
+    /// square, and for each corner, pixels.
     rms_px: f64,
     per_corner_px: Option<[f64; 4]>,
     /// Width and height of the rectangle, metres.
     size: [f64; 2],
     px_per_metre: f64,
-    /// How far off points are drawn at `sketch.wall_height`, pixels.
+    /// Reprojection error of points at `sketch.wall_height`, pixels.
     height_px: f64,
     reference_height: f64,
     /// Why this camera cannot be used.
     misfit: Option<String>,
-    /// The doctor's lines.
+    /// The lines of `petcomp camera doctor`.
     advice: Vec<String>,
     sketch: Sketch,
 }
@@ -70,13 +69,13 @@ impl CameraSummary {
     }
 }
 
-/// Height of the lens over the surface and its standard deviation, metres.
+/// Height of the lens above the surface and its standard deviation, metres.
 fn height_of(solution: &Solution) -> [f64; 2] {
     let variance = solution.sigma.center[(2, 2)];
     [solution.camera.center().z, variance.max(0.0).sqrt()]
 }
 
-/// The height of the walls that the label states, metres.
+/// The height of the walls from the label, metres.
 fn wall_height(label: &Label) -> Option<f64> {
     let height = label.surface.wall?.height_m?;
     Some(height).filter(|height| height.is_finite() && *height > 0.0)

@@ -1,4 +1,4 @@
-//! Folders that were listed, and what was read of their pictures so far.
+//! Listed folders, and what was read of their pictures so far.
 
 use crate::folder::Folder;
 use crate::refusal::{Answer, Refusal};
@@ -10,15 +10,15 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// Listings that are kept: two beside each other in each of two tabs, and two before.
+/// Maximum number of listings kept: two side by side in each of two tabs, and two previous ones.
 const KEPT: usize = 6;
 
-/// The listings of folders that were used last, the latest at the end.
+/// The most recently used listings of folders, the latest at the end.
 #[derive(Default)]
 pub(crate) struct Catalogs(Mutex<VecDeque<(String, Arc<Catalog>)>>);
 
 impl Catalogs {
-    /// Lists a folder, anew if it was listed before: rows of that listing stay what they were.
+    /// Lists a folder, again if it was listed before; rows of the earlier listing stay valid.
     pub(super) fn open(&self, folder: &Folder, name: &str) -> Answer<Arc<Catalog>> {
         let index = DatasetIndex::open(&folder.folder(name)?)?;
         let catalog = Arc::new(Catalog::new(index));
@@ -30,7 +30,7 @@ impl Catalogs {
         Ok(catalog)
     }
 
-    /// A folder as one of its listings has it; without a number, the one that was used last.
+    /// A listing of a folder by its number; without a number, the most recently used one.
     pub(super) fn get(
         &self,
         folder: &Folder,
@@ -66,9 +66,9 @@ fn forgotten(name: &str) -> Refusal {
     Refusal::new(StatusCode::NOT_FOUND, what)
 }
 
-/// A folder's pictures, as they were listed.
+/// The pictures of a folder when it was listed.
 pub(super) struct Catalog {
-    /// Number of the listing: the same folder has another one when it is listed again.
+    /// Number of the listing: listing the same folder again gives another number.
     pub(super) listing: u64,
     pub(super) index: DatasetIndex,
     /// None for a picture whose record cannot be read.
@@ -77,7 +77,7 @@ pub(super) struct Catalog {
     is_reading: AtomicBool,
 }
 
-/// A picture as a list shows it.
+/// A picture as shown in a list.
 #[derive(Debug, Serialize)]
 pub(super) struct Row {
     row: usize,
@@ -88,21 +88,21 @@ pub(super) struct Row {
     flags: Vec<Flag>,
 }
 
-/// What somebody may want to look at.
+/// Reasons to look at a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Flag {
-    /// Objects lie over each other in a circle.
+    /// Objects lie on top of each other in a cycle.
     Knotted,
     /// A scene was rejected before this one.
     Rejected,
     /// There is no object.
     Empty,
-    /// There are objects, and none has a label.
+    /// There are objects, but none has a label.
     Unlabelled,
-    /// Objects without a class are in the way.
+    /// There are objects without a class.
     Distractors,
-    /// What was written of it cannot be read.
+    /// Its record cannot be read.
     Unreadable,
 }
 
@@ -117,7 +117,7 @@ impl Catalog {
         }
     }
 
-    /// A row that there is.
+    /// Checks that a row exists.
     pub(super) fn checked(&self, row: usize) -> Answer<usize> {
         let count = self.index.pictures.len();
         if row < count {
@@ -127,7 +127,7 @@ impl Catalog {
         Err(Refusal::new(StatusCode::NOT_FOUND, what))
     }
 
-    /// What is in a picture; read now if it was not before, none where it cannot be.
+    /// The contents of a picture, read now if necessary; none if they cannot be read.
     pub(super) fn facts(&self, row: usize) -> Option<&PictureFacts> {
         let facts = self.facts[row].get_or_init(|| {
             self.read.fetch_add(1, Ordering::Relaxed);
@@ -137,17 +137,17 @@ impl Catalog {
         facts.as_ref()
     }
 
-    /// What is known of a picture without reading anything; none where it is not known yet.
+    /// The contents of a picture, without reading anything; none if not read yet.
     pub(super) fn known(&self, row: usize) -> Option<&Option<PictureFacts>> {
         self.facts[row].get()
     }
 
-    /// How many pictures were read.
+    /// Number of pictures read so far.
     pub(super) fn read_count(&self) -> usize {
         self.read.load(Ordering::Relaxed)
     }
 
-    /// Reads all that was not read, while others look at what is known.
+    /// Reads all remaining pictures, while what is known can already be used.
     pub(super) fn read_in_background(self: &Arc<Self>) {
         let is_done = self.read_count() == self.index.pictures.len();
         if is_done || self.is_reading.swap(true, Ordering::Relaxed) {
@@ -156,7 +156,7 @@ impl Catalog {
         let catalog = Arc::downgrade(self);
         tokio::task::spawn_blocking(move || {
             let mut row = 0;
-            // Ends where the listing is not kept any more.
+            // Ends when the listing is dropped.
             while let Some(catalog) = catalog.upgrade() {
                 if row == catalog.index.pictures.len() {
                     break;
@@ -167,7 +167,7 @@ impl Catalog {
         });
     }
 
-    /// Photos of the place in the pictures that were read.
+    /// Photos of the place in the pictures read so far.
     pub(super) fn backgrounds(&self) -> BTreeSet<String> {
         let known = self.facts.iter().filter_map(|facts| facts.get()?.as_ref());
         let named = known.filter(|facts| !facts.background.is_empty());
@@ -188,7 +188,7 @@ impl Catalog {
         })
     }
 
-    /// The flags of a picture, as far as they are known.
+    /// The known flags of a picture.
     pub(super) fn flags(&self, row: usize) -> Vec<Flag> {
         let all = [
             Flag::Knotted,
@@ -204,7 +204,7 @@ impl Catalog {
             .collect()
     }
 
-    /// Whether a picture has a flag; none where that is not known yet.
+    /// Whether a picture has a flag; none if that is not known yet.
     pub(super) fn has_flag(&self, row: usize, flag: Flag) -> Option<bool> {
         let written = self.index.pictures[row].written.as_ref();
         match flag {
@@ -219,7 +219,7 @@ impl Catalog {
         }
     }
 
-    /// How many objects and labels a picture has; none where that is not known yet.
+    /// Numbers of objects and labels of a picture; none if not known yet.
     pub(super) fn counts(&self, row: usize) -> Option<[usize; 2]> {
         if let Some(written) = &self.index.pictures[row].written {
             return Some([0, 1].map(|which| written.count(which) as usize));
@@ -228,7 +228,8 @@ impl Catalog {
         Some([facts.objects.len(); 2])
     }
 
-    /// Something that only the record tells: false where that cannot be read, none before it was.
+    /// A property that only the record contains: false if it cannot be read, none before it was
+    /// read.
     pub(super) fn of_facts(
         &self,
         row: usize,

@@ -1,4 +1,4 @@
-//! Which pictures are wanted, and in which order.
+//! Selection and order of pictures.
 
 use super::catalog::{Catalog, Flag};
 use petcomp::dataset::Part;
@@ -6,42 +6,42 @@ use petcomp::dataset::index::{DatasetIndex, ObjectFacts};
 use serde::Deserialize;
 use std::cmp::Reverse;
 
-/// What a picture must have; nothing is asked by default.
+/// Conditions on a picture; by default there are none.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct Filter {
     part: Option<Part>,
     /// An object of this class.
     class: Option<u32>,
-    /// That object has a label, or none.
+    /// That object has a label, or has none.
     labelled: Option<bool>,
-    /// That object is seen by shares in this range, 0 to 1.
+    /// That object's visible share is in this range, 0 to 1.
     visible: Option<[f32; 2]>,
-    /// So many objects, both ends included.
+    /// A number of objects in this range, both ends included.
     objects: Option<[usize; 2]>,
     /// This photo of the place.
     background: Option<String>,
     flag: Option<Flag>,
 }
 
-/// In which order pictures are shown.
+/// Order of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Order {
-    /// As they are listed.
+    /// As listed.
     Listed,
-    /// The strangest first, and only what is unlike the rest.
+    /// The most unusual first, and only unusual ones.
     Unlike,
     /// Those with most objects first.
     MostObjects,
     /// Those with fewest objects first.
     FewestObjects,
-    /// Those with an object that is hidden most first.
+    /// Those with the least visible object first.
     LeastVisible,
 }
 
 impl Order {
-    /// It takes what the records say and the list does not.
+    /// Whether it needs facts that only the records contain, not the list.
     pub(super) fn needs_facts(self, index: &DatasetIndex) -> bool {
         match self {
             Self::Listed => false,
@@ -52,7 +52,7 @@ impl Order {
 }
 
 impl Filter {
-    /// It takes what the records say and the list does not.
+    /// Whether it needs facts that only the records contain, not the list.
     pub(super) fn needs_facts(&self, index: &DatasetIndex) -> bool {
         let by_count = self.objects.is_some() || self.flag.is_some() || self.class.is_some();
         self.visible.is_some()
@@ -62,7 +62,7 @@ impl Filter {
             || (by_count && !lists_objects(index))
     }
 
-    /// Whether a picture is wanted; none where that is not known yet.
+    /// Whether a picture passes the filter; none if that is not known yet.
     fn admits(&self, catalog: &Catalog, row: usize) -> Option<bool> {
         let picture = &catalog.index.pictures[row];
         let asked = [
@@ -106,19 +106,19 @@ impl Filter {
     }
 }
 
-/// Whether the list says how many objects each picture has.
+/// Whether the list contains the number of objects of each picture.
 fn lists_objects(index: &DatasetIndex) -> bool {
     let mut pictures = index.pictures.iter();
     pictures.all(|picture| picture.written.is_some())
 }
 
-/// Whether a picture has so many objects, both ends included; none where that is not known yet.
+/// Whether a picture's number of objects is in a range, both ends included; none if not known yet.
 fn has_count(catalog: &Catalog, row: usize, [least, most]: [usize; 2]) -> Option<bool> {
     let [objects, _] = catalog.counts(row)?;
     Some((least..=most).contains(&objects))
 }
 
-/// The rows that are known to be wanted, and why they are unlike others where that is asked.
+/// The rows known to pass the filter; for [`Order::Unlike`], also why each is unlike the others.
 pub(super) fn found(catalog: &Catalog, filter: &Filter, order: Order) -> (Vec<usize>, Vec<String>) {
     let admitted = |row: &usize| filter.admits(catalog, *row) == Some(true);
     if order == Order::Unlike {
@@ -144,7 +144,7 @@ fn sort(rows: &mut [usize], catalog: &Catalog, order: Order) {
     }
 }
 
-/// Seen share of the object that is hidden most.
+/// Visible share of the object that is hidden most.
 fn least_visible(catalog: &Catalog, row: usize) -> f32 {
     let facts = catalog.known(row).and_then(Option::as_ref);
     let objects = facts.iter().flat_map(|facts| &facts.objects);

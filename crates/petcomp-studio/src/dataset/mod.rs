@@ -1,7 +1,7 @@
-//! The page `dataset`: its pictures with what is known of them, however many there are.
+//! The page `dataset`: its pictures and what is known about them, in any number.
 //!
-//! A folder is listed when it is opened; what is in a picture is read once somebody looks at it, or
-//! asks for something that only the records of all pictures can answer.
+//! A folder is listed when it is opened; a picture's record is read when somebody looks at the
+//! picture or asks for something that needs the records of all pictures.
 
 mod catalog;
 mod filter;
@@ -32,7 +32,7 @@ use std::sync::Arc;
 
 pub(crate) const PAGES: &[Page] = &[crate::page!("dataset.html"), crate::page!("dataset.js")];
 
-/// Most rows that are answered at a time: more than fit on any screen.
+/// Maximum number of rows in an answer: more than fit on any screen.
 const MAX_ROWS: usize = 500;
 
 pub(crate) fn routes() -> Router<Arc<Studio>> {
@@ -45,7 +45,7 @@ pub(crate) fn routes() -> Router<Arc<Studio>> {
         .route("/picture", get(picture))
 }
 
-/// Folders to look at: datasets, and what holds images outside of them.
+/// Folders to open: datasets, and folders with images outside of them.
 async fn folders(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<String>>> {
     blocking(move || Ok(Json(folders_of(&studio.folder)))).await
 }
@@ -59,13 +59,13 @@ fn folders_of(folder: &Folder) -> Vec<String> {
     folders
 }
 
-/// The folders that files lie in.
+/// The folders that contain files.
 fn parents(files: &[String]) -> BTreeSet<String> {
     let folders = files.iter().map(|file| parent_of(file));
     folders.map(str::to_owned).collect()
 }
 
-/// Whether a folder is another one, or lies below it.
+/// Whether a folder is the same as another one or below it.
 fn is_within(name: &str, outer: &str) -> bool {
     let rest = name.strip_prefix(outer);
     outer.is_empty() || rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
@@ -76,14 +76,14 @@ struct FolderName {
     folder: String,
 }
 
-/// A folder as it was listed.
+/// A folder when it was listed.
 #[derive(Serialize)]
 struct ListedFolder {
-    /// What tells its rows from those of another time.
+    /// Distinguishes its rows from those of other listings.
     listing: u64,
     count: usize,
     classes: Vec<String>,
-    /// Whether petcomp made it, and wrote down everything.
+    /// Whether petcomp generated it, with a record of everything.
     has_records: bool,
 }
 
@@ -117,21 +117,21 @@ impl Studio {
 #[derive(Deserialize)]
 struct RowSearch {
     folder: String,
-    /// Number of one of its listings; without it the one that was used last.
+    /// Number of one of its listings; by default the most recently used one.
     listing: Option<u64>,
     filter: Filter,
     order: Order,
 }
 
-/// The pictures that are wanted, as far as they are known.
+/// The selected pictures, as far as known.
 #[derive(Serialize)]
 struct FoundRows {
     rows: Vec<usize>,
     /// Why a picture is unlike the others, in the order of the rows.
     why: Vec<String>,
-    /// Photos of the place that were seen so far.
+    /// Photos of the place seen so far.
     backgrounds: BTreeSet<String>,
-    /// So many pictures were read of so many that must be; equal once the rows are final.
+    /// Number of pictures read and number to read; once they are equal, the rows are final.
     read: usize,
     of: usize,
 }
@@ -185,7 +185,7 @@ struct OneRow {
     folder: String,
     listing: Option<u64>,
     row: usize,
-    /// Longer side of a small picture, pixels; all of it without it.
+    /// Longer side of a small picture, pixels; by default the full size.
     side: Option<usize>,
 }
 
@@ -216,7 +216,7 @@ async fn picture(
     Ok(([(CACHE_CONTROL, "private, max-age=300")], response).into_response())
 }
 
-/// The file of a picture, which a list may say to be anywhere.
+/// The file of a picture; a list may name one anywhere.
 fn picture_file(folder: &Folder, catalog: &Catalog, row: usize) -> Answer<PathBuf> {
     let file = catalog.index.file(catalog.checked(row)?)?;
     if folder.holds(&file) {

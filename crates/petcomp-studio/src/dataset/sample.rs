@@ -1,4 +1,4 @@
-//! A picture with everything that is known of it, as the page draws it.
+//! A picture with everything known about it, as the page shows it.
 
 use crate::refusal::Answer;
 use petcomp::dataset::index::DatasetIndex;
@@ -9,42 +9,42 @@ use petcomp::{ObjectId, io};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// A picture and what is in it.
+/// A picture and its contents.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct SampleShown {
     name: String,
-    /// Its file, below the dataset's folder.
+    /// Its file, relative to the dataset's folder.
     file: String,
     /// Width and height, pixels.
     image: [u32; 2],
     background: String,
     objects: Vec<ObjectShown>,
-    /// Boxes of what is in the way and has no label.
+    /// Boxes of distractors, which have no label.
     distractors: Vec<[f64; 4]>,
     knotted: Vec<ObjectId>,
     /// Why scenes before this one were rejected.
     rejected: Vec<String>,
-    /// Every drawn value by its name.
+    /// Every drawn value by name.
     draws: BTreeMap<String, f64>,
 }
 
-/// An object in it; places in pixels.
+/// An object in the picture; coordinates in pixels.
 #[derive(Debug, Default, Serialize)]
 struct ObjectShown {
     id: u32,
     class: u32,
-    /// The asset that it shows; empty where that is not known.
+    /// Its asset; empty if unknown.
     asset: String,
-    /// Left, top, right and bottom of its label; of the whole object where it has none.
+    /// Left, top, right and bottom of its label; of the whole object if it has none.
     bbox: [f64; 4],
-    /// The same of what is seen of it.
+    /// The same for its visible part.
     visible_box: Option<[f64; 4]>,
     outline: Vec<Vec<[f64; 2]>>,
-    /// Runs of pixels that show it, column by column, the first outside.
+    /// Run lengths of its mask, column by column, starting with the outside.
     mask: Vec<u32>,
     visible: Option<f64>,
     covered_by: Vec<ObjectId>,
-    /// Why it has no label; none where it has one.
+    /// Why it has no label; none if it has one.
     unlabelled: Option<&'static str>,
 }
 
@@ -87,7 +87,7 @@ impl SampleShown {
         }
     }
 
-    /// Of a picture from elsewhere, which has boxes at most.
+    /// For a picture from another source, which has at most boxes.
     fn of_boxes(index: &DatasetIndex, row: usize) -> Answer<Self> {
         let header = io::read_header(index.file(row)?)?;
         let image = [header.width as u32, header.height as u32];

@@ -1,4 +1,4 @@
-//! The photos that can be cut out: the entries of the folder's lists.
+//! The photos that can be cut out: the entries of the folder's photo lists.
 
 use super::review::review_of;
 use crate::folder::Folder;
@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-/// An entry of a list: where that is and which photo it names, with slashes from the folder.
+/// An entry of a list: the list's file and the photo's, with slashes, relative to the folder.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 pub(super) struct EntryName {
     list: String,
@@ -24,7 +24,7 @@ pub(super) struct EntryName {
 }
 
 impl EntryName {
-    /// The entry, its paths below the folder, and how its list has it cut out.
+    /// The entry, with its paths inside the folder, and its list's options for cutting it out.
     pub(super) fn find(&self, folder: &Folder) -> Answer<(PhotoEntry, CutOutOptions)> {
         let list = read_list(folder, &self.list)?;
         let mut entries = list.photos.into_iter();
@@ -39,19 +39,19 @@ fn missing(EntryName { list, photo }: &EntryName) -> Refusal {
     Refusal::new(StatusCode::NOT_FOUND, petcomp::printable(&what))
 }
 
-/// A list with paths from the working folder.
+/// A list with paths relative to the working folder.
 fn read_list(folder: &Folder, name: &str) -> Answer<List> {
     let path = folder.file(name)?;
     let list = List::read(&path)?;
     Ok(list.located_in(path.parent().unwrap_or(Path::new(""))))
 }
 
-/// The photo of an entry, as browsers say it.
+/// The photo of an entry, as browsers name it.
 fn photo_name(folder: &Folder, entry: &PhotoEntry) -> String {
     folder.name_of_listed(&entry.file)
 }
 
-/// An entry whose pictures lie in the folder.
+/// An entry, if its pictures are in the folder.
 fn inside(folder: &Folder, mut entry: PhotoEntry) -> Answer<PhotoEntry> {
     entry.file = folder.file(&photo_name(folder, &entry))?;
     if let ScreenSource::Photo(empty) = &entry.screen {
@@ -61,17 +61,17 @@ fn inside(folder: &Folder, mut entry: PhotoEntry) -> Answer<PhotoEntry> {
     Ok(entry)
 }
 
-/// What can be looked at.
+/// The photos and plates to choose from.
 #[derive(Serialize)]
 pub(super) struct Photos {
     photos: Vec<ListedPhoto>,
-    /// Lists that cannot be used, and why.
+    /// Lists that cannot be used, with the reason.
     problems: Vec<String>,
-    /// Labelled photos of places to put cut-outs into.
+    /// Labelled photos of places to composite cut-outs onto.
     plates: Vec<String>,
 }
 
-/// A photo of a list, and what was said of its cut-out.
+/// A photo of a list, and the review of its cut-out.
 #[derive(Serialize)]
 struct ListedPhoto {
     list: String,
@@ -95,7 +95,7 @@ impl Photos {
                 Err(refusal) => problems.push(refusal.what),
             }
         }
-        // What is said of a photo holds for all that it is listed for.
+        // The review of a photo applies to all its entries.
         let mut seen = BTreeSet::new();
         photos.retain(|listed: &ListedPhoto| seen.insert(listed.photo.clone()));
         Self {
@@ -123,7 +123,7 @@ fn listed(folder: &Folder, list: &str, read: &List) -> Vec<ListedPhoto> {
     listed.collect()
 }
 
-/// The photos that have a label beside them.
+/// The photos with a label next to them.
 fn plates(folder: &Folder) -> Vec<String> {
     let photos = crate::photos::photos(folder).into_iter();
     let is_labelled = |photo: &String| {

@@ -1,4 +1,4 @@
-//! Layers: a cut-out as it is looked at, each as large as the photo.
+//! Layers: views of a cut-out, each as large as the photo.
 
 use super::solve::{ShownCut, Solved};
 use crate::message::Query;
@@ -15,14 +15,14 @@ use serde::Deserialize;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Longer side of a layer, at most, pixels: what a screen shows.
+/// Maximum longer side of a layer, pixels: the size of a screen.
 const SHOWN_SIDE_PX: usize = 1600;
 /// Side of a square of the checkerboard, pixels, and its two greys, scene-linear.
 const CHECK_PX: usize = 12;
 const CHECKS: [f32; 2] = [0.18, 0.36];
-/// Expected error of the transmittance that is shown brightest.
+/// Expected error of the transmittance that has the brightest colour.
 const LARGEST_UNCERTAINTY: f32 = 0.5;
-/// What shows no error, a middling one and the largest, display-encoded, 0 to 255.
+/// Colours for no error, a medium and the largest one, display-encoded, 0 to 255.
 const HEAT: [[f32; 3]; 3] = [
     [16.0, 18.0, 24.0],
     [196.0, 64.0, 40.0],
@@ -31,14 +31,14 @@ const HEAT: [[f32; 3]; 3] = [
 
 #[derive(Deserialize)]
 pub(super) struct LayerQuery {
-    /// Of the solved cut-out.
+    /// Number of the solved cut-out.
     number: u64,
     layer: Layer,
-    /// What it is put into, for the layer `plate`.
+    /// The photo to composite it onto, for the layer `plate`.
     plate: Option<String>,
 }
 
-/// What is shown.
+/// The kinds of layers.
 #[derive(Clone, Copy, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Layer {
@@ -50,13 +50,13 @@ enum Layer {
     Black,
     /// Over white.
     White,
-    /// Over a photo of a place, or over the even screen where there is none.
+    /// Over a photo of a place, or over the uniform screen without one.
     Plate,
-    /// Opacity: white hides.
+    /// Opacity: white is opaque.
     Matte,
-    /// Transmittance along the line of sight, in its colour.
+    /// Transmittance along the line of sight, in colour.
     Transmittance,
-    /// How far that may be off.
+    /// Expected error of the transmittance.
     Uncertainty,
 }
 
@@ -87,7 +87,7 @@ fn shown(solved: &Solved, layer: Layer, plate: Option<&Path>) -> Answer<Response
     }
 }
 
-/// The cut-out over what a layer has behind it.
+/// The cut-out over a layer's background.
 fn over(
     canvas: &Canvas,
     cut: &ShownCut,
@@ -137,11 +137,11 @@ fn shade(channels: [f32; 3]) -> Srgb8 {
     Srgb8 { r, g, b }
 }
 
-/// The photo's rectangle at the size that is shown.
+/// The photo's rectangle at the size of the layer.
 struct Canvas {
     width: usize,
     height: usize,
-    /// Pixels of the canvas for one of the photo.
+    /// Pixels of the canvas per pixel of the photo.
     scale: f64,
 }
 
@@ -160,7 +160,7 @@ impl Canvas {
         self.placed(&cut.film, cut.roi)
     }
 
-    /// A picture of a part of the photo, in its place.
+    /// A picture of a part of the photo, at its position.
     fn placed<P: Mix>(&self, part: &Image<P>, roi: Roi) -> Image<P> {
         let roi = self.scaled(roi);
         let part = filter::resize(part, roi.width.max(1), roi.height.max(1));
@@ -183,7 +183,7 @@ impl Canvas {
         )
     }
 
-    /// The middle of a picture, as large as the canvas.
+    /// The middle of a picture, cropped to cover the canvas.
     fn covered(&self, picture: &Image<LinearRgb>) -> Image<LinearRgb> {
         let (w, h) = picture.size();
         let times = (self.width as f64 / w as f64).max(self.height as f64 / h as f64);

@@ -1,4 +1,4 @@
-//! The page `mattes`: each photo of a list with its cut-out, and strokes that correct it.
+//! The page `mattes`: each photo of a list with its cut-out, and strokes to correct it.
 
 mod entry;
 mod layer;

@@ -1,4 +1,4 @@
-//! What a person said of a cut-out: read when a photo is shown, saved whenever it changes.
+//! Reviews of cut-outs: read when a photo is shown, saved whenever they change.
 
 use crate::folder::Folder;
 use crate::message::{Json, Query};
@@ -13,14 +13,14 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 
-/// A review as the page has it.
+/// A review as sent to the page.
 #[derive(Serialize)]
 pub(super) struct ReadReview {
-    /// Width and height of what was painted on, pixels; none where there is no file yet.
+    /// Width and height of the picture painted on, pixels; none if there is no file yet.
     size: Option<[usize; 2]>,
     strokes: Vec<Stroke>,
     verdict: Option<Verdict>,
-    /// None where there is no file yet.
+    /// None if there is no file yet.
     version: Option<String>,
 }
 
@@ -42,7 +42,7 @@ fn read_review(folder: &Folder, photo: &str) -> Answer<ReadReview> {
     })
 }
 
-/// What was said of a photo, or a review that says nothing; one that a link leads to elsewhere is none.
+/// The review of a photo, or an empty one; a link to a review outside the folder counts as none.
 pub(super) fn review_of(folder: &Folder, photo: &str) -> Answer<Review> {
     let photo_path = folder.file(photo)?;
     match folder.file(&review_name(photo)) {
@@ -56,18 +56,18 @@ fn review_name(photo: &str) -> String {
     path.to_string_lossy().into_owned()
 }
 
-/// What the page has of a review.
+/// A review as received from the page.
 #[derive(Deserialize)]
 pub(super) struct ChangedReview {
     photo: String,
     size: [usize; 2],
     strokes: Vec<Stroke>,
     verdict: Option<Verdict>,
-    /// That of the file when the page read it.
+    /// Version of the file when the page read it.
     version: Option<String>,
 }
 
-/// Where a review was saved.
+/// The saved review.
 #[derive(Serialize)]
 pub(super) struct SavedReview {
     file: String,

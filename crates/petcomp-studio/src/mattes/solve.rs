@@ -1,4 +1,4 @@
-//! Cutting out: photos that are open, and the cut-outs that were made of them last.
+//! Cutting out: the open photos, and their most recent cut-outs.
 
 use super::entry::EntryName;
 use crate::folder::Folder;
@@ -18,9 +18,9 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-/// Photos that are kept in memory: one that is worked on, and its neighbour.
+/// Number of photos kept in memory: the current one, and its neighbour.
 const OPEN_PHOTOS: usize = 2;
-/// Cut-outs that are kept until their layers are asked for: a few tabs' worth.
+/// Number of cut-outs kept until their layers are requested: enough for a few tabs.
 const SOLVED: usize = 6;
 
 /// What the page keeps between requests.
@@ -31,7 +31,7 @@ pub(crate) struct Mattes {
     solved: Recent<u64, Solved>,
 }
 
-/// The last few things that were made, by what they were made of.
+/// The most recent results, by their inputs.
 struct Recent<K, V>(Mutex<VecDeque<(K, Arc<V>)>>);
 
 impl<K, V> Default for Recent<K, V> {
@@ -55,14 +55,14 @@ impl<K: PartialEq, V> Recent<K, V> {
     }
 }
 
-/// What an open photo was read from: it is read again when any of this changes.
+/// What an open photo was read from: it is read again if any of this changes.
 #[derive(PartialEq)]
 struct PhotoKey {
     entry: PhotoEntry,
     options: CutOutOptions,
-    /// State of the photo's file; nothing where that cannot be read.
+    /// State of the photo's file; none if that cannot be read.
     photo: Option<String>,
-    /// The same of the photo of the empty screen, where the entry has one.
+    /// The same for the photo of the empty screen, if the entry has one.
     screen: Option<String>,
 }
 
@@ -82,18 +82,18 @@ impl PhotoKey {
     }
 }
 
-/// A photo and what was cut out of it.
+/// A photo and its cut-out.
 pub(super) struct Solved {
     pub(super) photo: Arc<OpenPhoto<'static>>,
-    /// Nothing where the photo gives no cut-out.
+    /// None if the photo gives no cut-out.
     pub(super) cut: Option<ShownCut>,
 }
 
-/// What is shown of a cut-out.
+/// The displayed parts of a cut-out.
 pub(super) struct ShownCut {
     pub(super) film: Image<Film>,
     pub(super) uncertainty: Image<f32>,
-    /// The part of the photo that it shows.
+    /// The part of the photo that it covers.
     pub(super) roi: Roi,
     /// Mean colour of the screen.
     pub(super) screen: LinearRgb,
@@ -109,7 +109,7 @@ impl Mattes {
         Ok(open)
     }
 
-    /// What was solved under a number.
+    /// The cut-out with a number.
     pub(super) fn solved(&self, number: u64) -> Answer<Arc<Solved>> {
         self.solved.get(&number).ok_or_else(|| {
             let what = "this cut-out has expired; reload the page";
@@ -129,12 +129,12 @@ pub(super) struct SolveRequest {
     #[serde(flatten)]
     name: EntryName,
     strokes: Vec<Stroke>,
-    /// Width and height of what these were painted on, pixels; none where no review says it.
+    /// Width and height of the picture that these were painted on, pixels; none without a review.
     size: Option<[usize; 2]>,
 }
 
 impl SolveRequest {
-    /// Why its strokes say nothing of a photo, in the words of `asset build`: they were painted on
+    /// Why its strokes do not apply to a photo, in the words of `asset build`: they were painted on
     /// another size.
     fn outdated(&self, photo: &OpenPhoto<'_>) -> Option<String> {
         let size = self.size.filter(|_| !self.strokes.is_empty())?;
@@ -145,11 +145,11 @@ impl SolveRequest {
     }
 }
 
-/// A cut-out in words; its layers are asked for by its number.
+/// The description of a cut-out; its layers are requested by its number.
 #[derive(Serialize)]
 pub(super) struct SolvedInWords {
     number: u64,
-    /// Width and height of what strokes are painted on, pixels.
+    /// Width and height of the picture to paint strokes on, pixels.
     size: [usize; 2],
     /// Why there is no cut-out.
     refused: Option<String>,

@@ -1,4 +1,4 @@
-//! A recipe that is being edited: what it says, and what it does not say.
+//! A recipe that is being edited: its settings, and those left to the preset.
 
 use crate::refusal::Answer;
 use petcomp::dataset::DatasetConfig;
@@ -9,12 +9,12 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Paths of keys with their new values as TOML; null takes a key back to its default.
+/// Paths of keys with their new values as TOML; null resets a key to its default.
 #[derive(Clone, Debug, Default, Deserialize)]
 pub(super) struct Edits(Vec<(String, Option<String>)>);
 
 impl Edits {
-    /// The text with the edits, its comments as they are.
+    /// The text with the edits, its comments unchanged.
     pub(super) fn apply(&self, text: &str) -> Answer<String> {
         let edits = self.0.iter().cloned();
         let edits: Vec<_> = edits.map(|(path, value)| KeyEdit { path, value }).collect();
@@ -22,14 +22,14 @@ impl Edits {
     }
 }
 
-/// What a recipe says.
+/// The settings of a recipe.
 #[derive(Debug, Serialize)]
 pub(super) struct Draft {
-    /// What the recipe itself says, by path.
+    /// Values set by the recipe itself, by path.
     own: BTreeMap<String, Value>,
-    /// What its preset says where it says nothing.
+    /// Values of its preset for what it does not set.
     preset: BTreeMap<String, Value>,
-    /// How many lights there are.
+    /// Number of lights.
     lights: usize,
     /// Width and height of the pictures.
     image: [u32; 2],
@@ -38,7 +38,7 @@ pub(super) struct Draft {
 
 impl Draft {
     /// # Errors
-    /// What `petcomp dataset generate` would say of the file.
+    /// Those of `petcomp dataset generate` for the file.
     pub(super) fn of(text: &str, path: &Path) -> Answer<Self> {
         let config = DatasetConfig::parse(text, path, &[])?;
         let table: toml::Table = text.parse().unwrap_or_default();

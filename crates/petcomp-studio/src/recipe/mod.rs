@@ -1,4 +1,4 @@
-//! The page `recipe`: every setting of a recipe, and what pictures become of it at once.
+//! The page `recipe`: every setting of a recipe, with an immediate preview of its pictures.
 
 mod draft;
 mod preview;
@@ -52,7 +52,7 @@ async fn files(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<String>>> {
     blocking(move || Ok(Json(studio.folder.find(is_recipe)))).await
 }
 
-/// A document that `petcomp dataset generate` takes.
+/// Whether a document is accepted by `petcomp dataset generate`.
 pub(crate) fn is_recipe(path: &Path) -> bool {
     has_extension(path, "toml") && DatasetConfig::read(path, &[]).is_ok()
 }
@@ -68,7 +68,7 @@ fn check_listed(file: &str) -> Answer<()> {
     Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
 }
 
-/// Fails on the name of a file that is there.
+/// Fails on the name of an existing file.
 fn check_free(folder: &Folder, file: &str) -> Answer<()> {
     if folder.file(file).is_err() {
         return Ok(());
@@ -87,7 +87,7 @@ struct FileName {
     file: String,
 }
 
-/// A recipe as its file has it.
+/// A recipe as stored in its file.
 #[derive(Serialize)]
 struct StoredRecipe {
     version: String,
@@ -101,7 +101,7 @@ async fn open(
 ) -> Answer<Json<StoredRecipe>> {
     blocking(move || {
         let read = studio.folder.read_text(&file)?;
-        // Assets and photos may be others by now.
+        // Assets and photos may have changed by now.
         studio.recipe.pipelines.forget();
         let draft = Draft::of(&read.text, &studio.folder.file(&file)?)?;
         let version = read.version;
@@ -110,7 +110,7 @@ async fn open(
     .await
 }
 
-/// Begins a recipe with the template, which names every setting.
+/// Creates a recipe from the template, which contains every setting.
 async fn begin(
     State(studio): State<Arc<Studio>>,
     Json(FileName { file }): Json<FileName>,
@@ -124,7 +124,7 @@ async fn begin(
     .await
 }
 
-/// A recipe with edits that are not saved.
+/// A recipe with unsaved edits.
 #[derive(Deserialize)]
 struct Edited {
     file: String,
@@ -162,7 +162,7 @@ async fn save(
     .await
 }
 
-/// A picture of an edited recipe. Of each slot of the page only the newest request counts.
+/// A picture of an edited recipe. For each slot of the page only the newest request counts.
 async fn picture(
     State(studio): State<Arc<Studio>>,
     tab: Tab,

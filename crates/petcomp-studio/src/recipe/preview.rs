@@ -1,7 +1,7 @@
-//! Pictures of a recipe while it is edited: small, coarse and soon.
+//! Pictures of a recipe while it is edited: small, coarse and fast.
 //!
-//! What stays the same from one picture to the next is kept: assets, photos and their cameras, and
-//! falls, which take most of the time and which few settings change.
+//! Whatever is the same from one picture to the next is cached: assets, photos and their cameras,
+//! and falls, which take most of the time and depend on few settings.
 
 use super::draft::Edits;
 use crate::folder::Folder;
@@ -19,15 +19,15 @@ use serde::Deserialize;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Most work of a picture that is looked at while a slider moves; a heap of 100 objects has some 2
+/// Maximum work for a picture previewed while a slider moves; a heap of 100 objects takes about 2
 /// million.
 const MOST_WORK: u64 = 10_000_000;
 /// Longer sides of small pictures, pixels.
 const SIDES_PX: std::ops::RangeInclusive<u32> = 64..=1024;
-/// Opened recipes that are kept: before and after, small and whole.
+/// Number of opened recipes kept: before and after, small and whole.
 const KEPT: usize = 4;
 
-/// Which picture is asked for.
+/// The requested picture.
 #[derive(Debug, Deserialize)]
 pub(super) struct PictureAsked {
     file: String,
@@ -35,19 +35,19 @@ pub(super) struct PictureAsked {
     seed: u64,
     /// Number of the scene.
     k: u64,
-    /// Longer side of a small picture, pixels; without it the picture is as a dataset has it.
+    /// Longer side of a small picture, pixels; by default the picture has the size of a dataset's.
     side: Option<u32>,
-    /// With boxes and outlines.
+    /// Whether to draw boxes and outlines.
     #[serde(default)]
     labels: bool,
-    /// Where it is shown: a newer request for the same place ends this one.
+    /// Where it is shown: a newer request for the same slot cancels this one.
     pub(super) slot: String,
 }
 
-/// Opened recipes, the last used at the end, and lanes in which pictures wait for each other.
+/// Opened recipes, the most recently used at the end, and lanes in which pictures queue.
 pub(super) struct Pipelines {
     kept: Mutex<Vec<Arc<Pipeline>>>,
-    /// As many as there are cores.
+    /// One per core.
     lanes: Vec<Mutex<()>>,
 }
 
@@ -62,12 +62,12 @@ impl Default for Pipelines {
 }
 
 impl Pipelines {
-    /// Has everything opened again.
+    /// Reopens everything on next use.
     pub(super) fn forget(&self) {
         self.kept().clear();
     }
 
-    /// A picture of a recipe, unless it is not wanted any more once it is its turn.
+    /// A picture of a recipe, unless it has been superseded by the time it is its turn.
     pub(super) fn picture(
         &self,
         folder: &Folder,
@@ -113,7 +113,7 @@ fn opens_same(known: &Pipeline, config: &DatasetConfig) -> bool {
 }
 
 impl PictureAsked {
-    /// The recipe with its edits, as a dataset is made of it.
+    /// The recipe with its edits, as used for a dataset.
     fn config(&self, folder: &Folder) -> Answer<DatasetConfig> {
         let path = folder.file(&self.file)?;
         let text = self.edits.apply(&folder.read_text(&self.file)?.text)?;
@@ -122,7 +122,7 @@ impl PictureAsked {
         Ok(config)
     }
 
-    /// The same for the picture that is asked for.
+    /// The same for the requested picture.
     fn reduced(&self, config: DatasetConfig) -> DatasetConfig {
         match self.side {
             Some(side) => small(config, side),
@@ -139,7 +139,7 @@ impl PictureAsked {
     }
 }
 
-/// A recipe may name folders anywhere; a studio opens those in its own folder.
+/// A recipe may name folders anywhere; a studio opens only those inside its own folder.
 fn check_stays_inside(config: &DatasetConfig, folder: &Folder) -> Answer<()> {
     let maps = config.scene.environment.files.iter();
     let maps = maps.map(|file| ("scene.environment.files", config.folder.join(file)));
@@ -163,8 +163,8 @@ fn outside(key: &str, path: &Path) -> Refusal {
     Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what)
 }
 
-/// The recipe in small and coarse pictures of the same scenes; what it says in pixels shrinks with
-/// them.
+/// The recipe with small and coarse pictures of the same scenes; values in pixels are scaled down
+/// with them.
 fn small(mut config: DatasetConfig, side: u32) -> DatasetConfig {
     let side = side.clamp(*SIDES_PX.start(), *SIDES_PX.end());
     let longer = config.scene.image[0].max(config.scene.image[1]);

@@ -1,4 +1,4 @@
-//! The page `scale`: two ends of a ruler, or the corners of the screen, and a photo has its pixels
+//! The page `scale`: the two ends of a ruler, or the corners of the screen, give a photo's pixels
 //! per metre.
 
 mod photo_list;
@@ -28,7 +28,7 @@ pub(crate) fn routes() -> Router<Arc<Studio>> {
         .route("/save", post(save))
 }
 
-/// A photo, and whether its list says how large things in it are.
+/// A photo, and whether its list gives its scale.
 #[derive(Serialize)]
 struct ListEntry {
     photo: String,
@@ -59,7 +59,7 @@ async fn read_photo(
     .await
 }
 
-/// Where the corners of the screen are seen, pixels.
+/// Corners of the screen, pixels.
 #[derive(Serialize)]
 struct FoundScreen {
     corners_px: [[f64; 2]; 4],
@@ -82,7 +82,7 @@ struct NewScale {
     photo: String,
     version: Option<String>,
     scale: PhotoScale,
-    /// What the list calls the object, where the photo is new in it.
+    /// The object's name in the list, if the photo is new in it.
     #[serde(default)]
     asset: String,
     #[serde(default)]

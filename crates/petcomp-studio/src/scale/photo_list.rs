@@ -1,5 +1,5 @@
-//! The list of photos beside a photo (`photos.toml`): what it says of the photo's scale, and how that
-//! is changed with everything else in it as it was.
+//! The photo list next to a photo (`photos.toml`): its scale for the photo, and changes to it that
+//! leave everything else in the list as it was.
 
 use crate::folder::Folder;
 use crate::refusal::{Answer, Refusal};
@@ -12,10 +12,10 @@ use std::path::Path;
 use toml::{Table, Value};
 
 const LIST_NAME: &str = "photos.toml";
-/// A list in a form that is read and not written here.
+/// A list in a format that is only read here, not written.
 const OTHER_LIST_NAME: &str = "photos.csv";
 const HEADER: &str = "[[photos]]";
-/// Keys that say how large things in a photo are, one way or another.
+/// Keys that give the scale of a photo, in one form or another.
 const SCALE_KEYS: [&str; 7] = [
     "length",
     "width",
@@ -26,22 +26,22 @@ const SCALE_KEYS: [&str; 7] = [
     "marker_size",
 ];
 
-/// What a list says of a photo, and in which state of the list.
+/// A list's entry for a photo, with the list's version.
 #[derive(Serialize)]
 pub(super) struct VersionedEntry {
-    /// The list, whether it is there or not.
+    /// The list, whether it exists or not.
     list: String,
-    /// The state of the list; none where there is none.
+    /// Version of the list; none if there is none.
     version: Option<String>,
-    /// What the list says of the photo.
+    /// The entry of the photo.
     entry: Option<Table>,
 }
 
-/// How large things in a photo are.
+/// The scale of a photo.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum PhotoScale {
-    /// Pixels for a metre.
+    /// Pixels per metre.
     PxPerMetre(f64),
     /// Width and height of the screen, metres, and its corners, pixels.
     Screen([f64; 2], [[f64; 2]; 4]),
@@ -55,7 +55,7 @@ pub(super) struct ScaledPhoto<'a> {
     pub(super) class: &'a str,
 }
 
-/// The list beside a photo, and the photo's name in it.
+/// The list next to a photo, and the photo's name in it.
 fn list_of(photo: &str) -> (String, &str) {
     match photo.rsplit_once('/') {
         Some((folder, file)) => (format!("{folder}/{LIST_NAME}"), file),
@@ -63,7 +63,7 @@ fn list_of(photo: &str) -> (String, &str) {
     }
 }
 
-/// What the list beside a photo says of it.
+/// The entry of a photo in the list next to it.
 pub(super) fn read(folder: &Folder, photo: &str) -> Answer<VersionedEntry> {
     let (list, file) = list_of(photo);
     let Some(versioned) = folder.text_if_any(&list)? else {
@@ -82,7 +82,7 @@ pub(super) fn read(folder: &Folder, photo: &str) -> Answer<VersionedEntry> {
     })
 }
 
-/// What the list beside a photo calls it.
+/// The name of a photo in the list next to it.
 fn listed_name(folder: &Folder, entries: &[Table], photo: &str) -> Answer<Option<String>> {
     let path = folder.file(photo)?;
     let mut files = entries.iter().filter_map(file_of);
@@ -90,14 +90,14 @@ fn listed_name(folder: &Folder, entries: &[Table], photo: &str) -> Answer<Option
     Ok(name.map(str::to_owned))
 }
 
-/// The photo of the studio that the list beside a file means by a path, as `asset build` finds it:
-/// in capitals, too.
+/// The studio's name of the photo that a path in the list next to a file refers to, found as in
+/// `asset build`: in any capitalisation.
 fn listed_photo(folder: &Folder, beside: &Path, path: &str) -> String {
     let place = beside.parent().unwrap_or(Path::new(""));
     folder.name_of_listed(&with_actual_spelling(place.join(path)))
 }
 
-/// The photos that have a scale, of some.
+/// Those of some photos that have a scale.
 pub(super) fn scaled_photos(folder: &Folder, photos: &[String]) -> BTreeSet<String> {
     let lists: BTreeSet<String> = photos.iter().map(|photo| list_of(photo).0).collect();
     let mut scaled = BTreeSet::new();
@@ -150,7 +150,8 @@ fn table_of(text: &str, list: &str) -> Answer<Table> {
     Ok(table.map_err(|e| Error::file(list, e.message()))?)
 }
 
-/// Saves the scale of a photo in the list beside it; one that is not in it is added at its end.
+/// Saves the scale of a photo in the list next to it; a photo that is not in the list is added at
+/// its end.
 pub(super) fn save(folder: &Folder, new: &ScaledPhoto<'_>, version: Option<&str>) -> Answer<()> {
     let (list, file) = list_of(new.photo);
     let text = match folder.text_if_any(&list)? {
@@ -169,7 +170,8 @@ pub(super) fn save(folder: &Folder, new: &ScaledPhoto<'_>, version: Option<&str>
     Ok(())
 }
 
-/// The text of a list that is not there yet; not beside one that `asset build` would then pass over.
+/// The text of a list that does not exist yet; an error if there is another list that `asset build`
+/// would then ignore.
 fn no_list(folder: &Folder, list: &str) -> Answer<String> {
     let other = list.replace(LIST_NAME, OTHER_LIST_NAME);
     if folder.file(&other).is_ok() {
@@ -179,7 +181,7 @@ fn no_list(folder: &Folder, list: &str) -> Answer<String> {
     Ok(String::new())
 }
 
-/// The only entry that was changed. A list in a form that lines do not show (tables in one line) is
+/// The only changed entry. A list in a form that cannot be edited by lines (tables in one line) is
 /// not changed at all.
 fn changed_entry<'a>(
     before: &[Table],
@@ -202,14 +204,14 @@ fn changed_entry<'a>(
     }
 }
 
-/// What is wrong with a list whose photos are no tables of their own.
+/// The error for a list whose photos are not tables of their own.
 fn not_in_tables(list: &str) -> Refusal {
     let what = format!("{list}: its photos are not written as {HEADER}; copy the line into it");
     Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what)
 }
 
-/// Fails on an entry for which `asset build` would refuse the whole list, which declares `classes`,
-/// or none and takes any.
+/// Fails on an entry for which `asset build` would reject the whole list. The list declares
+/// `classes`, or none and then accepts any.
 fn check_entry(entry: &Table, mut classes: Vec<String>, list: &str) -> Answer<()> {
     let read: Result<PhotoEntry, toml::de::Error> = entry.clone().try_into();
     let entry = read.map_err(|e| Error::file(list, e.message()))?;
@@ -223,8 +225,8 @@ fn check_entry(entry: &Table, mut classes: Vec<String>, list: &str) -> Answer<()
     Ok(entry.check(&known).map_err(|e| e.in_file(list))?)
 }
 
-/// Fails where `asset build` would refuse a list that it took before. One that is not complete yet
-/// is completed photo by photo.
+/// Fails if `asset build` would reject a list that it accepted before. An incomplete list is
+/// completed photo by photo.
 fn check_beside_others(before: &str, after: &str, list: &str) -> Answer<()> {
     match check_list(before, list) {
         Ok(()) => Ok(check_list(after, list)?),
@@ -238,7 +240,7 @@ fn check_list(text: &str, list: &str) -> petcomp::Result<()> {
     checked.map_err(|e| e.in_file(list))
 }
 
-/// The text of a list with the scale of a photo; remarks and everything else stay.
+/// The text of a list with the scale of a photo; comments and everything else are unchanged.
 fn with_scale(text: &str, file: &str, new: &ScaledPhoto<'_>) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     match block_of(&lines, file) {
@@ -252,8 +254,8 @@ fn with_scale(text: &str, file: &str, new: &ScaledPhoto<'_>) -> String {
     lines.join(end) + end
 }
 
-/// The lines of a photo's table with another scale, before the empty ones and the remarks at its
-/// end: those may be the next photo's.
+/// The lines of a photo's table with another scale, placed before the empty lines and the comments
+/// at its end: those may belong to the next photo.
 fn changed_block(block: &[String], scale: PhotoScale) -> Vec<String> {
     let mut lines = without_scale(block);
     let says = |line: &String| !matches!(line.trim().chars().next(), None | Some('#'));
@@ -276,18 +278,18 @@ fn without_scale(block: &[String]) -> Vec<String> {
     kept
 }
 
-/// How many lines the first of a table's values takes: a list may go over several.
+/// Number of lines of a table's first value: an array may span several.
 fn lines_of_first(lines: &[String]) -> usize {
     let mut counts = 1..=lines.len();
     counts.find(|&n| is_whole(&lines[..n])).unwrap_or(1)
 }
 
-/// No value goes on behind the lines.
+/// Whether no value continues after the lines.
 fn is_whole(lines: &[String]) -> bool {
     table_of(&lines.join("\n"), "").is_ok()
 }
 
-/// The lines of a photo's table, its header among them.
+/// The lines of a photo's table, including its header.
 fn block_of(lines: &[String], file: &str) -> Option<std::ops::Range<usize>> {
     let starts = (0..lines.len()).filter(|&i| is_header(&lines[i]));
     let mut blocks = starts.filter_map(|start| table_from(lines, start));
@@ -298,7 +300,7 @@ fn block_of(lines: &[String], file: &str) -> Option<std::ops::Range<usize>> {
 }
 
 /// The lines of the table whose header is at `start`. A line that begins with a bracket ends it,
-/// but for one of a list that goes over several.
+/// unless it is part of an array that spans several lines.
 fn table_from(lines: &[String], start: usize) -> Option<std::ops::Range<usize>> {
     let is_end = |i: usize| {
         lines
@@ -310,7 +312,7 @@ fn table_from(lines: &[String], start: usize) -> Option<std::ops::Range<usize>> 
     blocks.find(|block| is_whole(&lines[block.clone()]))
 }
 
-/// Whether a photo's table begins: there may be spaces and a remark.
+/// Whether a line begins a photo's table: there may be spaces and a comment.
 fn is_header(line: &str) -> bool {
     let header = line.split('#').next().unwrap_or_default();
     header.replace(' ', "").trim() == HEADER
@@ -347,7 +349,7 @@ fn new_block(file: &str, new: &ScaledPhoto<'_>, is_first: bool) -> Vec<String> {
     lines
 }
 
-/// The name that was given, or else the file's, in the characters that names of assets have.
+/// The given name, or else the file's, restricted to the characters of asset names.
 fn asset_name(given: &str, file: &str) -> String {
     let stem = Path::new(file).file_stem().unwrap_or_default();
     let stem = stem.to_string_lossy();
@@ -408,7 +410,7 @@ mod tests {
         assert_eq!(last["px_per_metre"].as_float(), Some(1966.7));
     }
 
-    /// What is in a folder's list after the scale of a photo was saved, or why it was not.
+    /// The list of a folder after the scale of a photo was saved, or the error.
     fn saved(list: &str, text: &str, new: &ScaledPhoto<'_>) -> Result<String, String> {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join(new.photo), "").unwrap();

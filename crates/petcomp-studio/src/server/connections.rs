@@ -1,4 +1,4 @@
-//! Connections: so many at a time, none that says nothing for long.
+//! Connections: limited in number and in idle time.
 
 use crate::message::PATIENCE;
 use axum::Router;
@@ -10,12 +10,12 @@ use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 
-/// Connections at a time: a browser opens six.
+/// Maximum number of simultaneous connections: a browser opens six.
 const MAX_CONNECTIONS: usize = 256;
 /// A pause after the system refused a connection (too many open files).
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Answers every connection, and never ends.
+/// Serves every connection, and never ends.
 pub(super) async fn serve(listener: TcpListener, app: Router) {
     let permits = Arc::new(Semaphore::new(MAX_CONNECTIONS));
     loop {
@@ -38,7 +38,7 @@ pub(super) async fn serve(listener: TcpListener, app: Router) {
     }
 }
 
-/// Answers the requests of a connection, one after the other.
+/// Answers the requests of a connection, one after another.
 async fn answer(stream: TcpStream, app: Router) {
     let mut server = http1::Builder::new();
     server

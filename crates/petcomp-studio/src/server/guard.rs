@@ -1,4 +1,4 @@
-//! Who is answered, and what browsers are told that they may do.
+//! Access control, and the security headers of answers.
 
 use super::token::Token;
 use crate::refusal::{Answer, Refusal};
@@ -12,12 +12,12 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use std::sync::Arc;
 
-/// Pages load their own files, and talk to their own server; no text becomes markup.
+/// Pages load only their own files, and connect only to their own server; no text becomes markup.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; \
      img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
      frame-ancestors 'none'; require-trusted-types-for 'script'; trusted-types 'none'";
 
-/// What every answer says.
+/// Headers of every answer.
 const HEADERS: [(HeaderName, &str); 5] = [
     (CONTENT_SECURITY_POLICY, POLICY),
     (X_CONTENT_TYPE_OPTIONS, "nosniff"),
@@ -32,7 +32,7 @@ const HEADERS: [(HeaderName, &str); 5] = [
     ),
 ];
 
-/// What a request must show.
+/// What a request must match.
 pub(super) struct Guard {
     token: Token,
     /// `127.0.0.1:PORT` and `localhost:PORT`.
@@ -53,7 +53,7 @@ impl Guard {
         self.check_token(request.uri())
     }
 
-    /// Another name for this machine is another site's: DNS rebinding.
+    /// Any other name for this machine may be another site's: DNS rebinding.
     fn check_host(&self, headers: &HeaderMap) -> Answer<()> {
         match text(headers, HOST) {
             Some(host) if self.hosts.iter().any(|known| known == host) => Ok(()),
@@ -86,7 +86,7 @@ impl Guard {
     }
 }
 
-/// Other sites may lead a person here, as a link does, and nothing else.
+/// Other sites may only navigate here, as a link does.
 fn check_site(method: &Method, headers: &HeaderMap) -> Answer<()> {
     let site = text(headers, HeaderName::from_static("sec-fetch-site"));
     let mode = text(headers, HeaderName::from_static("sec-fetch-mode"));
@@ -101,7 +101,7 @@ fn text(headers: &HeaderMap, name: HeaderName) -> Option<&str> {
     headers.get(name).and_then(|value| value.to_str().ok())
 }
 
-/// Refuses who may not ask, and adds [`HEADERS`] to every answer.
+/// Rejects requests that are not allowed, and adds [`HEADERS`] to every answer.
 pub(super) async fn check(
     State(guard): State<Arc<Guard>>,
     request: Request,
@@ -113,7 +113,7 @@ pub(super) async fn check(
     };
     let headers = response.headers_mut();
     for (name, value) in HEADERS {
-        // A page that is shut off from the others says so itself.
+        // A sandboxed page sends a policy of its own.
         headers
             .entry(name)
             .or_insert(HeaderValue::from_static(value));

@@ -1,11 +1,11 @@
-//! The server: on this machine alone, for whoever knows its token alone.
+//! The server: only on this machine, and only for clients that know its token.
 //!
-//! * It listens on 127.0.0.1, and every address has a token of 128 random bits in front
-//!   (`http://127.0.0.1:PORT/TOKEN/corners`), so pages reach everything by relative addresses, and
-//!   no cookie can be sent by somebody else's page.
-//! * `guard` refuses requests without the token, for another host (DNS rebinding) and from another
-//!   site's pages, and tells browsers to load nothing from elsewhere.
-//! * `connections` bounds how many connections there are and how long one may say nothing.
+//! * It listens on 127.0.0.1, and the path of every URL begins with a token of 128 random bits
+//!   (`http://127.0.0.1:PORT/TOKEN/corners`), so pages use relative URLs, and there is no cookie
+//!   that another site's page could send.
+//! * `guard` rejects requests without the token, for another host (DNS rebinding) and from another
+//!   site's pages, and forbids browsers to load anything from elsewhere.
+//! * `connections` limits the number of connections and their idle time.
 
 mod connections;
 mod guard;
@@ -29,12 +29,12 @@ use token::Token;
 use tokio::runtime::Runtime;
 use tokio::sync::Notify;
 
-/// The largest body of a request: strokes on a photo fit in it many times over.
+/// Maximum size of a request's body: many times that of strokes on a photo.
 const MAX_BODY_BYTES: usize = 16 << 20;
-/// How long requests in hand may still take after the server was stopped.
+/// Time that pending requests may still take after the server was stopped.
 const GRACE_PERIOD: Duration = Duration::from_secs(2);
 
-/// Pages about a folder, at an address of this machine.
+/// Serves pages about a folder, at a URL of this machine.
 pub struct Server {
     runtime: Runtime,
     listener: tokio::net::TcpListener,
@@ -49,17 +49,17 @@ pub struct Server {
 pub struct Stop(Arc<Notify>);
 
 impl Stop {
-    /// Ends [`Server::run`] soon.
+    /// Makes [`Server::run`] return soon.
     pub fn stop(&self) {
         self.0.notify_one();
     }
 }
 
 impl Server {
-    /// Listens on a port of 127.0.0.1; 0 is any free one.
+    /// Listens on a port of 127.0.0.1; 0 means any free one.
     ///
     /// # Errors
-    /// [`Error::File`] where there is no such folder; [`Error::Value`] for a port that is taken.
+    /// [`Error::File`] if there is no such folder; [`Error::Value`] for a port that is in use.
     pub fn open(folder: &Path, port: u16) -> Result<Self> {
         let folder = Folder::open(folder)?;
         let runtime = Runtime::new().map_err(|e| Error::value("studio", e))?;
@@ -77,12 +77,12 @@ impl Server {
         })
     }
 
-    /// Where the pages are, token included.
+    /// The URL of the pages, including the token.
     pub fn address(&self) -> String {
         format!("http://{}/{}/", self.address, self.token)
     }
 
-    /// What stops the server.
+    /// A handle that stops the server.
     pub fn stop(&self) -> Stop {
         Stop(self.stop.clone())
     }

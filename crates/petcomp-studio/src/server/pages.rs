@@ -29,7 +29,7 @@ macro_rules! page {
 }
 
 impl Page {
-    /// `/` of `index.html`, `/corners` of `corners.html`, `/studio.css` of `studio.css`.
+    /// `/` for `index.html`, `/corners` for `corners.html`, `/studio.css` for `studio.css`.
     fn route(&self) -> String {
         match self.name.strip_suffix(".html") {
             Some("index") => "/".into(),
@@ -48,7 +48,7 @@ impl Page {
         }
     }
 
-    /// What is in the program; while one works on a page, what is in its file.
+    /// The file embedded in the program; in debug builds, the file on disk, for work on a page.
     #[cfg(not(debug_assertions))]
     fn content(&self) -> String {
         self.text.into()
@@ -62,7 +62,7 @@ impl Page {
     }
 }
 
-/// The pages, below a path without a slash at its end.
+/// The routes of the pages, below a path without a trailing slash.
 pub(super) fn routes(below: &str, pages: &[Page]) -> Router<Arc<Studio>> {
     pages.iter().fold(Router::new(), |router, &page| {
         let path = format!("{below}{}", page.route());

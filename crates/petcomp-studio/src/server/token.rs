@@ -1,4 +1,4 @@
-//! The token that every address begins with.
+//! The token that every URL begins with.
 
 use petcomp::{Error, Result};
 use std::fmt;
@@ -13,7 +13,7 @@ impl Token {
         Ok(Self(bytes.iter().map(|b| format!("{b:02x}")).collect()))
     }
 
-    /// Whether somebody said it, in a time that does not tell how much of it was right.
+    /// Whether a text is the token, in constant time.
     pub(super) fn is(&self, said: &str) -> bool {
         let pairs = self.0.bytes().zip(said.bytes());
         let difference = pairs.fold(0, |all, (a, b)| all | (a ^ b));
