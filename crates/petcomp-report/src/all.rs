@@ -1,9 +1,9 @@
-//! Everything that is measured, in one document: error against run time of every approximate stage,
-//! the qualities that move along those curves, other programs, and extreme cases.
+//! All measurements in one document: error against run time of every approximate stage, the
+//! qualities that lie on those curves, other programs, and extreme cases.
 //!
-//! Inputs are made in code or come with the repository (the golden scenes of Blender's Cycles), so
-//! that a fresh clone will do; photos with known mattes and other programs' measurements are added
-//! where they exist.
+//! Inputs are generated in code or come with the repository (the golden scenes of Blender's
+//! Cycles), so a fresh clone is sufficient; photos with known mattes and other programs'
+//! measurements are added if they exist.
 
 use super::section::{Document, Section};
 use super::{
@@ -45,7 +45,7 @@ pub struct AllOptions {
     date: String,
 }
 
-/// How much is measured.
+/// Amount of work per measurement.
 struct Amount {
     views: u64,
     bottles: usize,
@@ -67,10 +67,10 @@ const FULL_AMOUNT: Amount = Amount {
     runs: 5,
 };
 
-/// One thing to measure: the diagrams of a stage.
+/// One measurement: the diagrams of a stage.
 type Measure = fn(&AllOptions, &Amount) -> Result<Vec<Diagram>>;
 
-/// What is measured, in the order of the data.
+/// The measurements, in the order of the data.
 const STAGES: [Measure; 10] = [
     |_, _| color::diagrams(),
     |options, _| matte::diagrams(options.truth.as_deref()),
@@ -89,8 +89,8 @@ const SLOW_SECTIONS: [fn() -> Result<Section>; 3] =
 
 /// Measures everything; `progress` gets the number of the step and of all steps.
 ///
-/// Times are CPU seconds of one thread. Takes about three minutes on two to four cores, half a
-/// minute when it is to be quick, which leaves out extreme cases, counted work and scale.
+/// Times are CPU seconds of one thread. Takes about three minutes on two to four cores, or half a
+/// minute in the quick mode, which leaves out extreme cases, counted work and scale.
 fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Document> {
     let slow: &[fn() -> Result<Section>] = if options.quick { &[] } else { &SLOW_SECTIONS };
     let steps = (STAGES.len() + slow.len()) as u64;
@@ -135,9 +135,9 @@ fn measure_stages(options: &AllOptions, progress: impl Fn(u64)) -> Result<Vec<Di
 /// (`.csv`) into a folder.
 ///
 /// # Errors
-/// An input that cannot be read; a thread or scratch folder that cannot be made; memory and scale
-/// need Linux's `/proc`; files that cannot be written. Nothing is written before everything is
-/// measured.
+/// An input that cannot be read; a thread or scratch folder that cannot be created; a system
+/// without Linux's `/proc`, which memory and scale need; files that cannot be written. Nothing is
+/// written before everything is measured.
 pub fn write(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<()> {
     measure(options, progress)?.write(&options.output)
 }

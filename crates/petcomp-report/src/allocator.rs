@@ -29,7 +29,7 @@ unsafe impl GlobalAlloc for CountingAllocator {
     }
 
     unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        // What shrinks asks for nothing.
+        // Shrinking allocates nothing.
         if size > layout.size() {
             allocated(size);
         }

@@ -1,7 +1,7 @@
 //! Error of the camera solver against run time and against tilt.
 //!
-//! Views are drawn by [`simulate`](petcomp::camera::simulate) from fixed seeds; every method sees
-//! the same ones. `joint` sees each of them with seven more photos of the same camera, at the same
+//! Views are drawn by [`simulate`](petcomp::camera::simulate) from fixed seeds; every method gets
+//! the same ones. `joint` gets each of them with seven more photos of the same camera, at the same
 //! tilt.
 
 mod coverage;
@@ -42,24 +42,23 @@ struct CameraRow {
     /// Angle from straight above, degrees.
     tilt_deg: f64,
     method: SolveMethod,
-    /// How many views there were, and how many of them gave no camera; those count as infinitely
-    /// wrong.
+    /// Number of views, and of those without a camera, which count as infinitely wrong.
     views: usize,
     failed: usize,
     /// Error of the focal length, percent: median and 95 % quantile.
     focal_percent: [f64; 2],
-    /// Error of where points 50 mm above the surface are seen, root mean square over the
-    /// rectangle, pixels: median and 95 % quantile.
+    /// Reprojection error of points 50 mm above the surface, root mean square over the rectangle,
+    /// pixels: median and 95 % quantile.
     height_px: [f64; 2],
-    /// Median CPU time of a photo, microseconds.
+    /// Median CPU time per photo, microseconds.
     time_us: f64,
 }
 
-/// Measures every method on so many views of every kind; `progress` gets the number of the step and
-/// of all steps.
+/// Measures every method on this many views of every kind; `progress` gets the number of the step
+/// and of all steps.
 ///
-/// One thread, so that run times mean something: about twenty seconds for 100 views on one core of
-/// a desktop of 2020.
+/// Runs on one thread, so that run times are comparable: about twenty seconds for 100 views on one
+/// core of a desktop of 2020.
 fn measure(views: u64, progress: impl Fn(u64, u64)) -> Vec<CameraRow> {
     let kinds = ViewKind::all();
     let mut rows = Vec::new();
@@ -79,7 +78,7 @@ struct ViewKind {
 }
 
 impl ViewKind {
-    /// Every lens with every noise at every tilt.
+    /// Every lens with every noise and every tilt.
     fn all() -> Vec<Self> {
         let noisy = Lens::ALL
             .into_iter()
@@ -103,7 +102,7 @@ impl ViewKind {
         views
     }
 
-    /// What each method makes of the same cameras.
+    /// The results of each method for the same cameras.
     fn rows(&self, methods: &[SolveMethod], cameras: u64) -> Vec<CameraRow> {
         let photos: Vec<_> = (0..cameras).map(|k| self.photos(k)).collect();
         methods.iter().map(|m| self.row(*m, &photos)).collect()
@@ -129,12 +128,12 @@ impl ViewKind {
     }
 }
 
-/// Photos of one camera may be solved together where they show one surface.
+/// Photos of one camera may be solved together if they show one surface.
 fn name_surface(view: &mut View) {
     view.label.surface.id = "tray".into();
 }
 
-/// Errors of one photo's camera, infinite where there is none, and what it took.
+/// Errors of one photo's camera, infinite if there is none, and its run time.
 struct ViewError {
     focal_percent: f64,
     height_px: f64,
@@ -172,8 +171,8 @@ fn focal_percent(view: &View, solution: &Solution) -> f64 {
     100.0 * (solution.camera.focal_px.x / view.camera.focal_px.x - 1.0).abs()
 }
 
-/// Root mean square over a grid above the rectangle: where the fitted camera sees it, and where the
-/// photo shows it; infinite where a point is behind either.
+/// Root mean square distance over a grid above the rectangle, between where the fitted camera sees
+/// it and where the photo shows it; infinite if a point is behind either.
 fn height_error_px(view: &View, solution: &Solution) -> f64 {
     let points = ERROR_GRID_SIDE * ERROR_GRID_SIDE;
     let sum: f64 = (0..points)
@@ -182,7 +181,7 @@ fn height_error_px(view: &View, solution: &Solution) -> f64 {
     (sum / points as f64).sqrt()
 }
 
-/// A place of the grid, in sides of the rectangle from its centre.
+/// A point of the grid, in sides of the rectangle from its centre.
 fn grid_place(i: usize) -> [f64; 2] {
     [i % ERROR_GRID_SIDE, i / ERROR_GRID_SIDE]
         .map(|k| k as f64 / (ERROR_GRID_SIDE - 1) as f64 - 0.5)
@@ -205,8 +204,8 @@ fn point_above([x, y]: [f64; 2], [w, h]: [f64; 2]) -> Point3<f64> {
 }
 
 /// Writes `camera.csv`, `camera_coverage.csv`, `camera.md` and the plots `camera_tilt_LENS.svg`,
-/// `camera_height_LENS.svg` and `camera_time_LENS.svg` into a folder: of so many views per kind of
-/// camera, noise and tilt, at least one. Returns the number of lines of `camera.csv`.
+/// `camera_height_LENS.svg` and `camera_time_LENS.svg` into a folder, with this many views per kind
+/// of camera, noise and tilt, at least one. Returns the number of rows of `camera.csv`.
 ///
 /// # Errors
 /// Files that cannot be written.

@@ -1,4 +1,4 @@
-//! How long something takes, on one thread.
+//! CPU time of work on one thread.
 
 use super::statistics::quantile;
 use petcomp::{Error, Result};
@@ -8,26 +8,26 @@ use std::hint::black_box;
 
 const SECONDS_PER_NANOSECOND: f64 = 1e-9;
 
-/// CPU seconds that this process has used, all its threads together.
+/// CPU seconds used by this process, all its threads together.
 ///
-/// Unlike the time that passes, it does not depend on what else the machine does (but for caches
-/// and clock rates).
+/// Unlike wall-clock time, it does not depend on the other load of the machine (except through
+/// caches and clock rates).
 pub(super) fn cpu_seconds() -> f64 {
     let now = clock_gettime(ClockId::ProcessCPUTime);
     now.tv_sec as f64 + now.tv_nsec as f64 * SECONDS_PER_NANOSECOND
 }
 
-/// Quicker work than this is timed many times over, seconds: the clock's resolution and caches
-/// would show in it.
+/// Shorter work is repeated when it is timed, seconds: otherwise the clock's resolution and caches
+/// would show.
 const MIN_TIMED_SECONDS: f64 = 2e-3;
-/// The largest number of repetitions.
+/// Maximum number of repetitions.
 const MOST_REPEATS: f64 = 1000.0;
 
-/// The result of `work`, and the median CPU seconds of `runs` of it (at least 1); one thread, so
+/// The result of `work`, and the median CPU seconds of `runs` runs (at least 1) on one thread, so
 /// that times can be compared.
 ///
 /// # Errors
-/// The first of `work`; a thread that cannot be started.
+/// The first error of `work`; a thread that cannot be started.
 pub(super) fn timed<T: Send>(runs: usize, work: impl Fn() -> Result<T> + Sync) -> Result<(T, f64)> {
     let one = single_thread()?;
     let (made, first) = seconds_of(|| one.install(&work));

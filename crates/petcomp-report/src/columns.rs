@@ -2,10 +2,10 @@
 
 use petcomp::plot::Table;
 
-/// The title of a column, and its cell of a row.
+/// The title of a column, and the function for its cells.
 pub(crate) type Column<R> = (&'static str, fn(&R) -> String);
 
-/// A table with a line for each row.
+/// A table with a line per row.
 pub(crate) fn table_of<'a, R: 'a>(
     columns: &[Column<R>],
     rows: impl IntoIterator<Item = &'a R>,
@@ -22,12 +22,12 @@ pub(crate) fn four(number: f64) -> String {
     format!("{number:.4}")
 }
 
-/// A number with so many decimals; nothing where there is none.
+/// A number with this many decimals; empty if there is none.
 pub(crate) fn number_or_empty(number: Option<f64>, decimals: usize) -> String {
     number.map_or_else(String::new, |v| format!("{v:.decimals$}"))
 }
 
-/// A table of lines that are there already.
+/// A table of existing rows.
 pub(crate) fn table_from<const N: usize>(
     titles: [&str; N],
     lines: impl IntoIterator<Item = [String; N]>,

@@ -1,51 +1,52 @@
-//! Work-precision diagrams: the error of a stage against what it costs, a point for each setting.
+//! Work-precision diagrams: the error of a stage against its cost, with one point per setting.
 
 use crate::columns::table_from;
 use petcomp::Quality;
 use petcomp::plot::{Axis, Beside, Chart, Curve, Table, three};
 
-/// Costs closer than this are equal: the noise of timings, as a factor.
+/// Costs whose ratio is below this factor count as equal: noise of timings.
 const TIMING_NOISE_FACTOR: f64 = 1.1;
-/// How far the axis reaches below the least error where some errors are 0: so far that its edge is
-/// not read as an error.
+/// How far the axis extends below the least positive error if some errors are 0: so far that its
+/// edge is not read as an error.
 const ZERO_ERROR_ROOM_FACTOR: f64 = 10.0;
 /// The largest invisible error of a picture: half of a code of 8 bits at middle grey.
 const INVISIBLE_ERROR: f64 = 0.004;
 
-/// Error against cost of the settings of a stage, and of other programs that do the same.
+/// Error against cost of the settings of a stage, and of other programs for the same task.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Diagram {
     /// Name of its files, without an extension.
     pub(crate) file: String,
-    /// What is seen in it.
+    /// Title of the diagram.
     pub(crate) title: String,
-    /// What is processed, with its size.
+    /// The input, with its size.
     pub(crate) input: String,
-    /// What the error is, with its unit.
+    /// Name of the error, with its unit.
     pub(crate) error: String,
-    /// What the cost is, with its unit.
+    /// Name of the cost, with its unit.
     pub(crate) cost: String,
-    /// What results are compared with: another program with its version, a closed form, or a
-    /// converged independent method.
+    /// Reference that results are compared with: another program with its version, a closed form,
+    /// or a converged independent method.
     pub(crate) reference: String,
     /// The settings.
     pub(crate) points: Vec<Point>,
-    /// The error that is small enough, and why.
+    /// The error that is small enough, and the reason.
     pub(crate) limit: Option<(f64, String)>,
-    /// Why the default is what it is, beyond what the points say.
+    /// Reason for the default, beyond what the points show.
     pub(crate) why: String,
-    /// Points of one curve do not follow from each other, so that no line joins them.
+    /// Whether the points of a curve are unrelated, so that no line joins them.
     pub(crate) apart: bool,
-    /// Curves are of different inputs: a point is compared only with those of its own.
+    /// Whether curves have different inputs: a point is then compared only with those of its own
+    /// curve.
     pub(crate) inputs: bool,
 }
 
 /// A setting.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Point {
-    /// The curve that it belongs to: a form of the computation, or another program.
+    /// Its curve: a variant of the computation, or another program.
     pub(crate) curve: String,
-    /// What is set.
+    /// The setting.
     pub(crate) setting: String,
     /// What it costs.
     pub(crate) cost: f64,
@@ -55,8 +56,8 @@ pub(crate) struct Point {
     pub(crate) qualities: Vec<Quality>,
 }
 
-/// Whether a point of cost and error is on the efficient front: no other one is at most as costly
-/// and at most as wrong, and better in one of the two. What is not finite never is.
+/// Whether a point of cost and error is on the efficient front: no other one has at most its cost
+/// and at most its error, with at least one of them lower. A non-finite point never is.
 fn is_unbeaten(point: [f64; 2], points: &[[f64; 2]]) -> bool {
     is_finite(point) && !points.iter().any(|other| beats(*other, point))
 }
@@ -69,7 +70,7 @@ fn beats(a: [f64; 2], b: [f64; 2]) -> bool {
     is_finite(a) && a[0] <= b[0] && a[1] <= b[1] && a != b
 }
 
-/// The limit of diagrams whose error is one of pixels.
+/// The limit of diagrams whose error is in pixel values.
 pub(crate) fn invisible_error() -> Option<(f64, String)> {
     Some((
         INVISIBLE_ERROR,
@@ -94,18 +95,18 @@ impl Point {
         }
     }
 
-    /// The same, used by those qualities of which `is_used` is true.
+    /// The same, used by the qualities for which `is_used` is true.
     pub(crate) fn used_where(mut self, is_used: impl Fn(Quality) -> bool) -> Self {
         self.qualities = Quality::ALL.into_iter().filter(|q| is_used(*q)).collect();
         self
     }
 
-    /// What the default uses.
+    /// Whether the default uses it.
     pub(crate) fn is_default(&self) -> bool {
         self.qualities.contains(&Quality::default())
     }
 
-    /// At least as exact, and cheaper by more than noise.
+    /// Whether it is at least as accurate, and cheaper by more than noise.
     fn clearly_beats(&self, other: &Self) -> bool {
         self.error <= other.error && self.cost * TIMING_NOISE_FACTOR < other.cost
     }
@@ -114,7 +115,7 @@ impl Point {
         [self.cost, self.error]
     }
 
-    /// Setting and curve; the curve alone where it is all that is set.
+    /// Setting and curve; only the curve if there is no setting.
     fn name(&self) -> String {
         if self.setting.is_empty() {
             self.curve.clone()
@@ -123,7 +124,7 @@ impl Point {
         }
     }
 
-    /// What it costs, as a share of what another one costs.
+    /// Its cost, as a share of another one's.
     fn share_of_cost(&self, other: &Self) -> String {
         three(self.cost / other.cost)
     }
@@ -141,7 +142,7 @@ impl Point {
         names.join(", ")
     }
 
-    /// The words next to it: what is set, and the qualities that use it.
+    /// Its label: the setting, and the qualities that use it.
     fn label(&self) -> String {
         let name = self.short_name();
         match self.qualities.len() {
@@ -162,14 +163,14 @@ impl Diagram {
         self.points.iter().find(|p| p.is_default())
     }
 
-    /// The cheapest setting that is at least as exact as the default, where it is another and
+    /// The cheapest setting that is at least as accurate as the default, if it is another one and
     /// cheaper by more than noise.
     pub(crate) fn cheaper_than_default(&self) -> Option<&Point> {
         let default = self.default_point()?;
         cheapest(self.rivals(default).filter(|p| p.clearly_beats(default)))
     }
 
-    /// What a point is compared with: the points of the same input.
+    /// The points that a point is compared with: those of the same input.
     fn rivals(&self, point: &Point) -> impl Iterator<Item = &Point> {
         self.points
             .iter()
@@ -187,8 +188,8 @@ impl Diagram {
         cheapest(self.points.iter().filter(|p| p.error <= *limit))
     }
 
-    /// In words: where the default is, why, whether it is on the efficient front, and how far from
-    /// it.
+    /// In words: the default, the reason for it, whether it is on the efficient front, and how far
+    /// from it.
     pub(crate) fn verdict(&self) -> String {
         let Some(default) = self.default_point() else {
             return self.why.clone();
@@ -215,7 +216,7 @@ impl Diagram {
         )
     }
 
-    /// How a setting compares with the cheapest one under the limit; nothing without a limit that
+    /// How a setting compares with the cheapest one under the limit; empty without a limit that
     /// some setting meets.
     fn limit_verdict(&self, point: &Point) -> String {
         let (Some((limit, why)), Some(best)) = (&self.limit, self.cheapest_under_limit()) else {
@@ -232,7 +233,7 @@ impl Diagram {
         }
     }
 
-    /// What the diagram shows, against what, and its verdict.
+    /// The content of the diagram, its reference, and its verdict.
     pub(crate) fn caption(&self) -> String {
         paragraph(&[
             &format!(
@@ -244,7 +245,7 @@ impl Diagram {
         ])
     }
 
-    /// What the marks mean that are in the picture.
+    /// Meaning of the marks in the diagram.
     fn legend(&self) -> &'static str {
         match (self.default_point().is_some(), self.has_exact_points()) {
             (true, true) => "Ring: the default. Points on the lower edge have no error.",
@@ -281,7 +282,7 @@ impl Diagram {
         }
     }
 
-    /// Each once, in the order of their first points.
+    /// Each curve once, in the order of their first points.
     fn curve_names(&self) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
         for name in self.points.iter().map(|point| &point.curve) {
@@ -297,7 +298,7 @@ impl Diagram {
         shown.map(|p| self.position(p)).collect()
     }
 
-    /// Where a point stands in the chart: exact ones on its lower edge.
+    /// Position of a point in the chart: exact ones are on its lower edge.
     fn position(&self, point: &Point) -> [f64; 2] {
         [point.cost, point.error.max(self.error_axis().range[0])]
     }
@@ -313,7 +314,7 @@ impl Diagram {
             .collect()
     }
 
-    /// The axis of errors; longer below where some are 0.
+    /// The axis of errors, extended below if some are 0.
     fn error_axis(&self) -> Axis {
         let mut axis = Axis::around(&self.error, self.points.iter().map(|p| p.error));
         if self.has_exact_points() {
@@ -347,7 +348,7 @@ impl Diagram {
         ]
     }
 
-    /// A line for each of some diagrams: the default, its error and cost, and what beats it.
+    /// A row per diagram: the default, its error and cost, and what beats it.
     pub(crate) fn summary(diagrams: &[Self]) -> Table {
         let defaults = diagrams.iter().filter_map(Self::summary_line);
         table_from(SUMMARY_TITLES, defaults)
@@ -372,7 +373,7 @@ impl Diagram {
     }
 }
 
-/// Sentences with a space between them; empty ones are left out.
+/// Joins sentences with spaces; empty ones are left out.
 fn paragraph(sentences: &[&str]) -> String {
     let mut kept = sentences.to_vec();
     kept.retain(|sentence| !sentence.is_empty());

@@ -1,9 +1,9 @@
-//! Bottles over new backgrounds: what each way of photographing them gives, against reality.
+//! Bottles over new backgrounds: the results of each way of photographing them, compared with
+//! reality.
 //!
 //! Reality is a rendering of the same bottle in the same room on a display that shows the
-//! background, so that nothing of our own model is in it. The captures are photos of the same
-//! scene with a sensor's noise, as JPEGs of 8 bits. Everything is compared seen straight from
-//! above.
+//! background, so that it is independent of our own model. The captures are photos of the same
+//! scene with a sensor's noise, as 8-bit JPEGs. Everything is compared as seen from straight above.
 
 mod method;
 mod place;
@@ -24,41 +24,41 @@ use shots::Stage;
 use std::path::Path;
 use window::{DisplayWindow, Surroundings};
 
-/// A pixel of which more than this is the bottle's is inside.
+/// A pixel is inside if the bottle covers more than this share of it.
 const INSIDE: f32 = 0.5;
-/// A displacement that is off by less is right, pixels of the photo.
+/// A displacement with a smaller error counts as right, pixels of the photo.
 const GOOD_FLOW_PX: f64 = 2.0;
-/// Contrast of the coarse stripes above which the true displacement is one place and not many.
+/// Contrast of the coarse stripes above which the true displacement is a single position.
 const LEAST_CONTRAST: f64 = 0.3;
 
-/// What a method made of a bottle.
+/// The result of a method for a bottle.
 struct DisplayRow {
     bottle: String,
     method: DisplayMethod,
-    /// Mean absolute errors over the backgrounds, linear light; nothing without a cut-out.
+    /// Mean absolute errors over the backgrounds, linear light; none without a cut-out.
     errors: Option<[f64; BACKGROUNDS.len()]>,
-    /// Errors of the displacement where it is known, pixels of the photo.
+    /// Errors of the displacement where the truth is known, pixels of the photo.
     flow_errors: Vec<f64>,
-    /// Pixels inside; 0 where the true displacement is not known.
+    /// Number of pixels inside; 0 if the true displacement is not known.
     inside: usize,
     /// Why there is no cut-out.
     refused: String,
 }
 
-/// Errors of a method over all bottles that it has photos of.
+/// Errors of a method over all bottles with photos for it.
 struct DisplaySummary {
     method: DisplayMethod,
     bottles: usize,
     failed: usize,
-    /// Mean absolute error over all backgrounds; not a number without a cut-out.
+    /// Mean absolute error over all backgrounds; NaN without a cut-out.
     error: f64,
     /// The same as a share of the paper's on the same bottles: over all backgrounds, the plain one,
-    /// and those with a pattern.
+    /// and the patterned ones.
     shares: [f64; 3],
-    /// Of the pixels inside, how many have a displacement; not a number where the truth has none or
-    /// the method measures none.
+    /// Share of the pixels inside with a displacement; NaN if there is no true displacement or the
+    /// method does not measure any.
     known: f64,
-    /// Of those, how many have the right one, and the median error; not numbers without any.
+    /// Share of those with the right displacement, and the median error; NaN without any.
     good_flow: f64,
     median_flow_px: f64,
 }
@@ -90,7 +90,7 @@ fn rows_of(stage: &Stage<'_>, place: &Place, bottle: &Bottle) -> Result<Vec<Disp
         .collect())
 }
 
-/// A bottle over its backgrounds, seen straight from above.
+/// A bottle over its backgrounds, seen from straight above.
 struct Reality {
     name: String,
     window: DisplayWindow,
@@ -98,7 +98,7 @@ struct Reality {
     seen: Vec<Image<LinearRgb>>,
     /// The backgrounds without the bottle.
     empty: Vec<Surroundings>,
-    /// True displacement; none where it is not one place, or not known.
+    /// True displacement; none where it is not a single position or unknown.
     flow: Option<Image<Option<[f64; 2]>>>,
 }
 
@@ -183,7 +183,7 @@ impl Reality {
     }
 }
 
-/// Most of the light comes from one place.
+/// Whether most of the light comes from one position.
 fn is_mostly_sharp(path: &LightPath) -> bool {
     path.haze < 0.5
 }
@@ -233,7 +233,7 @@ fn sorted_flow_errors(own: &[&DisplayRow]) -> Vec<f64> {
     errors
 }
 
-/// Pixels inside whose displacement the method might have found.
+/// Number of pixels inside whose displacement the method could have measured.
 fn measured_pixels(own: &[&DisplayRow], method: DisplayMethod) -> usize {
     match method.measures_displacement() {
         true => own.iter().map(|row| row.inside).sum(),
@@ -241,7 +241,7 @@ fn measured_pixels(own: &[&DisplayRow], method: DisplayMethod) -> usize {
     }
 }
 
-/// Errors over all backgrounds, the plain one, and those with a pattern, as shares of the paper's on
+/// Errors over all backgrounds, the plain one, and the patterned ones, as shares of the paper's on
 /// the same bottles.
 fn shares_of_paper(own: &[&DisplayRow], rows: &[DisplayRow]) -> [f64; 3] {
     let both = |row: &&DisplayRow| Some((row.errors?, paper_errors(rows, &row.bottle)?));
@@ -258,7 +258,7 @@ fn paper_errors(rows: &[DisplayRow], bottle: &str) -> Option<[f64; BACKGROUNDS.l
     rows.iter().find(of_paper)?.errors
 }
 
-/// A share or a length; nothing where there is none.
+/// A share or a length; empty for NaN.
 fn shown(value: f64, unit: &str) -> String {
     if value.is_nan() {
         return String::new();
@@ -266,7 +266,7 @@ fn shown(value: f64, unit: &str) -> String {
     format!("{value:.2}{unit}")
 }
 
-/// A mean error; nothing where there is none.
+/// A mean error; empty for NaN.
 fn shown_error(value: f64) -> String {
     number_or_empty((!value.is_nan()).then_some(value), 5)
 }
@@ -314,8 +314,8 @@ pub fn write(set: &Path, folder: &Path, progress: impl Fn(u64, u64)) -> Result<T
 
 const TITLE: &str = "Error of captures over new backgrounds";
 
-/// Writes a strip for each of some bottles: reality and every method over a background, and below
-/// by how much each is off.
+/// Writes a strip for each of some bottles: reality and every method over a background, with the
+/// differences below.
 ///
 /// # Errors
 /// Bottles that are not in the set; files that cannot be read or written.

@@ -1,7 +1,7 @@
-//! Files of pictures: what a format loses against the time and the bytes it takes.
+//! Picture files: loss of each format against time and size.
 //!
 //! The reference is the picture before it is written. Files are read back by petcomp's own readers,
-//! which the tests hold against OpenImageIO's.
+//! which the tests compare with OpenImageIO's.
 
 use super::clock::timed;
 use super::matte::uniform;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 const SIZE: [u32; 2] = [640, 480];
 const CARD_COUNT: u32 = 12;
 const TIMED_RUNS: usize = 5;
-/// Width of the plate's noise, scene-linear: that of a good camera in the middle of its range.
+/// Amplitude of the plate's noise, scene-linear: that of a good camera in the middle of its range.
 const GRAIN_WIDTH: f32 = 0.01;
 const JPEG_QUALITIES: [u8; 6] = [50, 75, 85, 90, 95, 100];
 
@@ -105,7 +105,7 @@ impl EncodingComparison {
         }
     }
 
-    /// Why datasets have PNG: it beside JPEG.
+    /// Why datasets use PNG, compared with JPEG.
     fn why_png(&self) -> Option<String> {
         let png = self.stored_as(PNG, "normal")?;
         let jpeg = self.stored_as("JPEG", "95")?;
@@ -196,7 +196,7 @@ impl Encoding {
         self.curve == curve && self.setting == setting
     }
 
-    /// A PNG as datasets have it, or the EXR that a reference has beside it.
+    /// A PNG as in datasets, or the EXR of a reference.
     fn point(&self, cost: f64, error: f64) -> Point {
         Point::new(self.curve, self.setting.clone(), cost, error).used_where(|quality| {
             let with_exr = quality.pictures(Default::default()).exr;

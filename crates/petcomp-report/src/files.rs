@@ -1,10 +1,10 @@
-//! The files that a report consists of.
+//! The files of a report.
 
 use petcomp::{Result, io};
 use std::fs::DirEntry;
 use std::path::{Path, PathBuf};
 
-/// Writes texts into a folder, which is made if it is not there.
+/// Writes texts into a folder, which is created if necessary.
 ///
 /// # Errors
 /// Files that cannot be written.

@@ -1,9 +1,9 @@
-//! Flags: whether a wrong cut-out is flagged for review, and a right one is not, on photos made
-//! harder in many ways.
+//! Flags: whether wrong cut-outs are flagged for review and right ones are not, on photos degraded
+//! in many ways.
 //!
-//! A person reviews the flagged photos only, so two shares matter: *silently wrong* photos spoil a
+//! A person reviews only the flagged photos, so two shares matter: *silently wrong* photos spoil a
 //! dataset, *false alarms* cost a review each. The photos are rendered, with known outlines; each
-//! variant makes them harder in one way that keeps the outline known.
+//! variant degrades them in one way that keeps the outline known.
 
 mod variant;
 
@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use std::path::Path;
 use variant::{Expected, VARIANTS};
 
-/// A photo whose outline is known, and the expected result.
+/// A photo with a known outline, and the expected result.
 #[derive(Clone)]
 struct Trial {
     photo: Image<LinearRgb>,
@@ -29,24 +29,24 @@ struct Trial {
     expected: Expected,
 }
 
-/// The result of a photo.
+/// The result for a photo.
 struct FlagRow {
     photo: String,
     variant: &'static str,
     judged: Judgement,
 }
 
-/// How good the cut-out of a photo is.
+/// Quality of the cut-out of a photo.
 struct Judgement {
     /// Overlap (intersection over union) of the tight outline, and largest error of a side of the
-    /// hull's box in pixels; nothing where the photo was refused.
+    /// hull's box in pixels; none if the photo was refused.
     errors: Option<[f64; 2]>,
     end: End,
     /// Why the cut-out needs review, or why there is none.
     reasons: Vec<String>,
 }
 
-/// How a photo ended.
+/// Outcome of a photo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum End {
     /// As expected, and not flagged.
@@ -71,7 +71,7 @@ impl End {
         Self::SilentlyWrong,
     ];
 
-    /// What it is called in tables.
+    /// Its name in tables.
     fn name(self) -> &'static str {
         match self {
             Self::Right => "right",
@@ -95,7 +95,7 @@ fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<FlagRow>> {
     Ok(rows)
 }
 
-/// A row for each variant that can be made of a photo.
+/// A row for each variant that applies to a photo.
 fn measure_photo(known: &Known, seed: u64) -> Vec<FlagRow> {
     VARIANTS
         .par_iter()
@@ -150,7 +150,7 @@ impl Trial {
 }
 
 impl Expected {
-    /// How a photo of which there is a cut-out ended.
+    /// The outcome of a photo with a cut-out.
     fn end(self, is_right: bool, is_flagged: bool) -> End {
         match (self, is_right, is_flagged) {
             (Self::Right, true, false) | (Self::Flagged, _, true) => End::Right,
@@ -161,12 +161,12 @@ impl Expected {
     }
 }
 
-/// Pixels of a reduced search are that much larger.
+/// Tolerances scale with the pixels of a reduced search.
 pub(crate) fn is_right([iou, box_px]: [f64; 2], reduction: f64) -> bool {
     iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * reduction.max(1.0)
 }
 
-/// Why an outline needs review; its colours are another matter.
+/// Why an outline needs review, without reasons about its colours.
 fn outline_reasons(cut: &CutOut) -> Vec<String> {
     let of_outline = cut
         .diagnostics
@@ -175,7 +175,7 @@ fn outline_reasons(cut: &CutOut) -> Vec<String> {
     of_outline.map(ToString::to_string).collect()
 }
 
-/// How the photos of each variant ended, a line per variant.
+/// Outcomes of the photos of each variant, a row per variant.
 fn table(rows: &[FlagRow]) -> Table {
     let ends = End::ALL.map(End::name);
     let mut table = Table::new(["photos", "made of"].into_iter().chain(ends));
@@ -186,7 +186,7 @@ fn table(rows: &[FlagRow]) -> Table {
     table
 }
 
-/// How many photos of a variant there are, and how many ended in each way.
+/// Number of photos of a variant, and of those with each outcome.
 fn counts_of(rows: &[FlagRow], variant: &str) -> impl Iterator<Item = usize> {
     let of_variant = rows.iter().filter(|row| row.variant == variant);
     let ends: Vec<End> = of_variant.map(|row| row.judged.end).collect();
@@ -298,7 +298,7 @@ mod tests {
 
     #[test]
     fn nothing_ends_silently_wrong() {
-        // Not yet met: the ringing of strong compression around a drawn slab is treated as its
+        // Known exception: the ringing of strong compression around a drawn slab is treated as its
         // edge, and not flagged.
         let others = VARIANTS.iter().filter(|v| v.name != "JPEG quality 60");
         for name in others.map(|variant| variant.name) {

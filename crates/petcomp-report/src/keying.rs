@@ -1,7 +1,7 @@
-//! The keyer's blur: Blender's sums against running sums, error against run time.
+//! The keyer's blur: Blender's sums compared with running sums, error against run time.
 //!
-//! The reference is the mean over the window in double precision, added up pixel by pixel from the
-//! matte before the blur.
+//! The reference is the mean over the window in double precision, summed pixel by pixel from the
+//! unblurred matte.
 
 use super::clock::timed;
 use super::{Diagram, Point};
@@ -12,7 +12,7 @@ use petcomp::{Coverage, Image, LinearRgb, Result};
 use std::ops::Range;
 
 const SIZE: (usize, usize) = (640, 480);
-/// Sizes of the blur, pixels: a window reaches one pixel less to every side.
+/// Sizes of the blur, pixels: a window extends one pixel less to every side.
 const BLUR_SIZES_PX: [u32; 4] = [3, 10, 30, 100];
 const TIMED_RUNS: usize = 5;
 const SCREEN: LinearRgb = LinearRgb::new(0.1, 0.75, 0.2);
@@ -23,7 +23,7 @@ const DISC_RADIUS_PX: f32 = 160.0;
 const DISC_EDGE_PX: f32 = 8.0;
 const DISC_TILE_PX: usize = 40;
 
-/// Error and time of both ways to blur, at several sizes.
+/// Error and time of both kinds of blur, at several sizes.
 pub(crate) fn diagrams() -> Result<Vec<Diagram>> {
     let photo = disc_photo();
     let job = Keying::new(&photo, Screen::Color(SCREEN));
@@ -81,7 +81,7 @@ fn why_exact(exact: &[Point], running: &[Point]) -> String {
     )
 }
 
-/// A soft disc of grey and red tiles before a screen with a slope of light.
+/// A soft disc of grey and red tiles in front of a screen with a gradient of light.
 fn disc_photo() -> Image<LinearRgb> {
     Image::from_fn(SIZE.0, SIZE.1, |x, y| {
         let cover = disc_coverage(x, y);
@@ -106,7 +106,7 @@ fn disc_color(x: usize, y: usize) -> LinearRgb {
 }
 
 /// Root mean squared difference between a blurred matte and the means of the sharp one's windows,
-/// cut off at the border.
+/// clipped at the border.
 fn rms_from_means(blurred: &Image<Coverage>, sharp: &Image<Coverage>, radius: usize) -> f64 {
     let (w, h) = sharp.size();
     let (mut squares, mut count) = (0.0, 0.0);

@@ -1,9 +1,9 @@
-//! Labels of a shape whose area is known: polygon against raster, error against run time and
-//! points.
+//! Labels of a shape with known area: polygon compared with raster, error against run time and
+//! number of points.
 //!
-//! The shape is an ellipse, the reference its closed form. The error is 1 - IoU: for the pixels of
-//! a mask by 16 x 16 points each; for a polygon inscribed in the ellipse it is the area that it
-//! lacks; for any other by chords along 16 lines a pixel.
+//! The shape is an ellipse, the reference its closed form. The error is 1 - IoU: for a mask from 16
+//! x 16 points per pixel; for a polygon inscribed in the ellipse from the area that it lacks; for
+//! any other polygon from chords along 16 lines per pixel.
 
 mod ellipse;
 
@@ -18,16 +18,16 @@ use petcomp::scene::Shot;
 /// Pictures: the default size, its half and its double.
 const SIZES_PX: [[u32; 2]; 3] = [[320, 240], DEFAULT_SIZE_PX, [1280, 960]];
 const DEFAULT_SIZE_PX: [u32; 2] = [640, 480];
-/// Shares of a pixel that must be covered.
+/// Minimum covered shares of a pixel.
 const THRESHOLDS: [f32; 4] = [0.02, 0.1, 0.25, 0.5];
-/// Corners of the polygon.
+/// Numbers of corners of the polygon.
 const CORNERS: [usize; 5] = [8, 16, 32, 64, 128];
 const SHOT_CORNERS: usize = 64;
-/// How far a simplified border may be from that of the mask, pixels.
+/// Maximum distances of a simplified border from that of the mask, pixels.
 const TOLERANCES_PX: [f64; 6] = [0.5, 0.75, 1.0, 1.5, 2.0, 4.0];
 const TIMED_RUNS: usize = 7;
 
-/// Error against time, and against the points that are written.
+/// Error against time, and against the number of written points.
 pub(crate) fn diagrams() -> Result<Vec<Diagram>> {
     let mut found = LabelPoints::default();
     for size in SIZES_PX {
@@ -39,7 +39,7 @@ pub(crate) fn diagrams() -> Result<Vec<Diagram>> {
     Ok(found.into_diagrams())
 }
 
-/// The ellipse as it is seen in a picture.
+/// The ellipse as seen in a picture.
 struct EllipsePicture {
     size: [u32; 2],
     ellipse: Ellipse,
@@ -95,7 +95,7 @@ impl EllipsePicture {
     }
 }
 
-/// A mask, and what it takes to get it from deep samples.
+/// A mask, and the cost of computing it from deep samples.
 struct MeasuredMask {
     name: String,
     mask: RleMask,
@@ -109,7 +109,7 @@ impl MeasuredMask {
         Point::new(curve, &self.name, cost, self.error)
     }
 
-    /// A point that is the default where the mask is.
+    /// A point that is the default if the mask is.
     fn marked(&self, point: Point) -> Point {
         point.used_where(|_| self.is_default)
     }
@@ -207,7 +207,7 @@ fn length_diagram(points: Vec<Point>) -> Diagram {
     }
 }
 
-/// What both diagrams share.
+/// Properties shared by both diagrams.
 fn label_diagram() -> Diagram {
     Diagram {
         input: input_words(),
@@ -276,7 +276,7 @@ mod tests {
             ..LabelOptions::default()
         };
         let mask = only_mask(&label(&ellipse.deep(), &shot, &half));
-        // A pixel on the border is wrong by at most a half, and by a quarter in the mean.
+        // A pixel on the border is wrong by at most a half, and by a quarter on average.
         let border: f64 = ring
             .iter()
             .zip(ring.iter().cycle().skip(1))

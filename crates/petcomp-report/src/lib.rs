@@ -1,6 +1,6 @@
-//! Report: how good a stage is, measured on simulated data, as tables and plots.
+//! Report: measures how well each stage works on simulated data, as tables and plots.
 //!
-//! Errors are the same at every run; times are this machine's.
+//! Errors are the same in every run; times depend on the machine.
 
 pub mod all;
 pub mod camera;

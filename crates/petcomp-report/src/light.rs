@@ -1,10 +1,10 @@
-//! Light and shadow: the filtered form and plain samples against closed forms, error against run
-//! time.
+//! Light and shadow: the filtered form and plain samples compared with closed forms, error against
+//! run time.
 //!
-//! One opaque card hangs over the surface. What it leaves of a rectangular light at a point is
-//! Lambert's formula for the part of the light that the card does not hide: the light cut by the
-//! planes through the point and the card's sides. What it leaves of an even sky is 1 less the
-//! card's form factor. Neither shares anything with the renderer's sampling.
+//! One opaque card is above the surface. The share of a rectangular light that it leaves at a point
+//! is Lambert's formula for the part of the light that the card does not hide: the light clipped by
+//! the planes through the point and the card's sides. The share of a uniform sky is 1 less the
+//! card's form factor. Neither has anything in common with the renderer's sampling.
 
 mod shadow;
 
@@ -23,11 +23,11 @@ const LIGHT_SAMPLES: [usize; 7] = [1, 2, 3, 4, 6, 8, 12];
 /// Directions of the sky.
 const SKY_SAMPLES: [usize; 7] = [4, 12, 32, 64, 100, 200, 400];
 const CELLS_PX: [f64; 5] = [4.0, 2.0, 1.5, 1.0, 0.33];
-/// The plain form takes a thousand times as long, so that it is tried with fewer samples.
+/// The plain form takes a thousand times as long, so it is measured with fewer samples.
 const MAX_PLAIN_SAMPLES: usize = 64;
 const TIMED_RUNS: usize = 5;
 
-/// The shadow of a card under an area light, and under an even sky.
+/// The shadow of a card under an area light, and under a uniform sky.
 pub(crate) fn diagrams() -> Result<Vec<Diagram>> {
     let kinds = [LightKind::Area, LightKind::Sky];
     kinds.into_iter().map(shadow_diagram).collect()
@@ -116,7 +116,7 @@ fn input_words() -> String {
 
 type Renderer = fn(&Shot, &RenderOptions) -> DeepImage;
 
-/// A card's shadow, to be rendered, and its closed form.
+/// A card's shadow to render, and its closed form.
 struct Shadow {
     kind: LightKind,
     shot: Shot,
@@ -164,7 +164,7 @@ impl Shadow {
     }
 
     fn plain_point(&self, samples: usize) -> Result<Point> {
-        // One sample a pixel: shadows are smooth, and what is compared is the light.
+        // One sample per pixel: shadows are smooth, and only the light is compared.
         let options = RenderOptions {
             subsamples: 1,
             ..self.kind.options(samples)
@@ -197,7 +197,7 @@ impl Shadow {
             .used_where(|q| is_default && q == Quality::default()))
     }
 
-    /// Over the pixels for which the closed form holds.
+    /// Root mean square over the pixels for which the closed form holds.
     fn rms_error(&self, deep: &DeepImage) -> f64 {
         let shadow = deep.shadow();
         let pairs = shadow.pixels().iter().zip(&self.exact);

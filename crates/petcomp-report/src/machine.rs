@@ -1,4 +1,4 @@
-//! What the measurements were made on.
+//! The machine used for the measurements.
 
 use petcomp::plot::Table;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 const BYTES_PER_KIB: f64 = 1024.0;
 pub(crate) const BYTES_PER_GIB: f64 = 1024.0 * 1024.0 * 1024.0;
 
-/// The machine and the versions of what runs on it; unknown values and an empty date are left out.
+/// The machine and the versions of its software; unknown values and an empty date are left out.
 pub(super) fn machine_table(date: &str) -> Table {
     let mut table = Table::new(["what", "value"]);
     for (what, value) in properties(date) {
@@ -50,7 +50,7 @@ fn kernel_release() -> Option<String> {
     Some(text.trim().to_owned())
 }
 
-/// The value of the first line of a file that begins with a name, and a `:` or `=`.
+/// The value in the first line of a file that begins with a name, after a `:` or `=`.
 fn line_of(path: impl AsRef<Path>, name: &str) -> Option<String> {
     let text = std::fs::read_to_string(path).ok()?;
     value_in(&text, name).map(str::to_owned)
@@ -66,7 +66,7 @@ fn value_of<'a>(line: &'a str, name: &str) -> Option<&'a str> {
     rest.strip_prefix([':', '='])
 }
 
-/// What a line `Name:   123 kB` of a file of Linux's `/proc` says, bytes.
+/// The value of a line `Name:   123 kB` in a file of Linux's `/proc`, bytes.
 pub(crate) fn bytes_in(text: &str, name: &str) -> Option<f64> {
     let kib: f64 = value_in(text, name)?.strip_suffix(" kB")?.parse().ok()?;
     Some(kib * BYTES_PER_KIB)

@@ -17,7 +17,7 @@ struct ReportCli {
     command: command::Command,
 }
 
-/// Flags that mean the same for every report.
+/// Flags common to all reports.
 #[derive(clap::Args)]
 pub(crate) struct ReportFlags {
     /// Worker threads; 0 means one per core
@@ -35,14 +35,14 @@ pub(crate) struct ReportFlags {
 }
 
 impl ReportFlags {
-    /// Prints a line about the work, unless asked to be quiet.
+    /// Prints a line about the work, unless `--quiet` is set.
     pub(crate) fn print_line(&self, line: impl std::fmt::Display) {
         if !self.quiet {
             println!("{line}");
         }
     }
 
-    /// Runs `measure`, which is given what shows the number of finished steps and of all steps on a
+    /// Runs `measure`, whose argument shows the number of finished steps and of all steps on a
     /// terminal.
     pub(crate) fn with_progress<T>(
         &self,
@@ -77,7 +77,7 @@ fn progress_style() -> ProgressStyle {
 
 fn main() -> ExitCode {
     let cli = ReportCli::parse();
-    // Fails only if a pool exists already, and then that pool serves.
+    // Fails only if a pool already exists, which is then used.
     let _ = rayon::ThreadPoolBuilder::new()
         .num_threads(cli.common.threads)
         .build_global();

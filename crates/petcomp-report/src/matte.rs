@@ -1,10 +1,10 @@
 //! Error of the matting methods against run time, on photos with known mattes.
 //!
 //! The truth is a renderer's: light added, transmittance with and without the object's own shadow,
-//! coverage, screen. Every method sees the same photos and finds the object itself. The two-screen
-//! method sees two shots made of the truth by `F + T K`, with the noise of the same sensor: on the
-//! photo's screen, green or blue, and on the other one. (The photo itself departs from the model by
-//! what blurs and refracts the screen, which a second shot would do alike.)
+//! coverage, screen. Every method gets the same photos and finds the object itself. The two-screen
+//! method gets two shots composed from the truth as `F + T K`, with the noise of the same sensor:
+//! on the photo's screen, green or blue, and on the other one. (The photo itself deviates from the
+//! model through blur and refraction of the screen, which would be the same in a second shot.)
 
 mod diagram;
 mod made;
@@ -32,11 +32,11 @@ use std::path::Path;
 use summary::{MethodSummary, summaries};
 use truth::{Known, Truths};
 
-/// What a method made of a photo.
+/// The result of a method for a photo.
 struct MatteRow {
     photo: String,
     method: MattingMethod,
-    /// Its errors; nothing where it gave no cut-out.
+    /// Its errors; none without a cut-out.
     score: Option<Score>,
     /// Why the cut-out needs review, or why there is none.
     warnings: Vec<String>,
@@ -44,11 +44,11 @@ struct MatteRow {
     time_ms: f64,
 }
 
-/// A box that a person would draw, pixels.
+/// Error of a box that a person would draw, pixels.
 pub(super) const GOOD_BOX_PX: f64 = 2.0;
-/// The outline that is promised.
+/// The promised overlap of the outline.
 pub(super) const GOOD_IOU: f64 = 0.95;
-/// Shots made of each photo's truth: their noise is drawn from seeds of their own.
+/// Shots composed from each photo's truth: their noise has seeds of its own.
 const SHOTS_PER_PHOTO: u64 = 2;
 const MS_PER_SECOND: f64 = 1e3;
 /// New backgrounds per photo.
@@ -73,7 +73,7 @@ fn measure_known(
     read: impl Fn(usize) -> Result<Known>,
     progress: impl Fn(u64, u64),
 ) -> Result<Vec<MatteRow>> {
-    // One thread, so that run times can be compared.
+    // One thread, so that run times are comparable.
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let mut rows = Vec::new();
     for i in 0..count {
@@ -89,7 +89,7 @@ fn measure_known(
     Ok(rows)
 }
 
-/// A photo with its truth, and what is made of that.
+/// A photo with its truth, and the inputs derived from them.
 struct MattingInputs {
     known: Known,
     /// Those of the two-screen method.
@@ -98,7 +98,7 @@ struct MattingInputs {
 }
 
 impl MattingInputs {
-    /// Of photo `i`.
+    /// The inputs of photo `i`.
     fn new(known: Known, i: u64) -> Self {
         let seed = SHOTS_PER_PHOTO * i;
         let size = known.photo.size();

@@ -1,4 +1,4 @@
-//! Other programs that do the same, measured beside petcomp in one run:
+//! Other programs for the same task, measured next to petcomp in one run:
 //! `tests/benches/peers/<stage>.py` writes what is read here, `make peers` runs them.
 
 use super::files::json_files;
@@ -8,25 +8,25 @@ use petcomp::{Result, io};
 use serde::Deserialize;
 use std::path::Path;
 
-/// Our own name among the programs.
+/// The name of petcomp among the programs.
 const OURS: &str = "petcomp";
-/// The setting that is compared with.
+/// The setting to compare with.
 const DEFAULT: &str = "default";
 
-/// One stage, by several programs.
+/// One stage in several programs.
 #[derive(Debug, PartialEq, Deserialize)]
 pub(crate) struct PeerComparison {
     stage: String,
-    /// What is processed, with its size.
+    /// The input, with its size.
     input: String,
-    /// What the error is, with its unit.
+    /// Name of the error, with its unit.
     error: String,
-    /// What results are held against.
+    /// Reference that results are compared with.
     reference: String,
     /// Threads that each program may use.
     #[serde(default)]
     threads: Option<u32>,
-    /// What the seconds are.
+    /// Meaning of the seconds.
     #[serde(default)]
     clock: String,
     #[serde(default)]
@@ -41,19 +41,19 @@ pub(crate) struct PeerComparison {
 struct PeerPoint {
     program: String,
     version: String,
-    /// What was set.
+    /// The setting.
     setting: String,
-    /// How it was run.
+    /// Its command.
     #[serde(default)]
     command: String,
-    /// Its error; nothing where there is nothing to hold it against.
+    /// Its error; none if there is no reference.
     error: Option<f64>,
     /// Median of its run times, seconds.
     seconds: f64,
-    /// How many runs that is the median of.
+    /// Number of runs of that median.
     #[serde(default)]
     runs: u32,
-    /// The setting of petcomp that does the same; empty = its default.
+    /// The corresponding setting of petcomp; empty for its default.
     #[serde(default)]
     beside: String,
 }
@@ -65,7 +65,7 @@ struct Absent {
     why: String,
 }
 
-/// Reads every comparison (`*.json`) of a folder, by file name; none where there is no such folder.
+/// Reads every comparison (`*.json`) of a folder, by file name; none if there is no such folder.
 pub(crate) fn read_comparisons(folder: &Path) -> Result<Vec<PeerComparison>> {
     if !folder.exists() {
         return Ok(Vec::new());
@@ -79,7 +79,7 @@ impl PeerPoint {
         format!("{} {}", self.program, self.version)
     }
 
-    /// Its place in a diagram; nothing without an error.
+    /// Its point in a diagram; none without an error.
     fn point(&self) -> Option<Point> {
         let setting = self.setting.clone();
         Some(Point::new(self.name(), setting, self.seconds, self.error?))
@@ -87,7 +87,7 @@ impl PeerPoint {
 }
 
 impl PeerComparison {
-    /// Error against time, a curve for each program; what has no error is not in it.
+    /// Error against time, a curve per program; points without an error are left out.
     pub(crate) fn diagram(&self) -> Diagram {
         Diagram {
             file: format!("peers_{}", file_name(&self.stage)),
@@ -115,7 +115,7 @@ impl PeerComparison {
         }
     }
 
-    /// Our point that another is compared with: the one that it names, or our default, or else our
+    /// Our point to compare another one with: the one that it names, else our default, else our
     /// first.
     fn our_counterpart(&self, other: &PeerPoint) -> Option<&PeerPoint> {
         let ours: Vec<_> = self.points.iter().filter(|m| m.program == OURS).collect();
@@ -126,7 +126,7 @@ impl PeerComparison {
         named.or(default).or(ours.first()).copied()
     }
 
-    /// A program beside petcomp: how many times its seconds and its error.
+    /// A program compared with petcomp: ratios of seconds and of error.
     fn ratio_cells(&self, m: &PeerPoint) -> [String; 8] {
         let ours = self.our_counterpart(m);
         let seconds = ours.map(|ours| m.seconds / ours.seconds);
@@ -143,7 +143,7 @@ impl PeerComparison {
         ]
     }
 
-    /// Programs that are not in it, in words; nothing where all are.
+    /// Sentence about missing programs; empty if there are none.
     pub(crate) fn missing(&self) -> String {
         if self.absent.is_empty() {
             return String::new();
@@ -154,7 +154,7 @@ impl PeerComparison {
     }
 }
 
-/// A stage's name as a file may be called.
+/// A stage's name as a file name.
 fn file_name(stage: &str) -> String {
     let lower = stage.to_ascii_lowercase();
     lower.replace(|c: char| !c.is_ascii_alphanumeric(), "_")
@@ -166,7 +166,7 @@ fn number_or_empty(number: Option<f64>) -> String {
         .map_or(String::new(), three)
 }
 
-/// Every program beside petcomp's default: how many times its seconds and its error.
+/// Every program compared with petcomp's default: ratios of seconds and of error.
 pub(crate) fn ratios(comparisons: &[PeerComparison]) -> Table {
     let mut table = Table::new([
         "stage",

@@ -1,4 +1,4 @@
-//! A pile of cards made in code: something to render where no photograph is at hand.
+//! A synthetic pile of cards, for rendering without photographs.
 
 use petcomp::Camera;
 use petcomp::Image;
@@ -35,7 +35,7 @@ fn pose_looking_down(height_m: f64) -> Pose {
     Pose::from_parts(Vector3::new(0.0, 0.0, height_m).into(), down)
 }
 
-/// A square lamp that shines at the origin from above its right.
+/// A square lamp above and to the right of the origin that shines at it.
 pub(super) fn lamp(color: LinearRgb) -> AreaLight {
     AreaLight {
         color,
@@ -43,7 +43,7 @@ pub(super) fn lamp(color: LinearRgb) -> AreaLight {
     }
 }
 
-/// See-through bottles on and over each other, under one light and a dim sky.
+/// See-through bottles on top of each other and side by side, under one light and a dim sky.
 pub(super) fn pile(cards: u32, image: [u32; 2]) -> Shot {
     let shot = Shot::new(camera_above(image, CAMERA_HEIGHT_M))
         .with_light(lamp(LinearRgb::new(1.0, 0.95, 0.85)))
@@ -63,7 +63,7 @@ fn bottle_card(k: u32, textures: &[Texture]) -> Card {
     Card::new(ObjectId(k + 1), quad, texture)
 }
 
-/// Spread by sines of incommensurable steps, each a little higher than the last.
+/// Spread by sines with incommensurable steps, each a little higher than the last.
 fn scattered_pose(k: f64) -> Pose {
     let (x, y) = (0.17 * libm::sin(3.1 * k), 0.1 * libm::cos(4.7 * k));
     let center = Vector3::new(x, y, 0.02 + 0.004 * k);

@@ -1,7 +1,8 @@
-//! Error of the renderer against run time: its presets beside Cycles at many sample counts, and the
-//! golden scenes.
+//! Error of the renderer against run time: its presets compared with Cycles at many sample counts,
+//! and the golden scenes.
 //!
-//! Times are CPU seconds of the rendering itself, textures read and their pyramids built.
+//! Times are CPU seconds of the rendering itself, after textures have been read and their mip
+//! levels built.
 
 mod cycles;
 mod diagram;
@@ -74,9 +75,10 @@ impl RenderReportOptions {
     }
 }
 
-/// The quadrature renders a quarter of the picture's sides: it takes a thousand times as long.
+/// The quadrature renders a quarter of the picture's sides, since it takes a thousand times as
+/// long.
 const QUADRATURE_SHRINK: u32 = 4;
-/// How finely the quadrature is sampled: sub-samples, light samples (a side each) and directions of
+/// Sampling density of the quadrature: sub-samples, light samples (per side each) and directions of
 /// the environment.
 const QUADRATURE: RenderOptions = RenderOptions {
     subsamples: 6,
@@ -106,11 +108,11 @@ pub(super) const HIGH: RenderOptions = RenderOptions {
 
 /// The name of this program in tables.
 const PETCOMP: &str = "petcomp";
-/// The setting of which the sheet of golden scenes is made.
+/// The setting used for the sheet of golden scenes.
 const SHEET_SETTING: &str = "good";
 
-/// Points on the curve of error over run time, the quickest first: each [`Quality`], and two finer
-/// than the default.
+/// Points on the curve of error over run time, the fastest first: each [`Quality`], and two
+/// settings finer than the default.
 pub(crate) fn settings() -> [(&'static str, RenderOptions); 5] {
     let [draft, normal, reference] = Quality::ALL.map(|quality| (quality.name(), quality.render()));
     [draft, normal, ("good", GOOD), ("high", HIGH), reference]
@@ -123,9 +125,10 @@ struct RenderRow {
     /// Setting, or samples per pixel.
     setting: String,
     cpu_seconds: f64,
-    /// Against the other program's best picture; none without one, or for that picture itself.
+    /// Compared with the other program's best picture; none without one, or for that picture
+    /// itself.
     cycles: Option<Likeness>,
-    /// Against the quadrature of the definition, at a quarter of the sides.
+    /// Compared with the quadrature of the definition, at a quarter of the sides.
     quadrature: Option<Likeness>,
 }
 
@@ -135,9 +138,9 @@ impl RenderRow {
     }
 }
 
-/// Measures and writes `render.csv`, `render.md` and `render.svg` into a folder, and of the golden
+/// Measures and writes `render.csv`, `render.md` and `render.svg` into a folder, and for the golden
 /// scenes `render_golden.csv` and the sheet `render_golden.png`: each scene as reference, 16 times
-/// the difference, and ours. Returns the table, and how many golden pictures there are.
+/// the difference, and our picture. Returns the table, and the number of golden pictures.
 ///
 /// # Errors
 /// A scene or a picture that cannot be read; files that cannot be written.
@@ -161,7 +164,7 @@ pub fn write(options: &RenderReportOptions) -> Result<(Table, usize)> {
     Ok((table, golden.len()))
 }
 
-/// Every setting, and every picture of the other program that is there.
+/// Measures every setting, and every available picture of the other program.
 fn measure(options: &RenderReportOptions) -> Result<Vec<RenderRow>> {
     let others = CyclesPictures::read(&options.cycles)?;
     let timed_scene = TimedScene::new(options, others.best()?)?;
@@ -180,7 +183,7 @@ fn measure(options: &RenderReportOptions) -> Result<Vec<RenderRow>> {
     Ok(rows)
 }
 
-/// The scene that is timed, and what its picture should be.
+/// The timed scene, and its reference pictures.
 struct TimedScene {
     shot: Shot,
     small: Shot,
@@ -293,7 +296,7 @@ mod tests {
         };
         let (table, golden_pictures) = write(&options).unwrap();
         assert_eq!((table.rows.len(), golden_pictures), (settings().len(), 0));
-        // So small a picture may be done before the system's clock of CPU time moves.
+        // Such a small picture may be finished before the system's clock of CPU time advances.
         let number = |row: &[String], i: usize| row[i].parse::<f64>().unwrap();
         assert!(
             table

@@ -1,5 +1,5 @@
-//! Sections of a document of measurements, which becomes a page, Markdown, and a file of data for
-//! each table and plot.
+//! Sections of a document of measurements, which becomes an HTML page, Markdown, and a data file
+//! for each table and plot.
 
 use super::Diagram;
 use petcomp::Result;
@@ -10,7 +10,7 @@ use std::path::Path;
 /// A part of a document under a heading of its own.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Section {
-    /// What it is about.
+    /// Its title.
     pub(crate) title: String,
     parts: Vec<SectionPart>,
 }
@@ -31,7 +31,7 @@ enum SectionPart {
 }
 
 impl Section {
-    /// An empty one.
+    /// An empty section.
     pub(crate) fn new(title: impl Into<String>) -> Self {
         Self {
             title: title.into(),
@@ -44,7 +44,7 @@ impl Section {
         self
     }
 
-    /// A paragraph; nothing for no text.
+    /// Adds a paragraph; nothing for an empty text.
     pub(crate) fn text(self, text: impl Into<String>) -> Self {
         let text = text.into();
         if text.is_empty() {
@@ -53,7 +53,7 @@ impl Section {
         self.with_part(SectionPart::Text(text))
     }
 
-    /// A table, also written as `<file>.csv`; one without rows is left out.
+    /// Adds a table, also written as `<file>.csv`; a table without rows is left out.
     pub(crate) fn table(self, file: impl Into<String>, table: Table) -> Self {
         if table.rows.is_empty() {
             return self;
@@ -62,7 +62,7 @@ impl Section {
         self.with_part(SectionPart::Table { file, table })
     }
 
-    /// A drawing with its caption and its data, written as `<file>.csv`.
+    /// Adds a drawing with its caption and its data, written as `<file>.csv`.
     pub(crate) fn figure(
         self,
         file: impl Into<String>,
@@ -78,7 +78,7 @@ impl Section {
         })
     }
 
-    /// A work-precision diagram.
+    /// Adds a work-precision diagram.
     pub(crate) fn diagram(self, diagram: &Diagram) -> Self {
         self.figure(
             diagram.file.clone(),
@@ -88,7 +88,7 @@ impl Section {
         )
     }
 
-    /// Several of them.
+    /// Adds several diagrams.
     pub(crate) fn diagrams(self, diagrams: &[Diagram]) -> Self {
         diagrams.iter().fold(self, Self::diagram)
     }
@@ -110,14 +110,14 @@ impl Section {
 /// A document of sections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Document {
-    /// What it is about.
+    /// Its title.
     pub(crate) title: String,
-    /// Its parts, in order.
+    /// Its sections, in order.
     pub(crate) sections: Vec<Section>,
 }
 
 impl Document {
-    /// The whole of it as one HTML page that needs no other file.
+    /// The whole document as one self-contained HTML page.
     pub(crate) fn html(&self) -> String {
         let mut page = Page::new(&self.title);
         page.html(&self.contents_html());
@@ -137,7 +137,7 @@ impl Document {
         format!("<ol>\n{links}</ol>\n")
     }
 
-    /// Its text and tables as Markdown; plots as their captions.
+    /// Its texts and tables as Markdown; plots become their captions.
     pub(crate) fn markdown(&self) -> String {
         let sections: String = self.sections.iter().map(Section::markdown).collect();
         format!("# {}\n{sections}", self.title)
@@ -160,7 +160,7 @@ impl Document {
 }
 
 impl SectionPart {
-    /// The name of the file of data, and the data.
+    /// The name and the contents of the data file.
     fn data_file(&self) -> Option<(&str, &Table)> {
         match self {
             Self::Text(_) => None,
@@ -196,7 +196,7 @@ fn figure_html(svg: &str, caption: &str, data: &Table) -> String {
     )
 }
 
-/// Text for HTML, with what stands between backticks as code.
+/// Text for HTML, with everything between backticks as code.
 fn with_code(text: &str) -> String {
     let pieces = text.split('`').map(escaped).enumerate();
     pieces

@@ -1,16 +1,16 @@
 //! Error of the settle stage against run time.
 //!
-//! Time step and solver iterations are changed one against the other; each setting sees the same
-//! heaps and the same closed-form cases. Overlap is measured by the stage's own separating-axis
-//! test, which shares nothing with the engine.
+//! Time step and solver iterations are traded against each other; each setting gets the same heaps
+//! and the same closed-form cases. Overlap is measured by the stage's own separating-axis test,
+//! which is independent of the engine.
 //!
 //! # Why the default is 1/360 s and 4 iterations
 //! Contacts are as stiff as the rate of solver iterations (iterations / step) allows, and overlap
-//! falls with its square; run time grows with it. Of 150 heaps of 5 to 30 cards, half failed at
-//! 1/120 s, which is therefore refused; at 1/240 s the worst pair overlapped by 0.23 mm, half of
-//! what is accepted, and a fifth of the heaps gained energy; at 1/480 s nothing overlapped by more
-//! than 0.03 mm. At 1/360 s all of 100 heaps of 20 bottles rest at the first attempt, at three
-//! quarters of the time. Shorter steps gain what no picture shows.
+//! falls with the square of that rate, while run time grows with it. Of 150 heaps of 5 to 30 cards,
+//! half failed at 1/120 s, which is therefore rejected; at 1/240 s the worst pair overlapped by
+//! 0.23 mm, half of what is accepted, and a fifth of the heaps gained energy; at 1/480 s nothing
+//! overlapped by more than 0.03 mm. At 1/360 s all of 100 heaps of 20 bottles rest at the first
+//! attempt, at three quarters of the time. Shorter steps bring no visible gain.
 
 mod closed_form;
 mod diagram;
@@ -31,32 +31,32 @@ use petcomp::settle::{SettleVerdict, Settled, heap, settle};
 use show::{charts, table};
 use std::path::Path;
 
-/// Time steps, as the number of them in a second.
+/// Time steps, as their number per second.
 const RATES: [u32; 5] = [240, 360, 480, 960, 1920];
 const ITERATIONS: [u32; 4] = [1, 2, 4, 8];
 const HEAP_CARDS: usize = 20;
 const MS_PER_SECOND: f64 = 1e3;
 const MM_PER_M: f64 = 1e3;
 
-/// What a setting of the solver gives.
+/// The result of a setting of the solver.
 struct SettleRow {
-    /// Time steps in a second.
+    /// Time steps per second.
     rate: u32,
-    /// Solver iterations in a step.
+    /// Solver iterations per step.
     iterations: u32,
     /// Heaps settled, and how many of them came to rest at the first attempt.
     heaps: usize,
     rested: usize,
     /// Overlap at the end: median and worst, millimetres.
     overlap_mm: [f64; 2],
-    /// Energy that appeared between two steps, percent of the drop's: median and worst.
+    /// Spurious energy gain between two steps, percent of the drop's energy: median and worst.
     energy_percent: [f64; 2],
-    /// How far the topmost of a stack of ten plates is from ten thicknesses, millimetres. Bodies
+    /// Deviation of the topmost of a stack of ten plates from ten thicknesses, millimetres. Bodies
     /// keep two margins of 0.2 mm between them, so a stack without any overlap has 4.
     stack_mm: f64,
-    /// Slopes on which a plate slides and should not, or the other way round.
+    /// Number of slopes on which a plate slides and should not, or vice versa.
     wrong_slopes: usize,
-    /// Median CPU time of a heap, milliseconds.
+    /// Median CPU time per heap, milliseconds.
     cpu_ms: f64,
 }
 
@@ -71,8 +71,8 @@ impl SettleRow {
     }
 }
 
-/// Measures every setting with so many heaps; `progress` gets the number of the setting and of all
-/// settings. One thread, so that run times mean something.
+/// Measures every setting with this many heaps; `progress` gets the number of the setting and of
+/// all settings. Runs on one thread, so that run times are comparable.
 fn measure(heaps: u64, progress: impl Fn(u64, u64)) -> Result<Vec<SettleRow>> {
     let settings = settings();
     let heaps = (0..heaps).map(|k| heap(k, HEAP_CARDS));
@@ -94,7 +94,7 @@ fn settings() -> Vec<SettleOptions> {
     rates.flat_map(|rate| at_rate(*rate, default)).collect()
 }
 
-/// A number of steps a second, with every number of iterations.
+/// A number of steps per second, with every number of iterations.
 fn at_rate(rate: u32, default: SettleOptions) -> [SettleOptions; 4] {
     ITERATIONS.map(|iterations| SettleOptions {
         step: 1.0 / f64::from(rate),
@@ -135,8 +135,8 @@ fn count_rested(ends: &[Settled]) -> usize {
         .count()
 }
 
-/// Writes the sweep (`settle.csv`, `.md`, `.svg`), with so many heaps for each setting, at least
-/// one, into a folder. Returns the number of lines of `settle.csv`.
+/// Writes the sweep (`settle.csv`, `.md`, `.svg`), with this many heaps for each setting, at least
+/// one, into a folder. Returns the number of rows of `settle.csv`.
 ///
 /// # Errors
 /// Files that cannot be written.

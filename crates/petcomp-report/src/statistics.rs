@@ -1,9 +1,9 @@
-//! Means and quantiles of what was measured.
+//! Means and quantiles.
 
-/// The value at a share of the sorted values, from 0 for the least to 1 for the greatest; 0 of
-/// nothing.
+/// The value at a share of the sorted values, from 0 for the least to 1 for the greatest; 0 for an
+/// empty list.
 ///
-/// Of an even number, the median is the upper of the middle two.
+/// For an even number of values, the median is the upper of the middle two.
 pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> f64 {
     quantiles(values, [share])[0]
 }
@@ -21,7 +21,7 @@ pub(crate) fn quantiles<const N: usize>(
     })
 }
 
-/// The mean of a number over some things; 0 of nothing.
+/// The mean of a number over some things; 0 if there are none.
 pub(crate) fn mean_of<T>(things: &[T], number: impl Fn(&T) -> f64) -> f64 {
     things.iter().map(number).sum::<f64>() / things.len().max(1) as f64
 }

@@ -1,9 +1,9 @@
-//! What scenes pay for: every scene here has a feature or lacks it, and the table shows the work
-//! counted for it.
+//! Cost of scene features: every scene here has a feature or lacks it, and the table shows the
+//! counted work.
 //!
-//! Each scene takes the program's whole path: files are opened, what is unknown is solved for, the
-//! picture, its labels or a dataset is made and written. Numbers are the same at every run, on
-//! every machine, and at any thread count.
+//! Each scene runs through the whole program: files are opened, unknowns are solved, and the
+//! picture, its labels or a dataset is generated and written. Numbers are the same in every run, on
+//! every machine, and with any number of threads.
 
 mod cases;
 #[cfg(test)]
@@ -22,21 +22,21 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use world::FixtureFolder;
 
-/// A scene and the work that it took.
+/// A scene and its counted work.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorkRow {
     /// Name of the scene.
     pub scene: &'static str,
-    /// What is in it, and what is asked for.
+    /// Its contents, and what is generated from it.
     pub about: &'static str,
-    /// How much of each kind was done; kinds that this program cannot count are left out.
+    /// Work of each kind; kinds that this program cannot count are left out.
     pub counts: Vec<(Kind, u64)>,
     /// Kinds whose count must be zero.
     pub absent: Vec<Kind>,
 }
 
 impl WorkRow {
-    /// Every count that must be zero is.
+    /// Whether every count that must be zero is.
     pub fn is_as_expected(&self) -> bool {
         self.counts
             .iter()
@@ -44,8 +44,8 @@ impl WorkRow {
     }
 }
 
-/// Makes every scene and counts; `progress` is given the number of finished scenes and of all
-/// scenes.
+/// Processes every scene and counts its work; `progress` gets the number of finished scenes and of
+/// all scenes.
 ///
 /// # Errors
 /// A temporary folder that cannot be written; no threads.
@@ -79,7 +79,7 @@ fn counts(work: &Work, with_allocations: bool) -> Vec<(Kind, u64)> {
         .collect()
 }
 
-/// The work of a scene from its files to what comes out.
+/// The work of a scene from its files to the output.
 fn work_of(world: &FixtureFolder, case: &WorkCase) -> Result<Work> {
     let folder = tempfile::tempdir().map_err(|e| Error::value("temporary folder", e))?;
     let (done, work) = counted(|| make_case(world, case, folder.path()))?;
@@ -90,7 +90,7 @@ fn counted<T: Send>(job: impl FnOnce() -> T + Send) -> Result<(T, Work)> {
     work::counted(job).map_err(|e| Error::value("threads", e))
 }
 
-/// Makes what a case asks for and writes it into a folder.
+/// Generates the output of a case and writes it into a folder.
 fn make_case(world: &FixtureFolder, case: &WorkCase, folder: &Path) -> Result<()> {
     let scene = case.scene.clone();
     let pipeline = Pipeline::open_for(world.config(), &scene)?;
@@ -132,8 +132,8 @@ pub fn write(folder: impl AsRef<Path>, progress: impl Fn(u64, u64)) -> Result<Ve
     Ok(rows)
 }
 
-/// Scenes by kinds of work, as integers; a required zero is marked, and so is a count that should
-/// be zero but is not.
+/// Scenes by kinds of work, as integers; required zeros are marked, and so are counts that should
+/// be zero but are not.
 pub fn table(rows: &[WorkRow]) -> Table {
     scenes_by_kinds(rows, marked)
 }

@@ -1,5 +1,5 @@
-//! How often the truth lies within the stated error, with the principal point in the middle of the
-//! picture and off it.
+//! Coverage of the stated errors: how often the truth is within them, with the principal point in
+//! the middle of the picture and off it.
 
 use super::show::three;
 use super::{focal_percent, height_error_px};
@@ -13,14 +13,14 @@ use petcomp::camera::{Framing, Solution, SolveOptions, solve};
 const OFF_CENTER: [f64; 4] = [0.0, 0.05, 0.1, 0.23];
 /// Noise of the corners, pixels.
 const NOISES_PX: [f64; 2] = [0.5, 1.0];
-/// Angles from straight above, degrees, in turn.
+/// Angles from straight above, degrees, cycled through.
 const TILTS_DEG: [f64; 6] = [5.0, 10.0, 20.0, 30.0, 45.0, 60.0];
-/// Numbers of standard deviations within which errors are counted.
+/// Multiples of the standard deviation within which errors are counted.
 const SIGMAS: [f64; 3] = [1.0, 2.0, 3.0];
 const VIEW_SEED: u64 = 7;
 const FRAMINGS: [Framing; 3] = [Framing::Whole, Framing::Unknown, Framing::Cropped];
 
-/// Errors of one kind of view, and what was stated of them.
+/// Errors of one kind of view, and their stated values.
 #[derive(Debug)]
 pub(super) struct StatedErrors {
     /// Distance of the principal point from the picture's middle, in longer sides.
@@ -30,19 +30,19 @@ pub(super) struct StatedErrors {
     /// What the label states about the picture.
     framing: Framing,
     views: usize,
-    /// How many of them no camera fits; they are left out of all other numbers.
+    /// Number of views that no camera fits; they are left out of all other numbers.
     refused: usize,
     /// Median error of the focal length and median of its stated standard deviation, percent.
     focal_percent: [f64; 2],
-    /// The same of where points above the surface are seen, pixels.
+    /// The same for the reprojection of points above the surface, pixels.
     height_px: [f64; 2],
-    /// Parts of the focal lengths within one, two and three standard deviations of the truth.
+    /// Shares of the focal lengths within one, two and three standard deviations of the truth.
     within: [f64; 3],
     /// The largest error of a focal length, in standard deviations.
     worst: f64,
 }
 
-/// Measures whole pictures with every framing, and cropped ones with those that are true of them.
+/// Measures whole pictures with every framing, and cropped ones with those that apply to them.
 pub(super) fn measure(views: u64) -> Vec<StatedErrors> {
     let kinds = NOISES_PX
         .into_iter()
@@ -107,7 +107,7 @@ struct SolvedView {
 }
 
 impl SolvedView {
-    /// View `k`; none where no camera fits it.
+    /// View `k`; none if no camera fits it.
     fn new(scenario: &Scenario, framing: Framing, k: u64) -> Option<Self> {
         let tilt = TILTS_DEG[k as usize % TILTS_DEG.len()];
         let mut view = scenario.tilted(tilt).view(VIEW_SEED, k);
@@ -197,8 +197,8 @@ mod tests {
         for row in measure(120) {
             println!("{row:?}");
             assert_eq!(row.refused, 0, "{row:?}");
-            // A normal error is within one standard deviation in 68 % of all cases; off the middle
-            // by 23 % every view is one of twice what is expected of a cropped one.
+            // A normal error is within one standard deviation in 68 % of all cases; 23 % off the
+            // middle, every view deviates by twice the standard deviation expected of cropped ones.
             let extreme = row.off_center > 0.2;
             let least = if extreme {
                 [0.5, 0.75, 0.95]

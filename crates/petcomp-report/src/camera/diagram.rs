@@ -1,4 +1,4 @@
-//! The camera solver's steps: error against run time.
+//! The steps of the camera solver: error against run time.
 
 use super::{CameraRow, Lens, SolveMethod, ViewKind};
 use crate::{Diagram, Point};
@@ -8,8 +8,8 @@ const CORNER_NOISE_PX: f64 = 0.5;
 /// Angles from straight above: a typical one, and one that hardly constrains the focal length.
 const DRAWN_TILTS_DEG: [f64; 2] = [20.0, 5.0];
 
-/// Error of the focal length against time, a diagram per tilt and a point per method; `views` of
-/// each.
+/// Error of the focal length against time, one diagram per tilt and one point per method, each with
+/// this many views.
 pub(crate) fn diagrams(views: u64) -> Vec<Diagram> {
     DRAWN_TILTS_DEG
         .map(|tilt_deg| tilt_diagram(tilt_deg, views))

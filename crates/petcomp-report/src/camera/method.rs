@@ -1,4 +1,4 @@
-//! The methods that are compared, and the cameras that they have to find.
+//! The compared methods, and the cameras that they have to find.
 
 use petcomp::camera::simulate::{Scenario, View};
 use petcomp::camera::{self, Priors, Solution, SolveOptions};
@@ -6,23 +6,23 @@ use petcomp::camera::{self, Priors, Solution, SolveOptions};
 /// Photos of one camera that are solved jointly.
 pub(super) const PHOTOS_TOGETHER: usize = 8;
 
-/// What the camera is really like, and what the solver assumes of it.
+/// The real camera, and the solver's assumptions about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Lens {
-    /// A perfect pinhole over a perfect rectangle, and the solver knows; nothing is known of the
+    /// A perfect pinhole over a perfect rectangle, known to the solver; nothing is known about the
     /// focal length.
     Ideal,
-    /// Principal point, distortion and tape measure are as uncertain as they usually are, with the
-    /// default priors.
+    /// Principal point, distortion and tape measure are as uncertain as usual, with the default
+    /// priors.
     Realistic,
 }
 
-/// How a camera is found.
+/// A method for finding a camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SolveMethod {
     /// The closed form and this many steps of refinement.
     Steps(usize),
-    /// Every start, to the end, with covariance.
+    /// All starting points, to convergence, with covariance.
     Whole,
     /// Together with other photos of the same camera.
     Joint,
@@ -107,7 +107,7 @@ impl SolveMethod {
         }
     }
 
-    /// How many photos it looks at for one result.
+    /// Number of photos used for one result.
     pub(super) fn photos(self) -> usize {
         if self == Self::Joint {
             PHOTOS_TOGETHER

@@ -1,12 +1,12 @@
-//! What was measured as CSV, Markdown and charts.
+//! The measurements as CSV, Markdown and charts.
 
 use super::{CameraRow, NOISES_PX, SolveMethod};
 use crate::statistics::quantile;
 use petcomp::plot::{Axis, Chart, Curve, Table};
 
-/// Tilts that run time is plotted for, degrees.
+/// Tilts for which run time is plotted, degrees.
 const TIMED_TILTS_DEG: [f64; 3] = [5.0, 20.0, 45.0];
-/// Digits that count.
+/// Number of significant digits.
 const SIGNIFICANT_DIGITS: usize = 3;
 const CSV_TITLES: &str = "lens,noise_px,tilt_deg,method,views,failed,focal_median_percent,focal_95_percent,\
     height_median_px,height_95_px,time_us\n";
@@ -72,7 +72,7 @@ fn median_time(rows: &[CameraRow], method: SolveMethod) -> f64 {
     quantile(own.map(|row| row.time_us), 0.5)
 }
 
-/// Three digits that count, but two decimals at most.
+/// A number with three significant digits, but at most two decimals.
 pub(super) fn three(value: f64) -> String {
     let whole_digits = if value >= 1.0 {
         (libm::floor(libm::log10(value)) as usize).saturating_add(1)

@@ -1,4 +1,4 @@
-//! What each method takes a bottle for, seen straight from above.
+//! The cut-out of each method, seen from straight above.
 
 use super::place::{Bottle, Place};
 use super::shots::Stage;
@@ -18,7 +18,7 @@ pub(super) enum DisplayMethod {
     TwoScreens,
     /// A display that shows black and white.
     BlackAndWhite,
-    /// And stripes.
+    /// The same, and stripes.
     Stripes,
 }
 
@@ -53,12 +53,12 @@ impl DisplayMethod {
         }
     }
 
-    /// There are photos for it.
+    /// Whether there are photos for it.
     pub(super) fn is_possible(self, bottle: &Bottle) -> bool {
         self != Self::Stripes || bottle.with_stripes
     }
 
-    /// It measures where the light comes from.
+    /// Whether it measures displacement.
     pub(super) fn measures_displacement(self) -> bool {
         self == Self::Stripes
     }
@@ -71,17 +71,17 @@ impl DisplayMethod {
     }
 }
 
-/// An object seen straight from above, a pixel for each of the display's.
+/// An object seen from straight above, one pixel per pixel of the display.
 pub(super) struct SeenFilm {
     pub(super) film: Image<Film>,
-    /// Where the light comes from, pixels of the display; none where that is not known.
+    /// Origin of the light, pixels of the display; none where that is not known.
     pub(super) flow: Image<Option<LightPath>>,
 }
 
 fn on_paint(method: MattingMethod, place: &Place, bottle: &Bottle) -> Result<SeenFilm> {
     let [paint, other] = Place::paints(bottle);
     let exposure = place.exposure_from(paint);
-    // Both as the first was exposed.
+    // Both with the exposure of the first.
     let as_first = exposure.recip() * place.exposure_from(other);
     let second = place.photo(bottle, other)?;
     let shots = [

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// New backgrounds, by the names of their files.
 pub(super) const BACKGROUNDS: [&str; 5] = ["checker", "text", "noise", "bottle", "plain"];
 
-/// A room with a display in it and a camera over it.
+/// A room with a display and a camera above it.
 #[derive(Deserialize)]
 pub(super) struct Place {
     #[serde(skip)]
@@ -25,9 +25,9 @@ pub(super) struct Place {
     pub(super) display_px: [u32; 2],
     /// Width and height of the display, metres.
     pub(super) display_m: [f64; 2],
-    /// From photos of the view to the display, pixels.
+    /// Maps photos of the view to the display, pixels.
     display_from_photo: [[f64; 3]; 3],
-    /// Pixels that photos of painted screens show more, on every side.
+    /// Margin by which photos of painted screens are larger, on every side, pixels.
     paint_margin_px: usize,
     /// Factors of the photos' exposures, by what the display showed or the screen was painted.
     gain: BTreeMap<String, f32>,
@@ -66,7 +66,7 @@ impl Place {
         Ok(Self { folder, ..place })
     }
 
-    /// Where what the display's photos show of a bottle is in those of painted screens.
+    /// The region of a bottle in photos of painted screens.
     pub(super) fn in_painted(&self, bottle: &Bottle) -> Roi {
         let [x0, y0, x1, y1] = bottle.crop_px;
         Roi {
@@ -77,7 +77,7 @@ impl Place {
         }
     }
 
-    /// From photos of the view to the display, pixels.
+    /// Maps photos of the view to the display, pixels.
     pub(super) fn display_from_photo(&self) -> Homography {
         let rows = self.display_from_photo.map(RowVector3::from);
         Homography(Matrix3::from_rows(&rows))
@@ -88,7 +88,7 @@ impl Place {
         format!("{}/{}", self.light, bottle.name)
     }
 
-    /// The display without a bottle, all of the view.
+    /// The display without a bottle, for the whole view.
     pub(super) fn empty(&self, picture: &str) -> Result<Image<LinearRgb>> {
         let ending = if BACKGROUNDS.contains(&picture) {
             "png"
@@ -103,7 +103,7 @@ impl Place {
         io::read(self.folder.join(format!("{}_{shown}.jpg", bottle.name)))
     }
 
-    /// A bottle over a background, as it is: without noise, black away from the bottle.
+    /// A bottle over a background in reality: without noise, black away from the bottle.
     pub(super) fn reality(&self, bottle: &Bottle, background: &str) -> Result<Image<LinearRgb>> {
         io::read(
             self.folder
@@ -111,15 +111,14 @@ impl Place {
         )
     }
 
-    /// What a bottle covers.
+    /// Coverage by a bottle.
     pub(super) fn mask(&self, bottle: &Bottle) -> Result<Image<Coverage>> {
         io::read(self.folder.join(format!("{}_mask.png", bottle.name)))
     }
 
-    /// How far lines of sight are displaced on the display, and the contrast of coarse stripes, 0
-    /// to 1.
+    /// Displacement of lines of sight on the display, and the contrast of coarse stripes, 0 to 1.
     pub(super) fn true_flow(&self, bottle: &Bottle) -> Result<Image<([f64; 2], f64)>> {
-        // Codes and not light: numbers in 8 bits.
+        // Codes rather than light: numbers in 8 bits.
         let file = self.folder.join(format!("{}_flow.png", bottle.name));
         let codes: Image<LinearRgb> = io::read(file)?;
         Ok(codes.map(|light| {
@@ -129,7 +128,7 @@ impl Place {
         }))
     }
 
-    /// The paint that is not a bottle's own colour, and the other one.
+    /// The paint that is not a bottle's own colour, then the other one.
     pub(super) fn paints(bottle: &Bottle) -> [&'static str; 2] {
         if bottle.colour == "green" {
             ["blue", "green"]

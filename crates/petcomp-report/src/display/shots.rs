@@ -14,16 +14,16 @@ use std::collections::BTreeMap;
 /// A sensor's noise: the variance of a value is `shot^2 * value + read^2`.
 const SHOT: f64 = 0.006;
 const READ: f64 = 0.002;
-/// Parts of a pixel along a side that what is shown is averaged over.
+/// Samples per side of a pixel that shown pictures are averaged over.
 const PARTS: usize = 4;
 
-/// What captures of a place have in common.
+/// What the captures of a place have in common.
 pub(super) struct Stage<'a> {
     place: &'a Place,
     display: Display,
     /// Photos of the whole display without a bottle.
     empty: BTreeMap<Frame, Image<LinearRgb>>,
-    /// Of the view's first pixel among those of a photo.
+    /// Position of the view's first pixel in a photo.
     corner: [usize; 2],
 }
 
@@ -41,8 +41,8 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// What is measured with black and white, or with stripes as well; over the display, a pixel
-    /// for each of its own.
+    /// Measurement with black and white, or also with stripes; over the display, one pixel per
+    /// pixel of its own.
     pub(super) fn measure(&self, bottle: &Bottle, with_stripes: bool) -> Result<Measured> {
         let shots = self.series(with_stripes, |frame| self.shot(bottle, frame))?;
         let empty = self.series(false, |frame| Ok(self.empty[&frame].clone()))?;
@@ -123,8 +123,9 @@ impl EmptyView {
         photo
     }
 
-    /// How bright what is shown is in a pixel, as a share of white: the mean of its parts, as a
-    /// camera sees it. Markers found in pixels read at one point lie a fraction of one off.
+    /// Brightness of the shown picture in a pixel, as a share of white: the mean of its samples, as
+    /// a camera sees it. Markers found in point-sampled pixels would be off by a fraction of a
+    /// pixel.
     fn shown_light(&self, shown: &Image<Srgb8>, middle: Point2<f64>) -> f32 {
         let offset = |i: usize| (i as f64 + 0.5) / PARTS as f64 - 0.5;
         let parts = (0..PARTS * PARTS).map(|i| {
@@ -135,7 +136,7 @@ impl EmptyView {
         parts.sum::<f32>() / (PARTS * PARTS) as f32
     }
 
-    /// The light at a position of the view, or beyond it as at its border.
+    /// The light at a position of the view, clamped to its border.
     fn at(&self, shown: &Image<Srgb8>, view: Point2<f64>) -> LinearRgb {
         let light = self.shown_light(shown, view);
         let [black, white] = [&self.black, &self.white].map(|empty| nearest(empty, view));

@@ -1,5 +1,4 @@
-//! Reality beside what each method makes of it, and by how much that is off; blank where a method
-//! refuses.
+//! Reality next to the result of each method, and the differences; blank if a method refuses.
 
 use super::Reality;
 use super::method::{DisplayMethod, SeenFilm};
@@ -11,8 +10,8 @@ const GAIN: f32 = 4.0;
 /// Pixels between pictures.
 const GAP_PX: usize = 4;
 
-/// Two rows: reality and the methods over background `k`; below each method how far it is off,
-/// four times.
+/// Two rows: reality and the methods over background `k`; below each method its difference, times
+/// four.
 pub(super) fn strip(
     reality: &Reality,
     k: usize,

@@ -1,4 +1,4 @@
-//! The part of a display that a bottle's pictures show, seen straight from above.
+//! The part of a display that a bottle's pictures show, seen from straight above.
 
 use super::place::{Bottle, Place};
 use nalgebra::Matrix3;
@@ -60,12 +60,12 @@ impl DisplayWindow {
         warp(&Pyramid::new(picture), &self.photo_from_window, w, h)
     }
 
-    /// Where a place of the window is in a bottle's pictures.
+    /// Position in a bottle's pictures of a position in the window.
     pub(super) fn in_photo(&self, at: Point2<f64>) -> Point2<f64> {
         self.photo_from_window.map(at)
     }
 
-    /// A picture of the whole view, with what it shows around the window.
+    /// A picture of the whole view, including a margin around the window.
     pub(super) fn with_margin(&self, view: Image<LinearRgb>) -> Surroundings {
         let (w, h) = self.size();
         let margin = self.margin_px;

@@ -1,4 +1,4 @@
-//! Photos made harder, their outlines still known.
+//! Photos made more difficult, with outlines that are still known.
 
 mod framing;
 mod lens;
@@ -22,12 +22,12 @@ pub(super) enum Expected {
     Refused,
 }
 
-/// A way in which a photo is harder.
+/// A way to make a photo more difficult.
 pub(super) struct PhotoVariant {
-    /// What it is called in tables.
+    /// Its name in tables.
     pub(super) name: &'static str,
     expected: Expected,
-    /// Nothing where it cannot be made of a photo.
+    /// None if it does not apply to a photo.
     make: fn(&VariantSource<'_>) -> Option<Trial>,
 }
 
@@ -44,7 +44,7 @@ impl PhotoVariant {
         }
     }
 
-    /// The photo in this variant; nothing where it cannot be made of it.
+    /// The photo in this variant; none if it does not apply.
     pub(super) fn trial(&self, known: &Known, seed: u64) -> Option<Trial> {
         let trial = (self.make)(&VariantSource::new(known, seed))?;
         Some(Trial {
@@ -75,7 +75,7 @@ pub(super) static VARIANTS: [PhotoVariant; 32] = [
     PhotoVariant::new("out of focus", Right, |s| {
         s.with(filter::gaussian_blur(&s.known.photo, 2.0))
     }),
-    // Of the plastic's own colour, where it has one.
+    // Of the plastic's own colour, if it has one.
     PhotoVariant::new("other screen colour", Right, |s| {
         s.with(screen::on_screen(s.known, |k| {
             LinearRgb::new(k.r, k.b, k.g)
@@ -203,8 +203,7 @@ impl<'a> VariantSource<'a> {
     }
 }
 
-/// A photo whose every pixel has its own share of the light; positions are those of pixels'
-/// centres.
+/// A photo with a factor on the light of every pixel; positions are those of pixels' centres.
 fn scaled(photo: &Image<LinearRgb>, light: impl Fn(f64, f64) -> f32 + Sync) -> Image<LinearRgb> {
     Image::from_fn(photo.width(), photo.height(), |x, y| {
         photo[(x, y)].scale(light(x as f64 + 0.5, y as f64 + 0.5))

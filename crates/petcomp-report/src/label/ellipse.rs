@@ -9,7 +9,7 @@ use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, LinearRgb, ObjectId, PremulRgba};
 use std::f64::consts::{PI, TAU};
 
-/// Half lengths of the ellipse and how it lies, metres and radians.
+/// Half lengths of the ellipse, metres, and its rotation, radians.
 pub(super) const ELLIPSE_HALF_M: [f64; 2] = [0.13, 0.045];
 const TURN_RAD: f64 = 0.5;
 /// Points of a pixel along each side.
@@ -29,7 +29,7 @@ pub(super) fn ring_area(ring: &[Point2<f64>]) -> f64 {
     0.5 * doubled.abs()
 }
 
-/// The parts of a line along the rows that lie in an odd number of rings.
+/// The parts of a row line that are in an odd number of rings.
 fn spans_inside(rings: &[Ring], y: f64) -> Vec<[f64; 2]> {
     let mut crossings: Vec<f64> = rings
         .iter()
@@ -41,7 +41,7 @@ fn spans_inside(rings: &[Ring], y: f64) -> Vec<[f64; 2]> {
     pairs.map(|pair| [pair[0], pair[1]]).collect()
 }
 
-/// Where a side crosses a line along the rows.
+/// Where a side crosses a row line.
 fn crossing(a: &Point2<f64>, b: &Point2<f64>, y: f64) -> Option<f64> {
     let is_crossed = (a.y <= y) != (b.y <= y);
     is_crossed.then(|| a.x + (y - a.y) * (b.x - a.x) / (b.y - a.y))
@@ -98,7 +98,7 @@ impl Ellipse {
         both / (mask.area() as f64 + self.area() - both)
     }
 
-    /// The same for what lies in an odd number of rings.
+    /// The same for the area in an odd number of rings.
     pub(super) fn iou_of_rings(&self, rings: &[Ring]) -> f64 {
         let step = 1.0 / POINTS_PER_SIDE as f64;
         let lines = 0..self.image[1] as usize * POINTS_PER_SIDE;
@@ -109,7 +109,7 @@ impl Ellipse {
         both / (own + self.area() - both)
     }
 
-    /// How much of a line lies in the rings and in the ellipse, and how much of it in the rings.
+    /// Lengths of a line in both the rings and the ellipse, and in the rings.
     fn line_lengths(&self, rings: &[Ring], y: f64) -> [f64; 2] {
         let chord = self.chord(y).unwrap_or_default();
         let spans = spans_inside(rings, y);
@@ -117,7 +117,7 @@ impl Ellipse {
         [shared, spans.iter().map(|[a, b]| b - a).sum()]
     }
 
-    /// Where the ellipse crosses a line along the rows; none where it does not.
+    /// Where the ellipse crosses a row line; none if it does not.
     pub(super) fn chord(&self, y: f64) -> Option<[f64; 2]> {
         // The level is a parabola along the line: through three points of it.
         let [low, middle, high] =
@@ -139,7 +139,7 @@ impl Ellipse {
         })
     }
 
-    /// What a perfect renderer sees of it.
+    /// Deep samples of a perfect renderer.
     pub(super) fn deep(&self) -> DeepImage {
         let [w, h] = self.image;
         let white = Image::filled(w as usize, h as usize, LinearRgb::WHITE);
@@ -164,7 +164,7 @@ fn bounding_quad() -> Quad {
     }
 }
 
-/// A place on the ellipse's border, on its card.
+/// A point on the ellipse's border, on its card.
 fn place_uv(turn: f64) -> Point2<f64> {
     Point2::new(0.5 + 0.5 * libm::cos(turn), 0.5 + 0.5 * libm::sin(turn))
 }

@@ -9,15 +9,15 @@ use petcomp::{LinearRgb, ObjectId, PremulRgba};
 use std::f64::consts::PI;
 
 pub(super) const IMAGE_SIZE_PX: [u32; 2] = [160, 120];
-/// Size, height and turn of the card, metres and radians.
+/// Size, height and rotation of the card, metres and radians.
 const CARD_SIZE_M: [f64; 2] = [0.2, 0.08];
 pub(super) const CARD_HEIGHT_M: f64 = 0.05;
 const CARD_TURN_RAD: f64 = 0.4;
 const CAMERA_HEIGHT_M: f64 = 0.6;
-/// Pixels this much around the card are left out, as a factor on its sides: they see its border.
+/// Pixels up to this factor of the card's sides are left out: they see its border.
 const BORDER_FACTOR: f64 = 1.2;
 
-/// Which light there is.
+/// The kinds of light.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum LightKind {
     Area,
@@ -37,7 +37,7 @@ fn opaque_card() -> Card {
         world_from_card: card_pose(),
         size: CARD_SIZE_M,
     };
-    // So fine that its border, half a texel soft, is a sharp one.
+    // So fine that its border, half a texel soft, is sharp.
     let texture = Image::filled(512, 256, PremulRgba::new(0.0, 0.0, 0.0, 1.0));
     Card {
         outline_uv: [].into(),
@@ -54,8 +54,8 @@ fn square_light() -> AreaLight {
     AreaLight::new([0.3, 0.2, 0.8], [0.3; 2], 5.0)
 }
 
-/// What the card leaves of the light at each pixel's centre; nothing where the card itself is seen,
-/// or near its border.
+/// Share of the light that the card leaves at each pixel's centre; none where the card itself or
+/// its border is seen.
 pub(super) fn exact_shares(shot: &Shot, kind: LightKind) -> Vec<Option<f64>> {
     let card = shot.cards[0].quad.corners();
     let [w, h] = shot.camera.image;
@@ -67,7 +67,7 @@ pub(super) fn exact_shares(shot: &Shot, kind: LightKind) -> Vec<Option<f64>> {
         .collect()
 }
 
-/// The point of the surface that a pixel sees; nothing where it sees the card.
+/// The point of the surface that a pixel sees; none where it sees the card.
 fn surface_point(shot: &Shot, pixel: [u32; 2]) -> Option<Point3<f64>> {
     let [x, y] = pixel.map(|v| f64::from(v) + 0.5);
     let ray = shot.camera.ray(Point2::new(x, y));
@@ -76,7 +76,7 @@ fn surface_point(shot: &Shot, pixel: [u32; 2]) -> Option<Point3<f64>> {
     around.intersect(&ray).is_none().then_some(point)
 }
 
-/// A card with the pixels that see its border.
+/// The card, extended by the pixels that see its border.
 fn with_border(card: &Quad) -> Quad {
     Quad {
         size: card.size.map(|side| BORDER_FACTOR * side),
@@ -84,7 +84,7 @@ fn with_border(card: &Quad) -> Quad {
     }
 }
 
-/// What a card leaves of the light at a point.
+/// Share of the light that a card leaves at a point.
 fn light_share(shot: &Shot, kind: LightKind, card: &[Point3<f64>; 4], point: Point3<f64>) -> f64 {
     match kind {
         LightKind::Sky => 1.0 - level_irradiance(card, point) / PI,
@@ -101,8 +101,8 @@ fn level_irradiance(polygon: &[Point3<f64>], point: Point3<f64>) -> f64 {
     polygon_irradiance(polygon, point, Vector3::z())
 }
 
-/// The part of a light's face that a card hides from a point: cut by the planes through the point
-/// and each side.
+/// The part of a light's face that a card hides from a point: clipped by the planes through the
+/// point and each side.
 fn shadowed_part(
     face: &[Point3<f64>; 4],
     card: &[Point3<f64>; 4],
@@ -146,7 +146,8 @@ fn positive_part(
 mod tests {
     use super::*;
 
-    /// The share of the light's points that a point sees past the card, weighted as light is.
+    /// Brute force: the share of the light's points that a point sees past the card, weighted by
+    /// their light.
     fn brute_force(shot: &Shot, point: Point3<f64>) -> f64 {
         const N: usize = 120;
         let light = &shot.lights[0];

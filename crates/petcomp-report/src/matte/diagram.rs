@@ -10,7 +10,7 @@ use std::path::Path;
 const SECONDS_PER_MS: f64 = 1e-3;
 
 /// Error over new backgrounds and overlap of the outline, each against time: on photos with truth
-/// of a folder, or on made ones without one.
+/// from a folder, or on synthetic ones.
 pub(crate) fn diagrams(truth: Option<&Path>) -> Result<Vec<Diagram>> {
     let (rows, input, source) = if let Some(truth) = truth {
         let rows = measure(truth, |_, _| ())?;

@@ -1,31 +1,32 @@
-//! Photos of see-through objects made in code, with all that a renderer would know of them: for a
-//! repository without any.
+//! Synthetic photos of see-through objects, with everything that a renderer would know about them:
+//! for a repository without photos.
 //!
 //! A bottle is two walls of film around a closed outline, with wrinkles, a bright streak and an
-//! opaque label, on a screen that is darker towards its corners. Two flat walls of clear PET pass
-//! three quarters of the light (four surfaces, each of which reflects some 7 %), and dye takes its
-//! share; the screen is seen through the object and lit through it. In folds and rims the
-//! sight meets more plastic, while the light, which comes from all around, does not.
+//! opaque label, on a screen that is darker towards its corners. Two flat walls of clear PET
+//! transmit three quarters of the light (four surfaces, each of which reflects about 7 %), and dye
+//! absorbs its share; the screen is seen through the object and lit through it. In folds and rims
+//! the line of sight passes through more plastic, while the light, which comes from all around,
+//! does not.
 
 use super::truth::{Known, PhotoNoise};
 use petcomp::{Coverage, Image, LinearRgb};
 
-/// How many there are.
+/// Number of photos.
 pub(super) const PHOTO_COUNT: usize = TINTS.len();
-/// Absorbance of the dye of two walls that lie flat: clear, blue, green, brown.
+/// Absorbance of the dye of two flat walls: clear, blue, green, brown.
 const TINTS: [[f64; 3]; 4] = [
     [0.0; 3],
     [0.4, 0.13, 0.01],
     [0.35, 0.09, 0.27],
     [0.08, 0.18, 0.25],
 ];
-/// Absorbance of two clear walls, by what four surfaces reflect.
+/// Absorbance of two clear walls, from the reflection of four surfaces.
 const CLEAR_ABSORBANCE: f64 = 0.29;
 const SIZE_PX: (usize, usize) = (600, 320);
 const SCREEN_COLOR: LinearRgb = LinearRgb::new(0.06, 0.42, 0.12);
 /// How much darker the screen is, per squared side of the picture from its brightest place.
 const SCREEN_FALLOFF: f64 = 0.35;
-/// Light that film throws back.
+/// Light reflected by film.
 const SHEEN_LIGHT: f64 = 0.02;
 /// Paint of the label.
 const LABEL_COLOR: [f64; 3] = [0.6, 0.12, 0.1];
@@ -33,19 +34,19 @@ const LABEL_COLOR: [f64; 3] = [0.6, 0.12, 0.1];
 const AXIS_PX: f64 = 170.0;
 const RADIUS_PX: f64 = 75.0;
 const EDGE_PX: f64 = 1.0;
-/// How deep the wall is seen at a grazing angle.
+/// Depth to which the wall is seen at a grazing angle.
 const RIM_DEPTH_PX: f64 = 6.0;
-/// Where the streak is brightest, and half its width.
+/// Depth of the streak's maximum, and half its width.
 const STREAK_DEPTH_PX: f64 = 30.0;
 const STREAK_WIDTH_PX: f64 = 5.0;
-/// The label is so far inside the outline.
+/// Distance of the label from the outline.
 const LABEL_DEPTH_PX: f64 = 12.0;
 /// Noise of a typical camera at base sensitivity.
 const CAMERA_NOISE: PhotoNoise = PhotoNoise {
     shot: 0.006,
     read: 0.002,
 };
-/// Seeds of the photos' noise, apart from those of the shots that the two-screen method gets.
+/// Seeds of the photos' noise, different from those of the shots for the two-screen method.
 const FIRST_NOISE_SEED: u64 = 1000;
 
 /// Photo `i`.
@@ -53,15 +54,15 @@ pub(super) fn photo(i: usize) -> Known {
     enlarged_photo(i, 1)
 }
 
-/// Photo `i` by a camera with `times` the pixels along each side: as sharp, and as noisy in each
-/// pixel.
+/// Photo `i` from a camera with `times` the pixels along each side, equally sharp and equally noisy
+/// per pixel.
 pub(super) fn enlarged_photo(i: usize, times: usize) -> Known {
     let known = truth(i, times);
     let photo = known.on(&known.screen, FIRST_NOISE_SEED + i as u64);
     Known { photo, ..known }
 }
 
-/// All that is known of photo `i`, which is still black.
+/// Everything known about photo `i`, which is still black.
 fn truth(i: usize, times: usize) -> Known {
     let pixels = bottle_pixels(i, times);
     let (w, h) = pixels.size();
@@ -115,10 +116,10 @@ fn axis_ends(i: usize) -> [[f64; 2]; 2] {
     [-1.0, 1.0].map(|s| [0.5 * w as f64 + s * dx, 0.5 * h as f64 + s * dy])
 }
 
-/// Radius of the body at the first and at the last end: the neck is narrower.
+/// Radius of the body at its first and last end: the neck is narrower.
 const RADII_PX: [f64; 2] = [0.55 * RADIUS_PX, RADIUS_PX];
 
-/// Two discs and all discs between them.
+/// Bounding box of two discs and all discs between them.
 fn bounds(i: usize) -> [f64; 4] {
     let [a, b] = axis_ends(i);
     let [neck, foot] = RADII_PX;
@@ -127,24 +128,24 @@ fn bounds(i: usize) -> [f64; 4] {
     [left, top, right, bottom]
 }
 
-/// What a photo shows at one place.
+/// What a photo shows at one position.
 #[derive(Clone, Copy)]
 struct BottlePixel {
     cover: f64,
     foreground: [f64; 3],
     view: [f64; 3],
-    /// What reaches the screen.
+    /// Transmittance of the light that reaches the screen.
     lit: [f64; 3],
 }
 
 impl BottlePixel {
-    /// Of the screen's own light, which passes the object twice.
+    /// Transmittance of the screen's own light, which passes the object twice.
     fn transmittance(&self) -> [f64; 3] {
         [0, 1, 2].map(|c| self.view[c] * self.lit[c])
     }
 }
 
-/// What bottle `i` is like at a place; an edge is as wide as `px`.
+/// Properties of bottle `i` at a position; an edge is as wide as `px`.
 fn bottle_at(i: usize, [x, y]: [f64; 2], px: f64) -> BottlePixel {
     let (along, depth) = body_at(i, x, y);
     let cover = (depth / (EDGE_PX * px) + 0.5).clamp(0.0, 1.0);
@@ -163,9 +164,9 @@ fn bottle_at(i: usize, [x, y]: [f64; 2], px: f64) -> BottlePixel {
     }
 }
 
-/// Two walls of film at a place.
+/// Two walls of film at a position.
 struct Walls {
-    /// What they pass where they lie flat.
+    /// Transmittance where they are flat.
     flat: [f64; 3],
     rim: f64,
     wrinkle: f64,
@@ -174,20 +175,20 @@ struct Walls {
 }
 
 impl Walls {
-    /// What is seen through them.
+    /// Transmittance along the line of sight.
     fn passes(&self) -> [f64; 3] {
         let film = self.flat.map(|v| libm::pow(v, self.rim * self.wrinkle));
         film.map(|v| (1.0 - self.label) * v)
     }
 
-    /// What they and the label throw back.
+    /// Light reflected by them and by the label.
     fn light(&self, x: f64, y: f64, depth: f64) -> [f64; 3] {
         let sheen = SHEEN_LIGHT * self.rim * self.wrinkle + streak(x, depth);
         label_paint(y).map(|paint| self.label * paint + (1.0 - self.label) * sheen)
     }
 }
 
-/// What two walls pass that lie flat.
+/// Transmittance of two flat walls.
 fn flat_walls(i: usize) -> [f64; 3] {
     TINTS[i % PHOTO_COUNT].map(|dye| libm::exp(-CLEAR_ABSORBANCE - dye))
 }
@@ -198,12 +199,12 @@ fn label_paint(y: f64) -> [f64; 3] {
     LABEL_COLOR.map(|color| color * stripe)
 }
 
-/// How much thicker the walls look near the outline, where they are seen at a grazing angle.
+/// Factor on the thickness of the walls near the outline, where they are seen at a grazing angle.
 fn rim(depth: f64) -> f64 {
     1.0 + 2.0 * libm::exp(-depth.max(0.0) / RIM_DEPTH_PX)
 }
 
-/// How much thicker the walls are where they are folded.
+/// Factor on the thickness of the walls where they are folded.
 fn wrinkle(i: usize, x: f64, y: f64) -> f64 {
     1.0 + 0.5 * libm::sin(0.11 * x + 0.03 * i as f64) * libm::sin(0.07 * y + 0.05 * x)
 }
@@ -220,7 +221,7 @@ fn streak(x: f64, depth: f64) -> f64 {
     0.5 * across * (0.5 + 0.5 * libm::sin(0.05 * x)).powi(4)
 }
 
-/// How far along the axis a point is, 0 to 1, and how deep inside the outline, pixels; negative
+/// Position of a point along the axis, 0 to 1, and its depth inside the outline, pixels; negative
 /// outside.
 ///
 /// # Method

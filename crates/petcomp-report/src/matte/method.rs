@@ -1,4 +1,4 @@
-//! The matting methods that are compared.
+//! The compared matting methods.
 
 use petcomp::matte::{
     CutOutOptions, FilmOptions, KeyOptions, Keying, Screen, ScreenPlate, SegmentOptions,
@@ -11,23 +11,23 @@ use petcomp::{Coverage, Film, Image, LinearRgb, PremulRgba, Result, filter};
 pub(crate) enum MattingMethod {
     /// Blender's keyer with the mean colour of the background, masked by the convex hull.
     Paper,
-    /// Blender's keyer with a key of its own for every pixel, masked by the tight outline.
+    /// Blender's keyer with a separate key for every pixel, masked by the tight outline.
     KeyPlate,
     /// Colour difference (Vlahos) against the plate, the screen subtracted.
     Difference,
     /// Film from one screen.
     Physical,
-    /// Film from two screens, both shots made of the truth.
+    /// Film from two screens, with both shots composed from the truth.
     TwoScreen,
 }
 
-/// What a method made of a photo.
+/// The result of a method for a photo.
 pub(super) struct MethodCutOut {
     /// Light and view transmittance.
     pub(super) film: Image<Film>,
     /// Transmittance with the object's own shadow.
     pub(super) transmittance: Image<LinearRgb>,
-    /// Where it finds the object.
+    /// The object's outline.
     pub(super) outline: Image<Coverage>,
     pub(super) found: Segmentation,
 }
@@ -89,7 +89,7 @@ impl MattingMethod {
     }
 }
 
-/// The paper's way.
+/// The paper's method.
 fn key_by_color(photo: &Image<LinearRgb>, found: Segmentation) -> Result<MethodCutOut> {
     let key = Screen::Color(screen_color(photo, &found.mask)?);
     let keyed = Keying::new(photo, key).run(&KeyOptions::default())?;
@@ -101,7 +101,7 @@ fn fitted_plate(photo: &Image<LinearRgb>, found: &Segmentation) -> Result<Screen
     ScreenPlate::fit_outside(photo, &found.mask, &CutOutOptions::default().plate)
 }
 
-/// A photo, where the object is in it, and its screen.
+/// A photo, its object's outline, and its screen.
 struct PreparedPhoto<'a> {
     photo: &'a Image<LinearRgb>,
     found: Segmentation,
@@ -154,7 +154,7 @@ impl PreparedPhoto<'_> {
 }
 
 impl MethodCutOut {
-    /// What is as opaque in every channel.
+    /// A cut-out with the same opacity in every channel.
     fn from_grey(cut: &Image<PremulRgba>, outline: Image<Coverage>, found: Segmentation) -> Self {
         let transmittance = cut.map(|p| LinearRgb::grey(1.0 - p.a.clamp(0.0, 1.0)));
         Self {
@@ -166,8 +166,8 @@ impl MethodCutOut {
     }
 }
 
-/// Colour difference against the screen's own colour, and what the screen does not explain of the
-/// pixel.
+/// Colour difference against the screen's own colour; the foreground is the part of the pixel that
+/// the screen does not explain.
 ///
 /// # Method
 /// `1 - a = (I_p - max(I_others)) / (K_p - max(K_others))` for the screen's strongest channel `p`

@@ -6,11 +6,11 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 /// Longest side of a patch of a new background, pixels.
 const MAX_PATCH_PX: usize = 24;
-/// Patches over each place of a background, on average, were they as large as they can be.
+/// Average number of patches over each position of a background, if all had the maximum size.
 const PATCH_LAYERS: usize = 4;
-/// What patches leave free.
+/// Colour between the patches.
 const BACKGROUND_GREY: f32 = 0.2;
-/// Uniform numbers whose sum has variance 1.
+/// Number of uniform numbers whose sum has variance 1.
 const UNIFORM_NUMBERS: usize = 12;
 
 /// Uniform numbers from 0 to 1.
@@ -41,7 +41,7 @@ pub(super) fn patched_background((w, h): (usize, usize), seed: u64) -> Image<Lin
     image
 }
 
-/// What is beyond the picture is left out.
+/// Parts beyond the picture are left out.
 fn fill_patch(
     image: &mut Image<LinearRgb>,
     [x, y]: [usize; 2],

@@ -1,4 +1,4 @@
-//! Errors of a cut-out against what is known.
+//! Errors of a cut-out compared with the truth.
 
 use super::method::MethodCutOut;
 use super::truth::Known;
@@ -8,7 +8,7 @@ use petcomp::{Coverage, Image, LinearRgb, filter};
 
 /// Sums of errors over a picture are given in thousands.
 const SUM_UNIT: f64 = 1000.0;
-/// Width of the derivative whose length is the gradient, pixels ([Rhemann et al. 2009]).
+/// Width of the derivative of the gradient, pixels ([Rhemann et al. 2009]).
 ///
 /// [Rhemann et al. 2009]: https://doi.org/10.1109/CVPR.2009.5206503
 const GRADIENT_SIGMA_PX: f32 = 1.4;
@@ -20,10 +20,9 @@ pub(super) struct Score {
     pub(super) sad: f64,
     /// Mean squared difference of alpha.
     pub(super) mse: f64,
-    /// Sum of squared differences of the gradient's length of alpha, thousands.
+    /// Sum of squared differences of the gradient magnitude of alpha, thousands.
     pub(super) gradient: f64,
-    /// Mean absolute error over new backgrounds that are lit by themselves (F + V B), linear
-    /// light.
+    /// Mean absolute error over new backgrounds that are lit independently (F + V B), linear light.
     pub(super) mae_lit: f64,
     /// The same as a peak signal-to-noise ratio, decibels for a peak of 1.
     pub(super) psnr_lit: f64,
@@ -89,13 +88,13 @@ fn pixel_pairs(a: &Image<Coverage>, b: &Image<Coverage>) -> impl Iterator<Item =
     pairs.map(|(a, b)| (f64::from(a.0), f64::from(b.0)))
 }
 
-/// Sum of squared differences of the gradient's length.
+/// Sum of squared differences of the gradient magnitude.
 fn gradient_error(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
     let pairs = gradient_lengths(a).into_iter().zip(gradient_lengths(b));
     pairs.map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
-/// Length of the gradient of the blurred picture, by central differences.
+/// Gradient magnitude of the blurred picture, by central differences.
 fn gradient_lengths(alpha: &Image<Coverage>) -> Vec<f64> {
     let smooth = filter::gaussian_blur(alpha, GRADIENT_SIGMA_PX);
     let (w, h) = alpha.size();
@@ -116,7 +115,7 @@ fn half_difference(image: &Image<Coverage>, a: [isize; 2], b: [isize; 2]) -> f64
     0.5 * (a - b)
 }
 
-/// Over new backgrounds that are lit by themselves.
+/// Over new backgrounds that are lit independently.
 fn lit_errors(found: &MethodCutOut, known: &Known, backgrounds: &[Image<LinearRgb>]) -> ErrorSums {
     let film = found.film.pixels();
     recomposite(known, &known.view, backgrounds, |i, behind| {
@@ -136,7 +135,7 @@ fn shaded_errors(
     })
 }
 
-/// Errors over all backgrounds; `ours` gives a pixel over what is behind it.
+/// Errors over all backgrounds; `ours` composites a pixel over its background.
 fn recomposite(
     known: &Known,
     passes: &Image<LinearRgb>,
@@ -190,7 +189,7 @@ fn mean_residue(alpha: &Image<Coverage>, mask: &Image<Coverage>) -> f64 {
     mean_of(&outside, |alpha| *alpha)
 }
 
-/// Intersection over union of what is covered by at least a half.
+/// Intersection over union of the areas with at least half coverage.
 pub(crate) fn overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
     let (mut both, mut any) = (0_u64, 0_u64);
     for (a, b) in pixel_pairs(a, b) {
@@ -200,7 +199,7 @@ pub(crate) fn overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
     both as f64 / any.max(1) as f64
 }
 
-/// The error of the side of a hull's box that is farthest from left, top, right or bottom.
+/// The error of the worst side of a hull's box.
 pub(crate) fn box_error(hull: &[Point2<f64>], truth: [f64; 4]) -> f64 {
     let [left, right] = extent(hull.iter().map(|p| p.x));
     let [top, bottom] = extent(hull.iter().map(|p| p.y));
@@ -223,7 +222,7 @@ mod tests {
 
     const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
 
-    /// A slab of clear film with an opaque bar on an even screen.
+    /// A slab of clear film with an opaque bar on a uniform screen.
     fn known() -> Known {
         let (w, h) = (160, 100);
         let on = |x: usize, y: usize| (40..120).contains(&x) && (30..70).contains(&y);

@@ -1,8 +1,8 @@
-//! How large a picture the object is searched in: error of the outline and of the box against run
-//! time.
+//! Size of the picture in which the object is searched: error of the outline and of the box against
+//! run time.
 //!
-//! Bottles made in code have an outline in closed form; each is photographed by cameras of fewer
-//! and of more pixels.
+//! Synthetic bottles have an outline in closed form; each is photographed by cameras with fewer and
+//! with more pixels.
 
 use super::made;
 use super::score::box_error;
@@ -13,14 +13,14 @@ use crate::{Diagram, Point};
 use petcomp::matte::{CutOutOptions, SegmentOptions, segment};
 use petcomp::{Coverage, Image, Quality, Result};
 
-/// Longer sides of the picture that is searched, pixels: those of the qualities, half of the least
-/// and double the most.
+/// Longer sides of the searched picture, pixels: those of the qualities, half the smallest and
+/// double the largest.
 const SEARCH_SIDES_PX: [usize; 5] = [160, 320, 640, 1280, 2560];
-/// Pixels of the photos along each side, as multiples of the least.
+/// Pixels of the photos along each side, as multiples of the smallest.
 const PHOTO_SCALES: [usize; 3] = [1, 2, 4];
-/// That of the photos on which qualities are marked.
+/// Scale of the photos on which qualities are marked.
 const TYPICAL_PHOTO_SCALE: usize = 4;
-/// Means over the photos are even enough.
+/// One run: means over the photos are stable enough.
 const TIMED_RUNS: usize = 1;
 
 /// Errors and seconds of one search.
@@ -28,12 +28,12 @@ const TIMED_RUNS: usize = 1;
 struct SearchErrors {
     /// 1 - IoU of coverage.
     outline: f64,
-    /// The side of the box that is farthest off, pixels of the photo.
+    /// Error of the worst side of the box, pixels of the photo.
     box_px: f64,
     seconds: f64,
 }
 
-/// A search of photos, and its means over them.
+/// A search in photos, and its means over them.
 struct MeasuredSearch {
     photo_scale: usize,
     photo_width: usize,
@@ -41,7 +41,7 @@ struct MeasuredSearch {
     mean: SearchErrors,
 }
 
-/// Overlap of the outline, and the box, each against time, of `photos` photos, as far as there are.
+/// Overlap of the outline, and the box, each against time, for up to `photos` photos.
 pub(crate) fn searches(photos: usize) -> Result<Vec<Diagram>> {
     let photos = photos.min(made::PHOTO_COUNT);
     let mut found = Vec::new();
@@ -65,7 +65,7 @@ pub(crate) fn searches(photos: usize) -> Result<Vec<Diagram>> {
     ])
 }
 
-/// What is searched.
+/// Description of the input.
 fn input_of(photos: usize) -> String {
     let photos = match photos {
         1 => "1 photo of a see-through bottle".into(),
@@ -80,7 +80,7 @@ fn measure_photos(count: usize, photo_scale: usize) -> Result<Vec<MeasuredSearch
         .map(|i| made::enlarged_photo(i, photo_scale))
         .collect();
     let photo_width = largest_width(&photos);
-    // A photo is not enlarged to be searched.
+    // A photo is not enlarged for the search.
     SEARCH_SIDES_PX
         .into_iter()
         .filter(|side| *side <= photo_width)
@@ -155,7 +155,7 @@ fn sum_of_pairs(a: &Image<Coverage>, b: &Image<Coverage>, of: fn(f32, f32) -> f3
     pairs.map(|(a, b)| f64::from(of(a.0, b.0))).sum()
 }
 
-/// What both diagrams share.
+/// Properties shared by both diagrams.
 fn search_diagram(
     found: &[MeasuredSearch],
     input: &str,

@@ -49,7 +49,7 @@ const DETAIL_COLUMNS: [Column<MatteRow>; 14] = [
 ];
 
 impl MatteRow {
-    /// One of its errors; empty where there is no cut-out.
+    /// One of its errors; empty without a cut-out.
     fn error_cell(&self, error: fn(&Score) -> f64) -> String {
         number_or_empty(self.score.as_ref().map(error), 6)
     }
@@ -60,7 +60,7 @@ pub(super) fn details(rows: &[MatteRow]) -> Table {
     table_of(&DETAIL_COLUMNS, rows)
 }
 
-/// Error against run time, a point per method: over backgrounds lit by themselves, and in the
+/// Error against run time, a point per method: over backgrounds lit independently, and in the
 /// object's own shadow.
 pub(super) fn chart(summaries: &[MethodSummary]) -> String {
     let lit = error_chart(summaries, "new background, lit by itself", |s| s.mae_lit);

@@ -6,20 +6,21 @@ use crate::statistics::{mean_of, quantile};
 /// Errors of a method over all photos.
 pub(super) struct MethodSummary {
     pub(super) method: MattingMethod,
-    /// Means; of the outline's overlap and of the time the median, of the box the 95 % quantile.
+    /// Means, except for the median of the outline's overlap and of the time, and the 95 % quantile
+    /// of the box.
     pub(super) score: Score,
     /// Photos without a cut-out.
     pub(super) failed: usize,
-    /// Share of the photos whose box is right to 2 pixels.
+    /// Share of the photos with a box error of at most 2 pixels.
     pub(super) box_within_2_px: f64,
-    /// Photos with a box more than 2 pixels off or an outline overlapping by less than 0.95, and
-    /// no warning.
+    /// Photos with a box more than 2 pixels off or an outline with an overlap below 0.95, without a
+    /// warning.
     pub(super) silently_wrong: usize,
     /// Median run time, milliseconds.
     pub(super) time_ms: f64,
 }
 
-/// Errors over all photos, a line per method.
+/// Errors over all photos, a row per method.
 pub(super) fn summaries(rows: &[MatteRow]) -> Vec<MethodSummary> {
     MattingMethod::ALL
         .into_iter()
@@ -59,7 +60,7 @@ impl Score {
     }
 }
 
-/// Means; of the outline's overlap the median, of the box the 95 % quantile.
+/// Means, except for the median of the outline's overlap and the 95 % quantile of the box.
 fn mean_score(scores: &[Score]) -> Score {
     Score {
         sad: mean_of(scores, |s| s.sad),

@@ -1,4 +1,4 @@
-//! Photos with known mattes, as the sample world has them.
+//! Photos with known mattes, in the format of the sample world.
 
 use crate::files::json_files;
 use petcomp::color::{linear_to_srgb, srgb_to_linear};
@@ -9,13 +9,14 @@ use std::path::{Path, PathBuf};
 /// The largest value of a photo's 8 bits.
 const MAX_CODE: f32 = 255.0;
 
-/// A photo and all that its renderer knows of it; all pictures are scene-linear and of one size.
+/// A photo and everything that its renderer knows about it; all pictures are scene-linear and of
+/// the same size.
 pub(crate) struct Known {
     pub(crate) name: String,
     pub(crate) photo: Image<LinearRgb>,
     /// Premultiplied foreground F.
     pub(crate) foreground: Image<LinearRgb>,
-    /// Transmittance T as a screen under the object shows it, 1 outside the object.
+    /// Transmittance T as seen on a screen under the object, 1 outside the object.
     pub(crate) transmittance: Image<LinearRgb>,
     /// View transmittance V, 1 outside the object.
     pub(crate) view: Image<LinearRgb>,
@@ -87,7 +88,7 @@ pub(crate) fn in_eight_bits(value: f32) -> f32 {
     srgb_to_linear(code.round() / MAX_CODE)
 }
 
-/// The records of a folder, by file name, still to be read.
+/// The unread records of a folder, by file name.
 pub(crate) struct Truths {
     folder: PathBuf,
     records: Vec<TruthRecord>,
@@ -138,7 +139,7 @@ impl Truths {
     }
 
     fn read_view(&self, name: &Path) -> Result<Image<LinearRgb>> {
-        // Linear in 8 bits, which is how coverage is stored and colour is not.
+        // Linear in 8 bits, like stored coverage and unlike colour.
         Ok(self.read_color(name)?.map(|p| p.map(linear_to_srgb)))
     }
 

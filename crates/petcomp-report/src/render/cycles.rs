@@ -22,7 +22,7 @@ pub(super) struct TimedPicture {
 }
 
 impl CyclesPictures {
-    /// None where the folder has no `times.json`.
+    /// None if the folder has no `times.json`.
     pub(super) fn read(folder: &Path) -> Result<Self> {
         let path = folder.join("times.json");
         if !path.exists() {

@@ -1,4 +1,4 @@
-//! The renderer's samples and filters: error against Cycles, over run time.
+//! Samples and filters of the renderer: error against Cycles, over run time.
 
 use super::golden::GoldenScene;
 use crate::clock::timed;
@@ -17,21 +17,21 @@ const PIXEL_SAMPLES: [usize; 4] = [1, 3, 4, 6];
 const LIGHT_SAMPLES: [usize; 4] = [1, 2, 4, 6];
 const SKY_SAMPLES: [usize; 4] = [8, 16, 64, 128];
 const CELLS_PX: [f64; 4] = [4.0, 2.0, 1.0, 0.66];
-/// The scene on which filtered samples stand beside plain ones, which take a thousand times as
+/// The scene on which filtered and plain samples are compared; plain ones take a thousand times as
 /// long.
 const PLAIN_SCENE: &str = "tilted_translucent";
 /// Samples along each side of a pixel there.
 const PLAIN_SIDES: [usize; 5] = [1, 2, 3, 4, 6];
 
-/// What a scene costs, and how wrong it is.
+/// Cost and error of a scene.
 struct SceneCost {
     mean_square: f64,
     seconds: f64,
     pixels: f64,
 }
 
-/// The golden scenes at many settings, `runs` times each, and filtered samples beside plain ones;
-/// none without scenes.
+/// The golden scenes at many settings, `runs` times each, and filtered samples compared with plain
+/// ones; none without scenes.
 pub(crate) fn diagrams(golden: &Path, runs: usize) -> Result<Vec<Diagram>> {
     let scenes = GoldenScene::all_in(golden)?;
     if scenes.is_empty() {
@@ -111,11 +111,11 @@ fn filter_points(scene: &GoldenScene, subsamples: usize, runs: usize) -> Result<
     ])
 }
 
-/// Which scenes want more samples.
+/// Scenes that need more samples.
 const EDGE_NOTE: &str = "Cards of the scenes that are no piles are bare rectangles, whose edges want more samples of a pixel than \
     cut-outs do, which end in their own soft alpha.";
 
-/// What all diagrams share.
+/// Properties shared by all diagrams.
 fn golden_diagram(points: Vec<Point>) -> Diagram {
     Diagram {
         error: "RMS error, scene-linear".into(),
@@ -143,7 +143,7 @@ impl RenderSetting {
         }
     }
 
-    /// The default but for one number.
+    /// The default with one number changed.
     fn changed(curve: &'static str, name: String, change: impl FnOnce(&mut RenderOptions)) -> Self {
         let mut options = RenderOptions::default();
         change(&mut options);
@@ -160,7 +160,7 @@ impl RenderSetting {
     }
 }
 
-/// The presets, and each number of the default changed by itself.
+/// The presets, and the default with each number changed separately.
 fn render_settings() -> Vec<RenderSetting> {
     let presets = super::settings()
         .map(|(name, options)| RenderSetting::new(PRESETS, name.to_owned(), options));
@@ -201,7 +201,7 @@ fn measure_scenes(
 }
 
 impl GoldenScene {
-    /// Cut-outs of bottles in a heap: what datasets are made of.
+    /// Whether it is a heap of bottles, like the scenes of datasets.
     fn is_pile(&self) -> bool {
         self.name.starts_with("pile_of_")
     }
@@ -233,8 +233,7 @@ fn squared_differences(a: &PremulRgba, b: &LinearRgb) -> [f64; 3] {
     [a.r - b.r, a.g - b.g, a.b - b.b].map(|d| f64::from(d).powi(2))
 }
 
-/// Root mean squared error over scenes, all of the same weight, and the CPU seconds of all of them
-/// per megapixel.
+/// Root mean squared error over scenes of equal weight, and their total CPU seconds per megapixel.
 fn mean_point<'a>(
     curve: &str,
     setting: &str,

@@ -1,4 +1,4 @@
-//! The golden scenes: pictures of Cycles that ours should equal.
+//! The golden scenes: pictures by Cycles that ours should match.
 
 use super::{picture_of, settings};
 use petcomp::diff::{Likeness, triple};
@@ -14,7 +14,7 @@ const STRIP_GAP_PX: usize = 4;
 pub(super) struct GoldenRow {
     pub(super) case: String,
     pub(super) quality: &'static str,
-    /// Against the reference.
+    /// Compared with the reference.
     pub(super) likeness: Likeness,
 }
 
@@ -26,7 +26,7 @@ pub(super) struct GoldenScene {
 }
 
 impl GoldenScene {
-    /// All scenes of a folder, by name; none where there is no folder.
+    /// All scenes of a folder, by name; none if there is no folder.
     pub(super) fn all_in(folder: &Path) -> Result<Vec<Self>> {
         let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
         let mut cases: Vec<PathBuf> = entries
@@ -67,8 +67,8 @@ impl GoldenScene {
     }
 }
 
-/// Every golden scene at every setting, and a sheet of all of them at one of them; no sheet where
-/// there are no scenes.
+/// Every golden scene at every setting, and a sheet of all of them at one of them; no sheet without
+/// scenes.
 pub(super) fn golden(
     folder: &Path,
     shown: &str,

@@ -1,22 +1,21 @@
-//! The settings that take the least time at an error.
+//! The fastest settings for an error.
 
 use super::{RenderRow, TimedScene};
 use petcomp::Result;
 use petcomp::render::RenderOptions;
 
-/// Renderings of each setting that is tried, of which the median decides.
+/// Renderings per setting; their median counts.
 const TRIAL_REPEATS: usize = 3;
 
-/// Samples along each side of a pixel, along each side of a light, of the environment, and
-/// distances of the irradiance's nodes that are tried, each with each: from the coarsest that can
-/// be asked for to the default.
+/// Samples along each side of a pixel, along each side of a light, of the environment, and spacings
+/// of the irradiance's nodes; all combinations are tried, from the coarsest allowed to the default.
 const SUBSAMPLES: [usize; 2] = [1, 2];
 const LIGHT_SAMPLES: [usize; 3] = [1, 2, 3];
 const AMBIENT_SAMPLES: [usize; 5] = [2, 4, 8, 16, 32];
 const CELLS_PX: [f64; 8] = [1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0];
 
-/// The quickest settings whose error is at most each of `errors`; those that none reaches are left
-/// out.
+/// The fastest settings with an error of at most each of `errors`; errors that none reaches are
+/// left out.
 pub(super) fn quickest(
     scene: &TimedScene,
     errors: &[f64],

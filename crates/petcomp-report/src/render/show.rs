@@ -45,8 +45,8 @@ impl RenderRow {
     }
 }
 
-/// How many times as long the other program takes for the same error, on a straight line between
-/// its pictures in a plot of logarithms; none beyond its last one.
+/// Ratio of the other program's time for the same error to ours, interpolated log-log between its
+/// pictures; none beyond its last one.
 pub(super) fn speed_up(row: &RenderRow, rows: &[RenderRow]) -> Option<f64> {
     let error = row.cycles?.rmse;
     if !row.is_petcomp() {

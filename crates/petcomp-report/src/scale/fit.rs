@@ -1,4 +1,4 @@
-//! A cost as a sum of what things cost each: least squares without negative prices.
+//! A cost as a sum of prices: non-negative least squares.
 
 use super::{ScaleMeasurements, ScalePoint, missing_error};
 use nalgebra::{DMatrix, DVector};
@@ -7,32 +7,32 @@ use petcomp::Result;
 /// Singular values below this are zero: columns have length 1.
 const SINGULAR_EPSILON: f64 = 1e-12;
 
-/// What each thing costs, and how far measurements are from that.
+/// Prices of each term, and the deviations of measurements from the fit.
 pub(super) struct CostFit {
-    /// What is paid for.
+    /// The terms.
     pub(super) terms: Vec<&'static str>,
-    /// The price of each; 0 for what does not show.
+    /// The price of each term; 0 if it has no visible effect.
     pub(super) prices: Vec<f64>,
     /// Measured over fitted, less 1, for each measurement.
     pub(super) residuals: Vec<f64>,
-    /// The same with a fit that has not seen the measurement: what a forecast must expect.
+    /// The same with a fit that excludes the measurement: the error to expect of a forecast.
     pub(super) unseen: Vec<f64>,
 }
 
 /// Time and memory of a picture.
 pub(super) struct CostModel {
-    /// Seconds of a processor per picture, of points on one thread.
+    /// CPU seconds per picture, from points on one thread.
     pub(super) time: CostFit,
-    /// Most bytes of a process, of all points.
+    /// Peak bytes of a process, from all points.
     pub(super) memory: CostFit,
 }
 
-/// What is paid for, and how much of it a point has.
+/// A term of the cost, and its amount for a point.
 type Term = (&'static str, fn(&ScalePoint) -> f64);
 
-/// Light is looked up on a lattice that is finest along the sides of cards, however small these are
-/// in the picture, and every place of it looks through as many layers as may lie above; and any
-/// card may stand in another's light.
+/// Light is computed on a lattice that is finest along the sides of cards, however small these are
+/// in the picture, and every node looks through all layers that may be above it; any card may also
+/// stand in another's light.
 const TIME_TERMS: [Term; 6] = [
     ("picture", |_| 1.0),
     ("megapixel", |p| p.case.megapixels()),
@@ -44,7 +44,7 @@ const TIME_TERMS: [Term; 6] = [
     ("pair of cards", card_pairs),
 ];
 
-/// Textures of cards are held with a border, and light with what lies above it: cards that overlap.
+/// Textures of cards are held with a border, and light with the cards above it that overlap.
 const MEMORY_TERMS: [Term; 5] = [
     ("process", |_| 1.0),
     ("megapixel in hand", |p| in_hand(p, p.case.megapixels())),
@@ -59,12 +59,12 @@ const MEMORY_TERMS: [Term; 5] = [
     }),
 ];
 
-/// What all threads together have of what a picture has.
+/// The amount of a picture, times the number of threads.
 fn in_hand(point: &ScalePoint, of_picture: f64) -> f64 {
     point.case.threads as f64 * of_picture
 }
 
-/// Thousands of pixels along the sides of all cards, were each a square: the root of each card's
+/// Thousands of pixels along the sides of all cards, if each were a square: the root of each card's
 /// megapixels.
 fn card_sides(point: &ScalePoint) -> f64 {
     let cards = point.case.cards as f64;
@@ -76,7 +76,7 @@ fn card_pairs(point: &ScalePoint) -> f64 {
     0.5 * cards * (cards - 1.0)
 }
 
-/// How much a point has of each term.
+/// The amount of each term for a point.
 fn amounts(terms: &[Term], point: &ScalePoint) -> Vec<f64> {
     terms.iter().map(|(_, amount)| amount(point)).collect()
 }
@@ -92,12 +92,12 @@ impl CostModel {
         })
     }
 
-    /// Seconds of a processor for a picture like a point's.
+    /// CPU seconds for a picture like a point's.
     pub(super) fn seconds(&self, point: &ScalePoint) -> f64 {
         self.time.cost_of(&amounts(&TIME_TERMS, point))
     }
 
-    /// Most bytes of a process that makes pictures like a point's.
+    /// Peak bytes of a process that generates pictures like a point's.
     pub(super) fn bytes(&self, point: &ScalePoint) -> f64 {
         self.memory.cost_of(&amounts(&MEMORY_TERMS, point))
     }
@@ -115,14 +115,14 @@ fn fit_terms(
 }
 
 impl CostFit {
-    /// Fits prices to measured costs, a row for each of how much it has of each term; none without
-    /// a measurement above 0.
+    /// Fits prices to measured costs, with a row of amounts of each term for every cost; none
+    /// without a measurement above 0.
     ///
     /// # Method
     /// Non-negative least squares of relative errors, since costs span decades. The best fit with
-    /// some prices at 0 and the others free is looked for among all sets of prices, of which
-    /// there are few; that it exists is a theorem of Lawson and Hanson ("Solving Least Squares
-    /// Problems", 1974, chapter 23).
+    /// some prices at 0 and the others free is searched among all sets of prices, of which there
+    /// are few; that it exists is a theorem of Lawson and Hanson ("Solving Least Squares Problems",
+    /// 1974, chapter 23).
     pub(super) fn new(terms: &[&'static str], rows: &[Vec<f64>], costs: &[f64]) -> Option<Self> {
         let data = Costs { rows, costs };
         let prices = data.fit_without(None)?;
@@ -135,12 +135,12 @@ impl CostFit {
         })
     }
 
-    /// The cost of something with these amounts of each term.
+    /// The cost of these amounts of each term.
     pub(super) fn cost_of(&self, amounts: &[f64]) -> f64 {
         dot(&self.prices, amounts)
     }
 
-    /// The share by which nine in ten measurements that were not fitted are off, at most.
+    /// The relative error that nine in ten held-out measurements do not exceed.
     pub(super) fn spread(&self) -> f64 {
         const NINE_IN_TEN: f64 = 0.9;
         let mut off: Vec<f64> = self.unseen.iter().map(|r| r.abs()).collect();
@@ -156,7 +156,7 @@ fn dot(prices: &[f64], amounts: &[f64]) -> f64 {
     prices.iter().zip(amounts).map(|(p, x)| p * x).sum()
 }
 
-/// Measured costs, and a row for each of how much it has of each term.
+/// Measured costs, each with its amounts of each term.
 struct Costs<'a> {
     rows: &'a [Vec<f64>],
     costs: &'a [f64],
@@ -170,7 +170,7 @@ impl Costs<'_> {
         self.costs[i] / dot(prices, &self.rows[i]) - 1.0
     }
 
-    /// The residual of a measurement by prices that are fitted to the others.
+    /// The residual of a measurement with prices fitted to the others.
     fn unseen_residual(&self, i: usize) -> f64 {
         let prices = self.fit_without(Some(i));
         prices.map_or(f64::INFINITY, |prices| self.residual(&prices, i))
@@ -181,7 +181,7 @@ impl Costs<'_> {
         all.filter(|&i| self.costs[i] > 0.0).collect()
     }
 
-    /// Prices by all measurements above 0 but one; none without any.
+    /// Prices fitted to all measurements above 0 except one; none without any.
     fn fit_without(&self, left_out: Option<usize>) -> Option<Vec<f64>> {
         let mut used = self.positive();
         used.retain(|i| Some(*i) != left_out);
@@ -193,7 +193,7 @@ impl Costs<'_> {
             .map(|(prices, _)| prices)
     }
 
-    /// Least squares with some prices free and the others 0.
+    /// Least squares with some prices free and the others at 0.
     fn least_squares(&self, used: &[usize], free: &[usize]) -> Option<PricesAndError> {
         let mut shares = DMatrix::from_fn(used.len(), free.len(), |i, k| {
             self.rows[used[i]][free[k]] / self.costs[used[i]]
@@ -208,13 +208,13 @@ impl Costs<'_> {
     }
 }
 
-/// All sets of terms but the empty one.
+/// All non-empty sets of terms.
 fn subsets(terms: usize) -> impl Iterator<Item = Vec<usize>> {
     let sets = 1..1_usize << terms;
     sets.map(move |set| (0..terms).filter(|k| set >> k & 1 == 1).collect())
 }
 
-/// Makes columns of length 1, so that a term of few per thousand is not mistaken for rounding;
+/// Normalises columns to length 1, so that a term of few per thousand is not mistaken for rounding;
 /// returns their lengths.
 fn normalize_columns(matrix: &mut DMatrix<f64>) -> Vec<f64> {
     let columns = matrix.column_iter_mut();
@@ -227,7 +227,7 @@ fn normalize_columns(matrix: &mut DMatrix<f64>) -> Vec<f64> {
         .collect()
 }
 
-/// What a matrix should be multiplied by to give ones, and the squared error that is left.
+/// The vector whose product with a matrix is closest to ones, and the remaining squared error.
 fn solve_ones(matrix: &DMatrix<f64>) -> Option<(DVector<f64>, f64)> {
     let ones = DVector::repeat(matrix.nrows(), 1.0);
     let svd = matrix.clone().svd(true, true);

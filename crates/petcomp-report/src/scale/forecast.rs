@@ -1,22 +1,22 @@
-//! What many pictures take on many machines, from the model of one.
+//! Time and memory for many pictures on many machines, from the model of one picture.
 
 use super::{CostModel, SECONDS_PER_HOUR, ScaleMeasurements, ScalePoint, grid, missing_error};
 use petcomp::Result;
 
-/// What a dataset of default pictures is expected to take.
+/// Expected time and memory of a dataset of default pictures.
 pub(super) struct Forecast {
-    /// Seconds of a processor per picture, its cards already lying: what the model says, and
-    /// between what nine in ten lie.
+    /// CPU seconds per picture with its cards at rest: the model's value, and the interval that
+    /// contains nine in ten.
     pub(super) picture_seconds: [f64; 3],
-    /// Seconds of a processor until its cards lie.
+    /// CPU seconds until its cards are at rest.
     pub(super) fall_seconds: f64,
-    /// Share of `cores` times the rate of one thread that all threads together have.
+    /// Parallel efficiency: throughput of all threads over `cores` times that of one thread.
     pub(super) efficiency: f64,
-    /// Cores of a machine: most threads that were measured.
+    /// Cores of a machine: the largest measured number of threads.
     pub(super) cores: usize,
-    /// Hours of one core for all: expected, least, most.
+    /// Core-hours in total: expected, least, most.
     pub(super) core_hours: [f64; 3],
-    /// Most memory of a process on all cores: expected, least, most, bytes.
+    /// Peak memory of a process on all cores: expected, least, most, bytes.
     pub(super) bytes: [f64; 3],
 }
 
@@ -43,7 +43,7 @@ fn core_hours(images: f64, seconds_each: f64, efficiency: f64) -> f64 {
     images * seconds_each / efficiency.min(1.0) / SECONDS_PER_HOUR
 }
 
-/// The default picture on one thread and on the most.
+/// The default picture on one thread and on the largest number of threads.
 fn one_and_all_threads(measured: &ScaleMeasurements) -> Result<(&ScalePoint, &ScalePoint)> {
     let points = measured.default_pictures();
     let one = points.iter().find(|point| point.is_single_threaded());
@@ -55,12 +55,12 @@ fn one_and_all_threads(measured: &ScaleMeasurements) -> Result<(&ScalePoint, &Sc
     }
 }
 
-/// A value and what is this share of it less and more.
+/// A value, and the same less and plus this share of it.
 fn interval(value: f64, share: f64) -> [f64; 3] {
     [value, value * (1.0 - share).max(0.0), value * (1.0 + share)]
 }
 
-/// Seconds of a fall of some cards, in proportion between the numbers that were measured.
+/// Seconds of a fall of some cards, interpolated linearly between the measured numbers.
 fn interpolated_fall(falls: &[(usize, f64)], cards: usize) -> f64 {
     let below = falls.iter().rev().find(|(n, _)| *n <= cards);
     let above = falls.iter().find(|(n, _)| *n >= cards);
@@ -77,7 +77,7 @@ fn between((a, s): (usize, f64), (b, t): (usize, f64), cards: usize) -> f64 {
 }
 
 impl Forecast {
-    /// Hours on a number of machines of [`cores`](Self::cores) cores: expected, least, most.
+    /// Hours on a number of machines with [`cores`](Self::cores) cores: expected, least, most.
     pub(super) fn hours_on(&self, machines: usize) -> [f64; 3] {
         let cores = (machines * self.cores) as f64;
         self.core_hours.map(|hours| hours / cores)
@@ -89,7 +89,7 @@ pub(super) mod tests {
     use super::super::ScaleCase;
     use super::*;
 
-    /// Measurements of a machine that is exactly as the model says, and half as good on two
+    /// Measurements of a machine that follows the model exactly, with half the efficiency on two
     /// threads.
     pub(in super::super) fn measured() -> ScaleMeasurements {
         let point = |case: ScaleCase| {

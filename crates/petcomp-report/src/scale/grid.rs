@@ -1,22 +1,22 @@
-//! Which datasets are measured.
+//! The measured datasets.
 
 use serde::{Deserialize, Serialize};
 
-/// Pictures of one kind, and how many are made at once.
+/// A kind of picture, and the number generated at the same time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScaleCase {
-    /// Threads, of which each makes a picture of its own.
+    /// Threads, each of which generates its own pictures.
     pub threads: usize,
     /// Width and height, pixels.
     pub image: [u32; 2],
-    /// Cards in a picture.
+    /// Number of cards in a picture.
     pub cards: usize,
-    /// Factor on the sides of the cards: the same number of cards in fewer or more layers.
+    /// Factor on the sides of the cards, which gives the same number of cards fewer or more layers.
     pub scale: f64,
 }
 
-/// The picture of a typical dataset: that of the recipe's defaults, with its most cards.
+/// The picture of a typical dataset: the recipe's defaults, with the maximum number of cards.
 pub(super) const DEFAULT_PICTURE: ScaleCase = ScaleCase {
     threads: 1,
     image: [640, 480],
@@ -24,9 +24,9 @@ pub(super) const DEFAULT_PICTURE: ScaleCase = ScaleCase {
     scale: 1.0,
 };
 
-/// From 1 to 33 megapixels, in shapes that cameras have.
+/// From 1 to 33 megapixels, in aspect ratios of cameras.
 const LARGER_IMAGES: [[u32; 2]; 4] = [[1152, 864], [2048, 1536], [3648, 2736], [7680, 4320]];
-/// Numbers of cards with the factors on their sides: so that cards and layers do not grow together.
+/// Numbers of cards with factors on their sides, so that cards and layers do not grow together.
 const CARDS: [(usize, f64); 12] = [
     (1, 1.0),
     (3, 1.0),
@@ -41,8 +41,8 @@ const CARDS: [(usize, f64); 12] = [
     (10, 2.0),
     (30, 2.0),
 ];
-/// Corners of the grid, where terms that only fit along its edges would show: few pixels, many
-/// pixels and no layers.
+/// Corners of the grid, where terms that fit only along its edges would show: few pixels, and many
+/// pixels without layers.
 const CORNERS: [([u32; 2], usize, f64); 4] = [
     ([160, 120], 12, 1.0),
     ([160, 120], 100, 1.0),
@@ -50,7 +50,7 @@ const CORNERS: [([u32; 2], usize, f64); 4] = [
     ([2048, 1536], 100, 0.5),
 ];
 
-/// Cards that fall together.
+/// Numbers of cards that fall together.
 pub(super) const FALL_SIZES: [usize; 5] = [1, 5, 12, 20, 40];
 
 /// Every case: the default picture on 1, 2, 4 ... threads, then sizes, cards and corners on one.
@@ -72,7 +72,7 @@ pub(super) fn cases(max_threads: usize) -> Vec<ScaleCase> {
     threads.chain(sizes).chain(cards).chain(corners).collect()
 }
 
-/// Powers of two up to the most, and the most.
+/// Powers of two up to the maximum, and the maximum.
 fn thread_counts(max_threads: usize) -> impl Iterator<Item = usize> {
     let powers = std::iter::successors(Some(1), |n| Some(2 * n));
     powers
@@ -86,7 +86,7 @@ impl ScaleCase {
         f64::from(self.image[0]) * f64::from(self.image[1]) * 1e-6
     }
 
-    /// Whether it is the default picture, on however many threads.
+    /// Whether it is the default picture, on any number of threads.
     pub(super) fn is_default_picture(&self) -> bool {
         let single = Self {
             threads: 1,

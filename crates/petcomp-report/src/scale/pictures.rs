@@ -1,4 +1,4 @@
-//! Pictures of a kind, made from nothing.
+//! Synthetic pictures of a kind.
 
 use super::ScaleCase;
 use crate::pile::{CAMERA_HEIGHT_M, camera_above, lamp, striped};
@@ -22,22 +22,22 @@ use std::sync::{Arc, OnceLock};
 
 /// What the camera sees of the surface at 1:1, metres per pixel of focal length and width.
 const FOCAL_BY_WIDTH: f64 = 1.166;
-/// Where cards lie, metres: a bit less than what is seen.
+/// Area of the cards, metres: slightly less than what is visible.
 const ROOM_M: [f64; 2] = [0.84, 0.6];
 /// Width and length of a card, metres: a bottle.
 const CARD_M: [f64; 2] = [0.07, 0.21];
-/// Height of the pile, and most that a card adds to it, metres.
+/// Height of the pile, and maximum height that a card adds to it, metres.
 const PILE_HEIGHT_M: f64 = 0.25;
 const MAX_RISE_M: f64 = 0.006;
 const CARD_MASS_KG: f64 = 0.02;
-/// How far each card is turned from the last, radians.
+/// Rotation of each card relative to the last, radians.
 const CARD_TURN_RAD: f64 = 2.4;
-/// Different cut-outs.
+/// Number of different cut-outs.
 const CUT_OUT_COUNT: usize = 5;
 /// The root of `x^3 = x + 1`.
 const PLASTIC_NUMBER: f64 = 1.324_717_957_244_746;
 
-/// What pictures of a kind are made from.
+/// Inputs of pictures of a kind.
 pub(super) struct PictureInputs {
     scene: Scene,
     shot: Shot,
@@ -60,7 +60,7 @@ impl PictureInputs {
         Self { scene, shot }
     }
 
-    /// Makes a dataset in a temporary folder and returns the layers of one picture.
+    /// Generates a dataset in a temporary folder and returns the layers of one picture.
     pub(super) fn make(&self, pictures: u64) -> Result<f64> {
         let folder = tempfile::tempdir().map_err(|e| Error::value("temporary folder", e))?;
         let layers = OnceLock::new();
@@ -140,7 +140,7 @@ fn samples_in_row(deep: &DeepImage, y: usize) -> usize {
     (0..deep.width()).map(|x| deep.at(x, y).len()).sum()
 }
 
-/// Cards in a heap under a lamp and an even sky, seen from above.
+/// Cards in a heap under a lamp and a uniform sky, seen from above.
 fn heap_scene(case: &ScaleCase) -> Scene {
     Scene {
         plate: "tray".into(),

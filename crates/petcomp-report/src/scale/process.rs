@@ -1,4 +1,4 @@
-//! Memory of a whole process, and points that are measured in one of their own.
+//! Memory of a whole process, and points measured in a process of their own.
 
 use super::{ScaleCase, ScalePoint};
 use crate::machine::bytes_in;
@@ -6,7 +6,7 @@ use petcomp::{Error, Result};
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// A point as another process prints it.
+/// A point as printed by another process.
 pub(super) fn run_in_child(program: &Path, case: &ScaleCase, seconds: f64) -> Result<ScalePoint> {
     let case = serde_json::to_string(case).map_err(|e| Error::file(program, e))?;
     let output = Command::new(program)
@@ -24,7 +24,7 @@ fn printed_point(output: &Output) -> std::result::Result<ScalePoint, String> {
     serde_json::from_slice(&output.stdout).map_err(|e| format!("printed no point: {e}"))
 }
 
-/// Most memory that was ever resident in this process, bytes.
+/// Peak resident memory of this process, bytes.
 pub(super) fn peak_bytes() -> Result<f64> {
     let path = Path::new("/proc/self/status");
     let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;

@@ -1,4 +1,4 @@
-//! One point: a dataset made here and now.
+//! One point: a dataset generated in this process.
 
 use super::pictures::PictureInputs;
 use super::process::peak_bytes;
@@ -9,17 +9,17 @@ use petcomp::settle::{SettleOptions, heap, settle};
 use petcomp::{Error, Result, work};
 use std::time::Instant;
 
-/// What else the machine does only ever adds to the time of a picture: the fastest of these rounds
+/// Other load on the machine only ever adds to the time of a picture: the fastest of these rounds
 /// counts.
 const MAX_ROUNDS: u64 = 3;
 const MAX_PICTURES_PER_ROUND: f64 = 1000.0;
-/// Pictures do not take less than this, for the number of them in a round.
+/// Assumed minimum time of a picture, for the number of pictures in a round.
 const LEAST_PICTURE_SECONDS: f64 = 1e-3;
-/// Heaps whose falls are timed.
+/// Number of heaps whose falls are timed.
 const TIMED_HEAPS: u64 = 5;
 
-/// Makes pictures of a kind for about this many seconds of work, one on each thread at least, and
-/// returns what they took.
+/// Generates pictures of a kind for about this many seconds of work, at least one on each thread,
+/// and returns what they took.
 ///
 /// For a process that does nothing else: memory is that of the whole process.
 ///
@@ -51,7 +51,7 @@ fn least(seconds: impl Iterator<Item = f64>) -> f64 {
     seconds.fold(f64::INFINITY, f64::min)
 }
 
-/// Seconds that a picture took in one round, of processors and of the clock, and its layers.
+/// Seconds per picture in one round, of CPU time and of wall-clock time, and its layers.
 struct Round {
     cpu: f64,
     wall: f64,
@@ -69,10 +69,10 @@ impl Round {
         })
     }
 
-    /// Rounds, and the pictures of each, that fill this many seconds if pictures take as long as
-    /// this one.
+    /// Number of rounds, and of pictures in each, that fill this many seconds if every picture
+    /// takes as long as this one.
     fn plan_more(&self, threads: usize, seconds: f64) -> (u64, u64) {
-        // A picture that takes all of the time is made once more, others in several rounds.
+        // A picture that takes all of the time is generated once more, others in several rounds.
         let rounds = if self.cpu < seconds { MAX_ROUNDS } else { 1 };
         let each = self.cpu.max(self.wall).max(LEAST_PICTURE_SECONDS);
         let share = seconds * threads as f64 / (rounds as f64 * each);
@@ -81,7 +81,7 @@ impl Round {
     }
 }
 
-/// Median seconds of a processor until a heap of cards lies still.
+/// Median CPU seconds until a heap of cards is at rest.
 pub(super) fn fall_seconds(cards: usize) -> Result<f64> {
     let seconds = (0..TIMED_HEAPS)
         .map(|k| heap_seconds(k, cards))
@@ -89,7 +89,7 @@ pub(super) fn fall_seconds(cards: usize) -> Result<f64> {
     Ok(quantile(seconds, 0.5))
 }
 
-/// Seconds until heap `k` lies still.
+/// Seconds until heap `k` is at rest.
 fn heap_seconds(k: u64, cards: usize) -> Result<f64> {
     let scene = heap(k, cards)?;
     let before = cpu_seconds();

@@ -1,4 +1,4 @@
-//! Tables and charts of what was measured, beside what the model says.
+//! Tables and charts of the measurements, compared with the model.
 
 use super::{
     CostFit, CostModel, FORECAST_PICTURES, Forecast, MB_PER_BYTE, MS_PER_SECOND, ScaleCase,
@@ -8,7 +8,7 @@ use crate::columns::{Column, table_from, table_of};
 use petcomp::Result;
 use petcomp::plot::{Axis, Chart, Curve, Table};
 
-/// Machines that share them.
+/// Numbers of machines that share the pictures.
 const MACHINES: [usize; 3] = [1, 10, 100];
 
 /// Tables with their titles: all points and residuals first, then the model, threads, falls, and a
@@ -28,7 +28,7 @@ pub(crate) fn tables(measured: &ScaleMeasurements) -> Result<Vec<(String, Table)
         .into())
 }
 
-/// A point beside what the model says of it.
+/// A point, compared with the model's prediction.
 struct ModelledPoint {
     point: ScalePoint,
     seconds: f64,
@@ -202,7 +202,7 @@ fn interval_words([value, least, most]: [f64; 3], digits: usize) -> String {
     format!("{value:.digits$} ({least:.digits$} to {most:.digits$})")
 }
 
-/// Charts with what is to be seen in them: rate by threads and memory; time by pixels and by cards.
+/// Charts with their captions: throughput by threads and memory; time by pixels and by cards.
 pub(crate) fn charts(measured: &ScaleMeasurements) -> Result<Vec<(String, String)>> {
     let model = CostModel::fit(measured)?;
     let sizes = by_sizes(measured);
@@ -218,14 +218,14 @@ pub(crate) fn charts(measured: &ScaleMeasurements) -> Result<Vec<(String, String
     ])
 }
 
-/// What points are drawn along: its words, and its value of a point.
+/// The variable of a chart's axis: its name, and its value for a point.
 type Along = (&'static str, fn(&ScalePoint) -> f64);
 
 const MEGAPIXELS: Along = ("megapixels", |p| p.case.megapixels());
 const CARD_COUNT: Along = ("cards", |p| p.case.cards as f64);
 const THREAD_COUNT: Along = ("threads", |p| p.case.threads as f64);
 
-/// Points on one thread that differ in their size alone.
+/// Points on one thread that differ only in their size.
 fn by_sizes(measured: &ScaleMeasurements) -> Vec<&ScalePoint> {
     let ScaleCase { cards, scale, .. } = grid::DEFAULT_PICTURE;
     let mut points = measured.single_threaded();
@@ -233,7 +233,7 @@ fn by_sizes(measured: &ScaleMeasurements) -> Vec<&ScalePoint> {
     points
 }
 
-/// Points on one thread that differ in their number of cards alone.
+/// Points on one thread that differ only in their number of cards.
 fn by_cards(measured: &ScaleMeasurements) -> Vec<&ScalePoint> {
     let ScaleCase { image, scale, .. } = grid::DEFAULT_PICTURE;
     let mut points = measured.single_threaded();

@@ -1,4 +1,4 @@
-//! Cases whose end is known: a stack of plates, and a plate on a slope.
+//! Cases with a known result: a stack of plates, and a plate on a slope.
 
 use petcomp::Result;
 use petcomp::geom::UnitQuaternion;
@@ -40,8 +40,8 @@ fn make_plate(object: &mut Object, bottom: f64) {
     };
 }
 
-/// How far the top of a stack of n plates is from n times their thickness, metres; infinite where
-/// it does not rest.
+/// Deviation of the top of a stack of n plates from n times their thickness, metres; infinite if it
+/// does not come to rest.
 pub(super) fn stack_error_m(options: &SettleOptions) -> Result<f64> {
     let end = settle(plate_stack()?, &accepting_any_error(options))?;
     let top = end.scene.objects.last().and_then(rest_position);
@@ -49,7 +49,7 @@ pub(super) fn stack_error_m(options: &SettleOptions) -> Result<f64> {
     Ok(top.map_or(f64::INFINITY, |[_, z]| (z - expected).abs()))
 }
 
-/// With a plate's thickness of air below each.
+/// Plates with a gap of one thickness below each.
 fn plate_stack() -> Result<Scene> {
     let bottoms: Vec<f64> = (0..PLATE_COUNT)
         .map(|i| 2.0 * PLATE_THICKNESS_M * i as f64 + PLATE_THICKNESS_M)
@@ -57,7 +57,7 @@ fn plate_stack() -> Result<Scene> {
     level_plates(&bottoms)
 }
 
-/// The error is what is measured here, so none is too large.
+/// The error is the quantity measured here, so none is too large.
 fn accepting_any_error(options: &SettleOptions) -> SettleOptions {
     SettleOptions {
         max_overlap: 1.0,
@@ -66,7 +66,7 @@ fn accepting_any_error(options: &SettleOptions) -> SettleOptions {
     }
 }
 
-/// Where an object rests along the tray and how high, metres.
+/// Position of an object at rest along the tray, and its height, metres.
 fn rest_position(object: &Object) -> Option<[f64; 2]> {
     match object.placement {
         Placement::At(pose) => Some([pose.translation.x, pose.translation.z]),
@@ -74,7 +74,7 @@ fn rest_position(object: &Object) -> Option<[f64; 2]> {
     }
 }
 
-/// Slopes on which a plate slides and should not, or the other way round.
+/// Number of slopes on which a plate slides and should not, or vice versa.
 pub(super) fn count_wrong_slopes(options: &SettleOptions) -> Result<usize> {
     let mut wrong = 0;
     for slope in SLOPES {
@@ -83,8 +83,8 @@ pub(super) fn count_wrong_slopes(options: &SettleOptions) -> Result<usize> {
     Ok(wrong)
 }
 
-/// Whether a plate on a slope of `share` times the critical one slides where that is more than 1,
-/// and else stays.
+/// Whether a plate on a slope of `share` times the critical one slides if that is more than 1, and
+/// stays otherwise.
 fn slides_rightly(share: f64, options: &SettleOptions) -> Result<bool> {
     let scene = plate_on_slope()?;
     let options = SettleOptions {

@@ -1,4 +1,4 @@
-//! The physics' steps: errors of heaps at rest against run time.
+//! The steps of the physics: errors of heaps at rest against run time.
 
 use super::closed_form::PLATE_COUNT;
 use super::{HEAP_CARDS, SettleRow, measure};
@@ -7,10 +7,10 @@ use petcomp::plot::three;
 use petcomp::scene::SettleOptions;
 use petcomp::{Quality, Result};
 
-/// Length of the heap's typical card, of which limits are shares.
+/// Length of the heap's typical card, to which limits are relative.
 const CARD_LENGTH_MM: f64 = 200.0;
-/// Bodies keep two contact margins of 0.2 mm between them, so that a stack without overlap is
-/// higher by as much for each plate.
+/// Bodies keep two contact margins of 0.2 mm between them, so a stack without overlap is higher by
+/// that much per plate.
 const PLATE_GAP_MM: f64 = 0.4;
 
 /// Measures every setting with a number of heaps: worst overlap, worst energy rise and the error of
@@ -102,7 +102,7 @@ impl SettleRow {
         settings.iterations == self.iterations && self.is_step(settings.step)
     }
 
-    /// Every error of a setting is as small as it should be.
+    /// Whether every error of a setting is small enough.
     fn is_right(&self) -> bool {
         self.rested == self.heaps
             && self.wrong_slopes == 0
@@ -111,14 +111,14 @@ impl SettleRow {
             && self.stack_error_mm() <= max_overlap_mm()
     }
 
-    /// How far the stack is from its thicknesses and margins, millimetres.
+    /// Deviation of the stack from its thicknesses and margins, millimetres.
     fn stack_error_mm(&self) -> f64 {
         (self.stack_mm - PLATE_GAP_MM * PLATE_COUNT as f64).abs()
     }
 }
 
-/// What no single error shows: which settings are right in everything, and which of them costs
-/// least.
+/// What no single error shows: which settings are right in everything, and which of them is
+/// cheapest.
 fn why_default(rows: &[SettleRow]) -> String {
     let right: Vec<&SettleRow> = rows.iter().filter(|row| row.is_right()).collect();
     let best = right.iter().min_by(|a, b| a.cpu_ms.total_cmp(&b.cpu_ms));

@@ -10,18 +10,18 @@ const HEAP_SIZES: [usize; 3] = [5, 20, 60];
 const HEAPS_PER_SIZE: u64 = 3;
 const TIMED_RUNS: usize = 5;
 
-/// A heap for another program to settle, and how it settled here.
+/// A heap for another program to settle, and our result.
 #[derive(Clone, Debug, Serialize)]
 pub struct PeerCase {
-    /// What it is.
+    /// Its name.
     pub name: String,
-    /// Before the fall.
+    /// The scene before the fall.
     pub scene: Scene,
-    /// Width, height and thickness of the box that falls, for each object, metres.
+    /// Width, height and thickness of each object's falling box, metres.
     pub boxes: Vec<[f64; 3]>,
-    /// After it.
+    /// The scene after the fall.
     pub settled: Scene,
-    /// Times of five runs, milliseconds, one thread.
+    /// Wall-clock times of five runs on one thread, milliseconds.
     pub wall_ms: Vec<f64>,
 }
 
@@ -37,7 +37,7 @@ pub fn peer_cases() -> Result<Vec<PeerCase>> {
 }
 
 impl PeerCase {
-    /// Heap `k` of a number of cards.
+    /// Heap `k` with a number of cards.
     fn new(cards: usize, k: u64) -> Result<Self> {
         let options = SettleOptions::default();
         let scene = heap(k, cards)?;

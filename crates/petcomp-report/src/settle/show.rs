@@ -24,7 +24,7 @@ pub(super) fn table(rows: &[SettleRow]) -> Table {
 }
 
 /// The sweep as charts against run time: worst overlap, energy rise, and error of the stack; a ring
-/// where the default is.
+/// marks the default.
 pub(super) fn charts(rows: &[SettleRow]) -> Vec<Chart> {
     vec![
         error_chart(rows, "worst overlap, mm", |r| r.overlap_mm[1]),

@@ -1,5 +1,5 @@
-//! Synthetic photos of a bottle whose outline is known: a waisted body of film with a rim, glints,
-//! a striped label and a cap, in its own soft shadow.
+//! Synthetic photos of a bottle with a known outline: a waisted body of film with a rim, glints, a
+//! striped label and a cap, in its own soft shadow.
 
 use crate::flags::is_right;
 use crate::matte::score::{box_error, overlap};
@@ -13,10 +13,10 @@ pub(super) const BLUE: LinearRgb = LinearRgb::new(0.03, 0.06, 0.35);
 const RED: LinearRgb = LinearRgb::new(0.5, 0.03, 0.04);
 /// Rotation of a bottle in the picture, radians.
 const BOTTLE_ROTATION_RAD: f64 = 0.1;
-/// Subpixels that a pixel is the mean of, from its corner.
+/// Subpixels that a pixel is averaged from, relative to its corner.
 const SUBPIXELS: [[f64; 2]; 4] = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]];
 
-/// What a photo shows, and how it is taken.
+/// Contents of a photo, and camera settings.
 #[derive(Clone)]
 pub(super) struct BottlePhoto {
     pub(super) size: (usize, usize),
@@ -24,7 +24,7 @@ pub(super) struct BottlePhoto {
     pub(super) cap: LinearRgb,
     /// Standard deviation of the sensor's noise.
     pub(super) noise: f32,
-    /// The screen loses this share of its light from one corner to the other.
+    /// Share of its light that the screen loses from one corner to the other.
     pub(super) uneven: f32,
     /// Gain before the sensor saturates at 1.
     pub(super) exposure: f32,
@@ -84,7 +84,7 @@ fn neck(x: f64) -> f64 {
     }
 }
 
-/// Light added and transmittance at a point of a bottle 2 long; nothing beside it.
+/// Light added and transmittance at a point of a bottle 2 long; none outside it.
 fn bottle_at(x: f64, y: f64, cap: LinearRgb) -> Option<(LinearRgb, f32)> {
     let half = half_height(x);
     if !(-1.0..1.0).contains(&x) || y.abs() >= half {
@@ -119,7 +119,7 @@ fn is_glint(x: f64, y: f64) -> bool {
     libm::sin(x * 37.0 + y * 61.0) * libm::cos(x * 11.0 - y * 29.0) > 0.8
 }
 
-/// What a bottle leaves of the light of the screen beside it.
+/// Share of light that a bottle's soft shadow leaves on the screen.
 fn soft_shadow((u, v): (f64, f64)) -> f32 {
     let [along, across] = [(u.abs() - 0.9).max(0.0), (v.abs() - 0.25).max(0.0)];
     1.0 - 0.2 * libm::exp(-(along * along + across * across) / 0.02) as f32
@@ -130,7 +130,7 @@ impl BottlePhoto {
         [self.size.0 as f64, self.size.1 as f64]
     }
 
-    /// Where a point of the picture lies in the frame of bottle `i`.
+    /// Position of a point of the picture in the frame of bottle `i`.
     fn on_bottle(&self, i: usize, x: f64, y: f64) -> (f64, f64) {
         let ([w, h], [u, v]) = (self.extent(), self.at[i]);
         let unit = self.length * w / 2.0;
@@ -144,13 +144,13 @@ impl BottlePhoto {
         (0..self.at.len()).map(move |i| self.on_bottle(i, x, y))
     }
 
-    /// Light added and transmittance of the first bottle at a point; nothing beside them.
+    /// Light added and transmittance of the first bottle at a point; none outside all of them.
     fn bottle_seen(&self, x: f64, y: f64) -> Option<(LinearRgb, f32)> {
         self.on_bottles(x, y)
             .find_map(|(u, v)| bottle_at(u, v, self.cap))
     }
 
-    /// What the uneven lamp leaves of the light at a point.
+    /// Share of light that the uneven lamp leaves at a point.
     fn lamp_falloff(&self, x: f64, y: f64) -> f32 {
         let [w, h] = self.extent();
         1.0 - self.uneven * ((0.7 * x / w + 0.3 * y / h) as f32)
@@ -200,16 +200,16 @@ impl BottlePhoto {
     }
 }
 
-/// How close to the truth an outline is.
+/// Accuracy of an outline.
 pub(super) struct OutlineAccuracy {
     /// Intersection over union of the outline.
     pub(super) iou: f64,
     /// The largest error of a side of the box, pixels.
     pub(super) box_px: f64,
-    /// It is within the bounds of a good outline.
+    /// Whether it is within the bounds of a good outline.
     pub(super) is_right: bool,
-    /// Why the outline needs review; what film cannot know on a screen of its own hue is another
-    /// matter.
+    /// Why the outline needs review, without reasons that only concern film on a screen of its own
+    /// hue.
     pub(super) reasons: Vec<String>,
 }
 
@@ -235,7 +235,7 @@ fn sides_of(mask: &Mask) -> [f64; 4] {
     [left, top, right, bottom]
 }
 
-/// The first of some indices and the end of the last; 0 of none.
+/// The first of some indices and the end of the last; 0 if there are none.
 fn ends_of(indices: impl DoubleEndedIterator<Item = usize> + Clone) -> [f64; 2] {
     let first = indices.clone().next();
     let end = indices.last().map(|last| last + 1);

@@ -1,4 +1,4 @@
-//! Labels that are hard to solve a camera from: nearly no perspective, grazing, tiny, huge,
+//! Labels from which a camera is hard to solve: nearly without perspective, grazing, tiny, huge,
 //! degenerate, wrong.
 
 use super::{HardCase, Outcome};
@@ -6,7 +6,7 @@ use petcomp::camera::simulate::{Scenario, View};
 use petcomp::camera::{FocalSource, Label, Priors, Solution, SolveError, SolveOptions, solve};
 use petcomp::{Code, Result};
 
-/// Views of a kind; the worst of them counts.
+/// Number of views of a kind; the worst of them counts.
 const VIEW_COUNT: u64 = 20;
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
@@ -59,7 +59,7 @@ fn without_priors() -> SolveOptions {
     }
 }
 
-/// A label without noise, whose corners are declared to be as exact as their digits.
+/// A label without noise, whose corners are declared to be as accurate as their digits.
 fn exact_view(scenario: &Scenario, k: u64, sigma_px: f64) -> View {
     let mut view = scenario.view(11, k);
     view.label.surface.corner_sigma_px = Some(sigma_px);
@@ -70,8 +70,8 @@ fn focal_error(view: &View, solution: &Solution) -> f64 {
     (solution.camera.focal_px.x / view.camera.focal_px.x - 1.0).abs()
 }
 
-/// No number of a solution is NaN, those of the camera and of the fit are finite, and the camera is
-/// above the surface.
+/// Whether a solution is sound: no number is NaN, those of the camera and of the fit are finite,
+/// and the camera is above the surface.
 fn is_sound(solution: &Solution) -> bool {
     let (center, sigma) = (solution.camera.center(), &solution.sigma);
     let mut places = center.coords.iter().chain(&solution.size);
@@ -164,8 +164,8 @@ fn extreme_cameras() -> Vec<HardCase> {
     ]
 }
 
-/// Corners are doubles of up to 20 000 px: the perspective in them, over their size, bounds the
-/// accuracy.
+/// Corners are doubles of up to 20 000 px: the size of the perspective effect in them, relative to
+/// their size, bounds the accuracy.
 fn focal_recovery(name: &str, scenario: Scenario, limit: f64) -> HardCase {
     let input = format!("exact corners of {VIEW_COUNT} views at 25 degrees");
     let expectation =
@@ -208,14 +208,14 @@ fn solve_nearly_level_views() -> Result<Outcome> {
     Ok(Outcome::at_most(worst, 1e-6, "px"))
 }
 
-/// The residual without priors; infinite where a solution with or without them is unsound.
+/// The residual without priors; infinite if a solution with or without them is unsound.
 fn residual_of_sound_solutions(label: &Label) -> Result<f64> {
     let free = solve(label, &without_priors())?;
     let is_sound = is_sound(&free) && is_sound(&solve(label, &SolveOptions::default())?);
     Ok(if is_sound { free.rms_px } else { f64::INFINITY })
 }
 
-/// A rectangle tilted by 30 degrees as seen from infinitely far.
+/// A rectangle tilted by 30 degrees and seen from infinitely far away.
 fn from_infinity() -> Label {
     let (x, y) = (900.0, 600.0 * libm::cos(30_f64.to_radians()));
     let corners = [[-x, -y], [x, -y], [x, y], [-x, y]];
@@ -271,7 +271,7 @@ fn impossible_label() -> Label {
     label
 }
 
-/// Orders of the four corners that begin at the first: it names the width.
+/// Orders of the four corners that begin at the first: it defines the width.
 const CORNER_ORDERS: [[usize; 4]; 6] = [
     [0, 1, 2, 3],
     [0, 1, 3, 2],

@@ -1,4 +1,4 @@
-//! A stiff or extreme case of a stage, and what came of it.
+//! A stiff or extreme case of a stage, and its outcome.
 
 use super::CaseResult;
 use petcomp::Result;
@@ -11,26 +11,27 @@ use std::time::Instant;
 pub struct HardCase {
     /// What is extreme about the input.
     pub name: String,
-    /// What goes in.
+    /// The input.
     pub input: String,
-    /// What must come out, and why.
+    /// The expected result, and why.
     pub expectation: String,
-    /// It takes seconds or gigabytes, or is known to fail: for the report, not for every test run.
+    /// Whether it takes seconds or gigabytes, or is known to fail: such cases run only for the
+    /// report, not in every test run.
     pub report_only: bool,
     run: Box<dyn Fn() -> Result<Outcome> + Send + Sync>,
 }
 
-/// What came out of a case.
+/// The outcome of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outcome {
-    /// What was measured, with its unit, or the message of an error.
+    /// The measured value, with its unit, or the message of an error.
     pub measured: String,
     /// Whether it meets the expectation.
     pub passed: bool,
 }
 
 impl HardCase {
-    /// A case that takes little time.
+    /// A fast case.
     pub fn new(
         name: impl Into<String>,
         input: impl Into<String>,
@@ -59,7 +60,7 @@ impl HardCase {
         })
     }
 
-    /// The same, left to the report.
+    /// The same, run only for the report.
     pub fn for_the_report(self) -> Self {
         Self {
             report_only: true,
@@ -103,12 +104,12 @@ impl Outcome {
         }
     }
 
-    /// What was measured or reported where that cannot meet any expectation.
+    /// A measured value or message that cannot meet any expectation.
     pub fn failed(measured: impl Display) -> Self {
         Self::new(measured, false)
     }
 
-    /// A number that must not be further than `tolerance` from `expected`.
+    /// A number that must not differ from `expected` by more than `tolerance`.
     pub fn near(value: f64, expected: f64, tolerance: f64, unit: &str) -> Self {
         Self::new(
             with_unit(value, unit),
@@ -126,17 +127,17 @@ impl Outcome {
         Self::near(found as f64, expected as f64, 0.0, unit)
     }
 
-    /// A number of things of which there must be none.
+    /// A number of things that must be zero.
     pub fn none(found: usize, unit: &str) -> Self {
         Self::count(found, 0, unit)
     }
 
-    /// A number that must not be larger than `limit`.
+    /// A number that must not exceed `limit`.
     pub fn at_most(value: f64, limit: f64, unit: &str) -> Self {
         Self::new(with_unit(value, unit), value <= limit)
     }
 
-    /// An error that must be there and whose message must contain `cause`.
+    /// An error that must occur, with a message that contains `cause`.
     pub fn refused<T>(result: Result<T>, cause: &str) -> Self {
         let Err(error) = result else {
             return Self::failed("no error");
@@ -156,7 +157,7 @@ fn with_unit(value: f64, unit: &str) -> String {
     }
 }
 
-/// Plain digits where they are few, an exponent elsewhere.
+/// Plain digits if they are few, an exponent otherwise.
 fn readable(value: f64) -> String {
     if value == 0.0 || (1e-3..1e5).contains(&value.abs()) {
         trimmed(format!("{value:.6}"))

@@ -1,4 +1,4 @@
-//! Pictures that are hard to put together: very many layers, everything off, values at the ends of
+//! Pictures that are hard to composite: very many layers, everything off, values at the ends of
 //! their range.
 
 use super::staged::{camera_above, count_drawn, rendered};
@@ -165,7 +165,8 @@ fn composite_shares_rounded_up() -> Result<Outcome> {
     let share = (1.0 / 300.0_f32).next_up();
     let samples = (1..=300).map(|id| deep_sample(id, 0.0, share)).collect();
     let out = frame(&deep_row(vec![samples]), Some(&even_plate(1, 1e5)));
-    // The sum of 300 rounded numbers is known to 300 roundings, of which the plate is a 1e5-fold.
+    // The sum of 300 rounded numbers has an error of up to 300 roundings, and the plate is 1e5
+    // times brighter.
     let limit = 300.0 * 1e5 * f64::from(f32::EPSILON);
     let value = f64::from(out[(0, 0)].g);
     let passed = (0.0..=limit).contains(&value);

@@ -1,5 +1,5 @@
-//! Datasets that are hard to write: of empty pictures, of crowds, cut off in the middle, with
-//! numbers at their ends.
+//! Datasets that are hard to write: with empty pictures, with crowds, interrupted, with numbers at
+//! the ends of their ranges.
 
 use super::staged::{
     camera_above, empty_scene, grey, level_card, one_deep_pixel, rendered, temporary_folder,
@@ -131,7 +131,7 @@ fn draws() -> Vec<HardCase> {
     ]
 }
 
-/// A picture of a shot, its labels, and what it was made from.
+/// A picture of a shot, its labels, and its scene.
 fn rendered_sample(shot: &Shot) -> Sample {
     sample(shot, rendered(shot))
 }
@@ -158,7 +158,7 @@ fn with_a_card(k: u64) -> Sample {
     rendered_sample(&empty_shot().with_ambient(LinearRgb::WHITE).with_card(card))
 }
 
-/// A dataset in every layout, made and counted.
+/// A dataset in every layout, for generating and counting.
 struct TestDataset {
     folder: tempfile::TempDir,
     count: u64,
@@ -176,7 +176,7 @@ impl TestDataset {
         self.folder.path()
     }
 
-    /// Generates what is missing; the number of pictures made.
+    /// Generates what is missing; returns the number of pictures generated.
     fn generate_missing(&self, make: impl Fn(u64) -> Sample + Sync) -> Result<u64> {
         let running = AtomicBool::new(false);
         Ok(generate(&self.plan(), |k| Ok(make(k)), &|_| (), &running)?.made)
@@ -199,7 +199,7 @@ impl TestDataset {
         }
     }
 
-    /// The findings of the checker, without those that small sets of similar pictures have.
+    /// The findings of the checker, without those that any small set of similar pictures has.
     fn faults(&self) -> Result<Vec<String>> {
         let findings = check(self.path())?.findings;
         let messages = findings
@@ -223,7 +223,7 @@ impl TestDataset {
     }
 }
 
-/// Shortens a file to a length that its own determines.
+/// Truncates a file to a length computed from its own.
 fn cut_off_file(path: &Path, length: impl Fn(usize) -> usize) -> Result<()> {
     let mut bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
     bytes.truncate(length(bytes.len()));
@@ -240,7 +240,7 @@ fn all_writers() -> Vec<Arc<dyn Writer>> {
     writers
 }
 
-/// How many faults there are, and which.
+/// The number of faults, and a list of them.
 fn listed(faults: &[String]) -> String {
     let text = format!("{} faults {}", faults.len(), faults.join("; "));
     text.trim_end().into()
@@ -353,7 +353,7 @@ fn count_splits(percent: u8, expected: usize) -> Result<Outcome> {
     ))
 }
 
-/// Pictures of 1000 that are for validation.
+/// Number of pictures out of 1000 that are for validation.
 fn count_validation(val_percent: u8, order: SplitOrder) -> usize {
     let split = Split {
         val_percent,

@@ -8,10 +8,9 @@ use petcomp::eval::{
 };
 use petcomp::geom::BBox;
 
-/// Boxes of the largest case.
+/// Number of boxes in the largest case.
 const MOST_BOXES: usize = 100_000;
-/// Precision of a detector that makes no error, by YOLOv5's trapezoid, whose curve ends at
-/// precision 0.
+/// Precision of a perfect detector by YOLOv5's trapezoidal rule, whose curve ends at precision 0.
 const PERFECT_YOLO: f64 = 0.995;
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
@@ -61,7 +60,7 @@ pub(super) fn cases() -> Result<Vec<HardCase>> {
     Ok(cases)
 }
 
-/// A definition of the score, and the score of a detector that makes no error.
+/// A definition of the score, and the score of a perfect detector.
 #[derive(Clone, Copy)]
 struct ScoreCases {
     name: &'static str,
@@ -96,7 +95,7 @@ impl ScoreCases {
     }
 }
 
-/// What is special about some images, what they show, and how they are made.
+/// What is special about some images, a description of them, and their generator.
 type Input = (&'static str, &'static str, fn() -> Vec<EvalImage>);
 
 const WITHOUT_MATCHES: [Input; 4] = [

@@ -1,5 +1,5 @@
 //! Files that are hard to write or to read: values beyond a half float, the smallest ones,
-//! documents without an end, 16k.
+//! unterminated documents, 16k pictures.
 
 use super::staged::temporary_folder;
 use super::{HardCase, Outcome, memory};
@@ -223,7 +223,8 @@ fn read_document<T: DeserializeOwned>(text: &str, cause: &str) -> Result<Outcome
 
 /// Pixels along a side of the largest picture.
 const SIXTEEN_K_PX: usize = 16_384;
-/// The picture in floats once written and once read, its codes and the file, and something on top.
+/// Memory for writing and reading the picture once as floats, its codes and the file, with some
+/// margin.
 const SIXTEEN_K_GIB: f64 = 4.0;
 
 fn write_sixteen_k() -> Result<Outcome> {
@@ -240,7 +241,7 @@ fn write_sixteen_k() -> Result<Outcome> {
     ))
 }
 
-/// Whether the default limit refuses the picture, and whether it comes back by a larger one.
+/// Whether the default limit rejects the picture, and whether it can be read with a larger limit.
 fn sixteen_k_through_file(path: &Path) -> Result<[bool; 2]> {
     io::write(
         path,

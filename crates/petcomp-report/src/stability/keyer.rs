@@ -1,5 +1,4 @@
-//! Keys that barely differ from grey and pixels that are barely colours, in every profile of the
-//! keyer.
+//! Keys close to grey and pixels that are barely colours, in every profile of the keyer.
 
 use super::{HardCase, Outcome};
 use petcomp::matte::key::Profile;
@@ -137,7 +136,7 @@ fn key_screen_color() -> Result<Outcome> {
     Ok(Outcome::near(left, 0.0, 0.0, ""))
 }
 
-/// The sum of what a matte and a cut-out hold.
+/// Total light and coverage of a matte and a cut-out.
 fn light_and_coverage(keyed: &Keyed) -> f64 {
     let cutout = keyed.cutout.pixels().iter().map(absolute_sum);
     let matte = keyed.matte.pixels().iter().map(|m| f64::from(m.0));
@@ -199,7 +198,7 @@ fn non_finite_photo() -> Image<PremulRgba> {
     photo
 }
 
-/// The matte is in 0..1, the cut-out is finite.
+/// Whether the matte is in 0..1 and the cut-out finite.
 fn is_sound(keyed: &Keyed) -> bool {
     let mut cutout = keyed.cutout.pixels().iter();
     count_outside_unit_range(&keyed.matte) == 0

@@ -108,7 +108,7 @@ fn awkward_objects() -> Vec<HardCase> {
     ]
 }
 
-/// A picture in which a card at height 0 shows 100 pixels a metre.
+/// A picture in which a card at height 0 has 100 pixels per metre.
 fn shot_of(image: [u32; 2], cards: impl IntoIterator<Item = Card>) -> Shot {
     let empty = Shot::new(camera_above(image, 100.0));
     cards.into_iter().fold(empty, Shot::with_card)
@@ -154,8 +154,8 @@ fn whole_box([w, h]: [f64; 2]) -> BBox {
     }
 }
 
-/// About as wide as it should be: the window of a pixel is three wide, and counts where it covers
-/// more than a tenth.
+/// Whether a width is about as expected: the window of a pixel is three wide, and counts if it
+/// covers more than a tenth.
 fn is_about(found: f64, expected: f64) -> bool {
     (found - expected).abs() <= 2.0
 }
@@ -178,7 +178,7 @@ fn label_one_pixel() -> Result<Outcome> {
     }))
 }
 
-/// The only object there is, and whether it is correct.
+/// The outcome for the only object, if it is the only one and correct.
 fn only_object(objects: &[ObjectLabel], is_right: impl Fn(&ObjectLabel) -> bool) -> Outcome {
     let [one] = objects else {
         return Outcome::failed(format!("{} labels", objects.len()));
@@ -209,7 +209,7 @@ fn label_many_in_a_pixel() -> Outcome {
     )
 }
 
-/// In the pixel, of which only the first object is visible.
+/// Whether its box is the pixel, of which only the first object is visible.
 fn is_boxed_rightly(object: &ObjectLabel) -> bool {
     object.amodal_box == PIXEL_BOX && object.visible_box.is_empty() == (object.id.0 > 1)
 }
@@ -222,7 +222,7 @@ fn label_hidden_object() -> Result<Outcome> {
     Ok(only_object(&found, is_hidden_by_2))
 }
 
-/// 10 px across, and nothing of it visible.
+/// Whether it is 10 px wide and entirely hidden.
 fn is_hidden_by_2(object: &ObjectLabel) -> bool {
     object.visible_fraction == 0.0
         && object.visible_box.is_empty()

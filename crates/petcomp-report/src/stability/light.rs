@@ -65,7 +65,7 @@ fn received(light: &AreaLight) -> f64 {
     irradiance(light, Point3::origin(), Vector3::z()).g.into()
 }
 
-/// A light that is small from where it is seen: `P cos / (pi r^2)`.
+/// A light that is small as seen from the receiver: `P cos / (pi r^2)`.
 fn small_lamp(shape: LightShape, position: [f64; 3], side: f64, what: &str) -> HardCase {
     let light = lamp_of_shape(shape, position, side);
     let to = Vector3::from(light.position);
@@ -120,14 +120,14 @@ fn refused_map(name: &str, image: fn() -> Image<LinearRgb>, cause: &'static str)
     })
 }
 
-/// Dim, but for one texel.
+/// Dim, except for one texel.
 fn spotted(value: f32) -> Image<LinearRgb> {
     Image::from_fn(8, 4, |x, y| {
         LinearRgb::grey(if (x, y) == (5, 2) { value } else { 0.1 })
     })
 }
 
-/// An even sky of radiance L gives every receiver `pi L`.
+/// A uniform sky of radiance L gives every receiver `pi L`.
 fn even_sky(name: &str, (width, height): (usize, usize), radiance: f32) -> HardCase {
     let expected = PI * f64::from(radiance);
     HardCase::new(
@@ -179,7 +179,7 @@ fn sum_pieces_of_sky() -> Result<Outcome> {
     Ok(Outcome::at_most(worst, 1e-5, "off"))
 }
 
-/// A scene under even light, whose exposure and colour are unknown.
+/// A scene under uniform light, with unknown exposure and colour.
 fn unexposed_scene(exposure: Exposure, cast: LightTint, ambient: LinearRgb) -> Scene {
     Scene {
         exposure,
@@ -252,7 +252,7 @@ fn exposed(name: &str, plate: Image<LinearRgb>, expected_ev: f64) -> HardCase {
     exposed_under(LinearRgb::WHITE, name, plate, expected_ev)
 }
 
-/// Even light of 1 shows white as 1: the exposure must be the plate's white in stops, and 0 where
+/// Uniform light of 1 shows white as 1: the exposure must be the plate's white in stops, and 0 if
 /// there is none.
 fn exposed_under(
     ambient: LinearRgb,
@@ -299,7 +299,7 @@ fn distance_from_white(plate: &Image<LinearRgb>) -> Outcome {
     Outcome::at_most(off.into_iter().fold(0.0, largest), 1e-5, "off")
 }
 
-/// The noise of a plate as the standard deviation at mid grey; none where it cannot be measured.
+/// The noise of a plate as the standard deviation at mid grey; none if it cannot be measured.
 fn measured_noise(name: &str, plate: Image<LinearRgb>, expected: Option<f64>) -> HardCase {
     let expectation = expected.map_or("none is reported".into(), |sigma| {
         format!("a deviation of {sigma}, to 1e-4")

@@ -1,4 +1,4 @@
-//! Photos that are hard to cut out: each must come out right, or be flagged for review.
+//! Photos that are hard to cut out: each must be cut out correctly, or flagged for review.
 
 use super::bottle::{BLUE, BottlePhoto, GREEN, OutlineAccuracy};
 use super::{HardCase, Outcome, keyer};
@@ -21,7 +21,7 @@ pub(super) fn cases() -> Result<Vec<HardCase>> {
     Ok(cases)
 }
 
-/// What is expected of the cut-out of a photo.
+/// The expected cut-out of a photo.
 #[derive(Clone, Copy)]
 enum ExpectedCutOut {
     /// The outline is right and needs no review.
@@ -72,10 +72,10 @@ impl ExpectedCutOut {
     }
 }
 
-/// A matte below a code of 8 bits.
+/// A residual matte below one code of 8 bits.
 const MAX_RESIDUAL_MATTE: f32 = 0.003;
 
-/// Nothing of the screen is left, and the cut-out is no larger than it may be.
+/// Whether nothing of the screen is left, and the cut-out is no larger than allowed.
 fn is_clean(cut: &CutOut) -> bool {
     cut.residual_matte < MAX_RESIDUAL_MATTE
         && cut.film.width().max(cut.film.height()) <= CutOutOptions::default().longest_side
@@ -282,7 +282,7 @@ fn film_on(screen: LinearRgb, exposure: f32) -> Image<LinearRgb> {
     })
 }
 
-/// Light and transmittance of the film in the mask, of nothing beside it.
+/// Light and transmittance of the film in the mask, none outside it.
 fn film_or_nothing(mask: &Image<Coverage>, x: usize, y: usize) -> (f32, f32) {
     if mask[(x, y)].0 > 0.0 {
         folded_film(x, y)
@@ -304,7 +304,7 @@ fn film_mattes() -> Vec<HardCase> {
             "transmittance to 0.02 on average",
             judge_ordinary_film,
         ),
-        // So dark that no code of a picture would show it: the stage expects the noise of coded
+        // So dark that no code of a picture would show it: the stage assumes the noise of quantised
         // pictures.
         HardCase::new(
             "film 1000 times underexposed",
@@ -359,7 +359,7 @@ fn film_matte(photo: &Image<LinearRgb>, screen: LinearRgb) -> Result<FilmMatte> 
     film(photo, &plate, &ellipse(), &FilmOptions::default())
 }
 
-/// A photo without information on the film: sound pixels all the same, and a diagnostic.
+/// A photo without information on the film: pixels must still be valid, with a diagnostic.
 fn flagged_film(
     name: &str,
     photo: Image<LinearRgb>,
@@ -388,7 +388,8 @@ fn judge_soundness(found: &FilmMatte, cause: &str) -> Outcome {
     Outcome::new(format!("{unsound} px unsound, {reported}"), passed)
 }
 
-/// A photo of one colour: nothing passes where it is black, all where it is the screen's.
+/// A photo of one colour: transmittance is 0 where it is black, and 1 where it has the screen's
+/// colour.
 fn even_film(name: &str, color: LinearRgb, expected: f32) -> HardCase {
     let expectation = format!("transmittance {expected} in every pixel, to 0.05 on average");
     HardCase::new(name, "on an even green screen", expectation, move || {
@@ -458,7 +459,7 @@ fn fit_without_background() -> Result<Outcome> {
 
 fn triangulated(screens: [LinearRgb; 2], exposure: f32) -> Result<Triangulated> {
     let photos = screens.map(|screen| film_on(screen, exposure));
-    // What an exposure leaves of a screen before the sensor saturates.
+    // What an exposure makes of a screen before the sensor saturates.
     let exposed = screens.map(|screen| screen.map(|v| (v * exposure).min(1.0)));
     let plates = exposed.map(|screen| ScreenPlate::even(screen, SIZE));
     let shots = [(&photos[0], &plates[0]), (&photos[1], &plates[1])];

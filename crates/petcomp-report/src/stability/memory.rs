@@ -1,10 +1,10 @@
-//! How much memory a case takes, as Linux reports it; nothing elsewhere.
+//! Memory use of a case, as reported by Linux; none on other systems.
 
 use super::Outcome;
 use crate::machine::{BYTES_PER_GIB, bytes_in};
 use std::fs;
 
-/// A failed outcome where less than `needed_gib` are free without swapping.
+/// A failed outcome if less than `needed_gib` are available without swapping.
 pub(super) fn shortage(needed_gib: f64) -> Option<Outcome> {
     let free = gib_of("/proc/meminfo", "MemAvailable").filter(|free| *free < needed_gib)?;
     Some(Outcome::failed(format!(
@@ -14,7 +14,7 @@ pub(super) fn shortage(needed_gib: f64) -> Option<Outcome> {
 
 /// Runs `call` and measures the peak memory of the process meanwhile, GiB.
 pub(super) fn peak_gib<T>(call: impl FnOnce() -> T) -> (T, Option<f64>) {
-    // 5 sets the high-water mark back to what is resident now.
+    // 5 resets the high-water mark to the current resident memory.
     let reset = fs::write("/proc/self/clear_refs", "5").ok();
     let result = call();
     let peak = reset.and_then(|()| gib_of("/proc/self/status", "VmHWM"));

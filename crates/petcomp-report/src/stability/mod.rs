@@ -1,8 +1,8 @@
 //! Stability: every stage on stiff and extreme input, checked against a known result.
 //!
 //! The expected result is a closed form, a conservation law, the limit of easier neighbours, or an
-//! error that names its cause; it is never what came out before. A case that panics, or that fails
-//! where it should not, becomes a failed row, and the others still run.
+//! error that names its cause; it is never a previous output. A case that panics, or that fails
+//! unexpectedly, becomes a failed row, and the others still run.
 
 mod bottle;
 mod camera;
@@ -29,10 +29,10 @@ use petcomp::plot::Table;
 use petcomp::{Error, Result};
 use std::path::Path;
 
-/// Makes the cases of a stage.
+/// Creates the cases of a stage.
 type Cases = fn() -> Result<Vec<HardCase>>;
 
-/// The stages that have cases, in the order of the data.
+/// The stages with cases, in the order of the data.
 const STAGES: &[(&str, Cases)] = &[
     ("matte", matte::cases),
     ("camera", camera::cases),
@@ -46,13 +46,13 @@ const STAGES: &[(&str, Cases)] = &[
     ("eval", eval::cases),
 ];
 
-/// How a case ended.
+/// Result of a case.
 pub struct CaseResult {
     /// The stage under test.
     pub stage: &'static str,
-    /// What was tried.
+    /// The case.
     pub case: HardCase,
-    /// What came out, and whether it meets the expectation.
+    /// Its outcome.
     pub outcome: Outcome,
     /// Run time, milliseconds.
     wall_ms: f64,
@@ -70,7 +70,7 @@ const COLUMNS: [Column<CaseResult>; 7] = [
     ("time ms", |r| format!("{:.1}", r.wall_ms)),
 ];
 
-/// Names of the stages that have cases.
+/// Names of the stages with cases.
 fn stages() -> impl Iterator<Item = &'static str> {
     STAGES.iter().map(|(name, _)| *name)
 }
@@ -117,7 +117,7 @@ pub(crate) fn table(rows: &[CaseResult]) -> Table {
     table_of(&COLUMNS, rows)
 }
 
-/// How many cases each stage has and how many of them pass.
+/// Number of cases of each stage, and of those that pass.
 pub(crate) fn summary(rows: &[CaseResult]) -> Table {
     let stages = rows.chunk_by(|a, b| a.stage == b.stage);
     let lines = stages.map(|rows| {
@@ -130,7 +130,6 @@ pub(crate) fn summary(rows: &[CaseResult]) -> Table {
 
 /// Runs the cases of a stage, or of all (an empty name), and writes `stability.csv` and
 /// `stability.md` into a folder.
-///
 /// # Errors
 /// As [`cases`]; files that cannot be written. A case that fails is a row, not an error.
 pub fn write(folder: &Path, stage: &str, progress: impl Fn(u64, u64)) -> Result<Vec<CaseResult>> {

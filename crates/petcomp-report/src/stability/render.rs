@@ -1,4 +1,4 @@
-//! Shots that are hard to render: very many layers, very near, edge-on, very bright beside very
+//! Shots that are hard to render: very many layers, very near, edge-on, very bright next to very
 //! dim, very small and large.
 
 use super::staged::{
@@ -14,9 +14,9 @@ use petcomp::scene::{Card, Shot};
 use petcomp::{DeepImage, DeepSample, Film, Image, LinearRgb, PremulRgba, Quality, Result};
 use std::f64::consts::FRAC_PI_2;
 
-/// Layers of film in a pixel.
+/// Number of layers of film in a pixel.
 const LAYER_COUNT: u32 = 200;
-/// A product or sum of that many single precision numbers is known to this.
+/// Error bound of a product or sum of this many single precision numbers.
 const ROUNDING_ERROR: f64 = LAYER_COUNT as f64 * f32::EPSILON as f64;
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
@@ -112,7 +112,7 @@ fn absorbing_film(opacity: LinearRgb) -> Film {
     }
 }
 
-/// What 200 layers of transmittance 0.99 let through.
+/// Transmittance of 200 layers of transmittance 0.99.
 fn grey_layers(before: &str, input: &str, result: &str, at: fn(&DeepImage) -> f32) -> HardCase {
     let expected = libm::pow(0.99, f64::from(LAYER_COUNT));
     HardCase::new(
@@ -127,7 +127,7 @@ fn grey_layers(before: &str, input: &str, result: &str, at: fn(&DeepImage) -> f3
     )
 }
 
-/// What a tinted layer passes of red, green and blue.
+/// Transmittance of a tinted layer for red, green and blue.
 const TINT: [f64; 3] = [0.999, 0.99, 0.9];
 
 fn tinted_layers() -> HardCase {
@@ -182,8 +182,8 @@ fn render_near_card() -> Result<Outcome> {
 
 fn render_near_and_grazing() -> Result<Outcome> {
     let deep = rendered(&grazing_shot());
-    // Where the card ends 10 m away: slightly under the horizon, 60 tan(10 degrees) above the
-    // middle.
+    // Where the card ends, 10 m away: slightly below the horizon, which is 60 tan(10 degrees) above
+    // the middle.
     let horizon = 24.0 - 60.0 * libm::tan(10_f64.to_radians());
     // The window of a pixel is three wide.
     let rows = (0..48).filter(|&y| (y as f64 + 0.5 - horizon).abs() > 2.0);
@@ -209,7 +209,7 @@ fn error_of_row(deep: &DeepImage, y: usize, is_card: bool) -> f64 {
         .fold(0.0, largest)
 }
 
-/// Positions within a pixel that a steep card is rendered at.
+/// Number of positions within a pixel at which a steep card is rendered.
 const SUBPIXEL_POSITIONS: u32 = 64;
 /// Focal length of the camera over a steep card, pixels.
 const STEEP_FOCAL_PX: f64 = 400.0;
@@ -220,14 +220,14 @@ const STEEP_SIDE_PX: f64 = STEEP_SIDE_M * STEEP_FOCAL_PX / 0.9;
 
 /// A card that is nearly edge-on: its coverage, in pixels, must be the area of its projected
 /// corners.
-///
-/// Each row of the picture has two samples a pixel: a strip thinner than their distance is hit or
+/// Each row of the picture has two samples per pixel: a strip thinner than their distance is hit or
+/// missed, depending on its position.
 /// missed, depending on where it is.
 fn steep_card(degrees: f64) -> HardCase {
     let area = area_of_card(&steep_shot(degrees, 0));
     // Half the height of the card: a row of samples.
     let strip = 0.5 * STEEP_SIDE_PX;
-    // Positions a step apart meet a strip of so many pixels to one of them.
+    // Positions one step apart hit a strip of this width to within one of them.
     let width = area / STEEP_SIDE_PX;
     let mean_bound = 0.01 + 1.0 / (f64::from(SUBPIXEL_POSITIONS) * width);
     HardCase::new(
@@ -266,7 +266,7 @@ fn area_of_card(shot: &Shot) -> f64 {
 /// The relative error of the mean coverage, and the largest error in pixels.
 fn steep_card_errors(degrees: f64) -> (f64, f64) {
     let shots = (0..SUBPIXEL_POSITIONS).map(|position| steep_shot(degrees, position));
-    // Moved sideways, a card shows a little more or less of itself.
+    // When moved sideways, a card shows slightly more or less of itself.
     let (found, areas): (Vec<f64>, Vec<f64>) = shots
         .map(|shot| (total_coverage(&rendered(&shot)), area_of_card(&shot)))
         .unzip();
@@ -324,7 +324,7 @@ fn reflect_between_planes() -> Result<Outcome> {
     ))
 }
 
-/// The larger number; NaN where one is.
+/// The larger number; NaN if either is.
 pub(super) fn largest(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() {
         f64::NAN
@@ -335,10 +335,10 @@ pub(super) fn largest(a: f64, b: f64) -> f64 {
 
 /// Pixels along a side of the largest picture.
 const LARGEST_SIDE_PX: u32 = 16_384;
-/// What that picture may take at most: factors on the plate and offsets of samples are 4 GiB,
-/// samples a quarter.
+/// Maximum memory for that picture: factors on the plate and offsets of samples are 4 GiB, samples
+/// a quarter.
 const SIXTEEN_K_GIB: f64 = 6.0;
-/// What it shows of a card of 2000 x 2000 pixels and 64 x 64 texels: alpha falls to one half over
+/// Visible area of a card of 2000 x 2000 pixels and 64 x 64 texels: alpha falls to one half over
 /// the outermost half texel, which takes an eighth of a texel off each side.
 const SHOWN_PX: f64 = (2000.0 * (1.0 - 0.25 / 64.0)) * (2000.0 * (1.0 - 0.25 / 64.0));
 
@@ -368,8 +368,7 @@ fn sixteen_k_shot() -> Shot {
         .with_card(sheet)
 }
 
-/// Shots in which nothing can be seen of the card: no sample in any pixel, and a plate that keeps
-/// its bits.
+/// Shots in which the card is not visible: no sample in any pixel, and an unchanged plate.
 fn nothing_to_see() -> Vec<HardCase> {
     let behind = level_card(1, [0.0, 0.0, 2.0], 0.3, grey(0.8));
     let transparent = level_card(1, [0.0, 0.0, 0.1], 0.2, PremulRgba::TRANSPARENT);
@@ -450,7 +449,7 @@ fn card_through_the_eye() -> Shot {
     lit_shot().with_card(card(1, [0.01, 0.0, 1.0], tilt, [0.5; 2], texture()))
 }
 
-/// The same of textures without a neighbouring texel.
+/// The same for textures without a neighbouring texel.
 fn awkward_textures() -> [HardCase; 2] {
     // A lone texel is 0.8 in its middle and half of that at the card's edge, 4.4 pixels away; a
     // pixel's window reaches 1.5.
@@ -508,7 +507,7 @@ fn middle_coverage(deep: &DeepImage) -> f64 {
     f64::from(deep.flat(7, 5).opacity.g) + 0.0
 }
 
-/// Every pixel's light is finite, its coverage and its shadows lie in 0..1.
+/// Whether every pixel's light is finite, and its coverage and shadows are in 0..1.
 fn is_sound(deep: &DeepImage) -> bool {
     let mut shadows = deep.shadow().pixels().iter().flat_map(|s| [s.r, s.g, s.b]);
     let frame = composite::frame(deep, None);

@@ -1,5 +1,5 @@
-//! Light that is hard to render: grazing, without size, in the middle of a card, very bright beside
-//! very dim.
+//! Light that is hard to render: grazing, without size, in the middle of a card, very bright next
+//! to very dim.
 
 use super::staged::{camera_above, card, grey, lamp, level_card, small_shot, tilted};
 use super::{HardCase, Outcome};
@@ -52,13 +52,13 @@ fn light_reflected(shot: Shot, options: &RenderOptions) -> f64 {
     f64::from(deep.flat(2, 2).color.g)
 }
 
-/// The same with the default options, of a small shot under a light.
+/// The same with the default options, for a small shot under a light.
 fn lit_by(light: AreaLight) -> f64 {
     light_reflected(small_shot().with_light(light), &RenderOptions::default())
 }
 
-/// A point that shines like a small flat light turned to the origin, seen by a level white card: `P
-/// cos / (pi r)^2`.
+/// Irradiance from a small flat light turned to the origin, approximated as a point, on a level
+/// white card: `P cos / (pi r)^2`.
 fn from_a_point(light: &AreaLight) -> f64 {
     let to = Vector3::from(light.position);
     light.power * to.normalize().z / (PI * PI * to.norm_squared())
@@ -115,15 +115,14 @@ fn reflected_from_upper_half(light: &AreaLight) -> f64 {
     polygon_irradiance(&corners, Point3::origin(), Vector3::z()) * white
 }
 
-/// A camera that sees 3 x 3 pixels of the surface around `x`, 0 from straight above and very near
-/// to it.
+/// A camera that sees 3 x 3 pixels of the surface around `x`, 0 from straight above and very close.
 fn closeup_at(x: f64) -> Camera {
     let mut camera = camera_above([3, 3], 1e6);
     camera.camera_from_world.translation.vector.x = -x;
     camera
 }
 
-/// What is left of the light in the middle of a close-up.
+/// Share of the light that is left in the middle of a close-up.
 fn shade_in_the_middle(shot: &Shot, options: &RenderOptions) -> f64 {
     render(shot, options).shadow()[(1, 1)].g.into()
 }
@@ -172,7 +171,7 @@ fn bright_beside_dim() -> HardCase {
     )
 }
 
-/// The shadow of a card on the surface where it hides one light and not the other.
+/// The shadow of a card on the surface where it hides only one of two lights.
 fn dim_in_the_shade() -> HardCase {
     let bright = lamp([0.0, 0.0, 0.9], 0.01, 1e5);
     let dim = lamp([0.9, 0.0, 0.9], 0.01, 1e-4);

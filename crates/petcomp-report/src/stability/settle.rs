@@ -1,5 +1,5 @@
-//! Falls that are hard to settle: very thin and thick cards, very many, very small and large, very
-//! unequal, started badly.
+//! Falls that are hard to settle: very thin and thick cards, very many, very small and large, of
+//! very different masses, badly started.
 
 use super::{HardCase, Outcome};
 use petcomp::Result;
@@ -11,14 +11,14 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_6};
 /// More cards than this take seconds.
 const MAX_TEST_CARDS: usize = 100;
 
-/// What is expected of the end of a fall.
+/// The expected end of a fall.
 #[derive(Clone, Copy)]
 enum ExpectedEnd {
     /// [`SettleVerdict::Rested`].
     Rests,
     /// Any other verdict, or an error: the scene or its options are invalid.
     IsRefused,
-    /// Either; nothing is expected but an end.
+    /// Either of these; only an end is expected.
     Ends,
 }
 
@@ -98,7 +98,7 @@ impl HardFall {
         }
     }
 
-    /// The same, of which only an end is expected.
+    /// The same, with only an end expected.
     fn that_ends(self) -> Self {
         Self {
             expectation: ExpectedEnd::Ends,
@@ -106,7 +106,7 @@ impl HardFall {
         }
     }
 
-    /// The same, with other options, to be refused.
+    /// The same, with other options, to be rejected.
     fn that_is_refused(self, options: SettleOptions) -> Self {
         Self {
             expectation: ExpectedEnd::IsRefused,
@@ -199,13 +199,13 @@ fn card_counts() -> Result<Vec<HardFall>> {
 fn heap_of_cards(n: usize) -> Result<HardFall> {
     let mut fall = resting_fall(format!("{n} in a heap"), heap(2, n)?);
     if n > MAX_TEST_CARDS {
-        // An attempt of many takes ten seconds.
+        // An attempt with many cards takes ten seconds.
         fall.options.attempts = 1;
     }
     Ok(fall)
 }
 
-/// Of a box 0.6 m long.
+/// With a box 0.6 m long.
 fn box_sizes() -> Result<Vec<HardFall>> {
     [
         ("box of 0.06 mm", 1e-4),
@@ -335,7 +335,7 @@ fn with_step_times(factor: f64) -> SettleOptions {
     options
 }
 
-/// The same cards, `by` times as large, with everything around them.
+/// The same cards, `by` times as large, with everything around them scaled, too.
 fn scaled(mut scene: Scene, by: f64) -> Scene {
     scene.surface.size = scene.surface.size.map(|x| x * by);
     for object in &mut scene.objects {
@@ -352,7 +352,8 @@ fn enlarge(object: &mut Object, by: f64) {
     }
 }
 
-/// Each object changed; heights grow with `gap` so that thicker bodies still start apart.
+/// The scene with each object changed; heights grow with `gap` so that thicker bodies still start
+/// apart.
 fn changed(mut scene: Scene, gap: f64, change: impl Fn(usize, &mut Object)) -> Scene {
     for (i, object) in scene.objects.iter_mut().enumerate() {
         change(i, object);

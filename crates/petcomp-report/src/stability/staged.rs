@@ -1,4 +1,4 @@
-//! Shots that cases are made of: a camera straight above, level cards, small lights.
+//! Shots for cases: a camera straight above, level cards, small lights.
 
 use crate::pile;
 use petcomp::asset::Texture;
@@ -54,14 +54,14 @@ pub(super) fn card(
     Card::new(ObjectId(id), quad, texture)
 }
 
-/// A level square card of one texel value, with so many texels that the fade of the outermost half
+/// A level square card of one texel value, with enough texels that the fade of the outermost half
 /// is small.
 pub(super) fn level_card(id: u32, center: [f64; 3], size: f64, texel: PremulRgba) -> Card {
     let texture = Image::filled(64, 64, texel);
     card(id, center, UnitQuaternion::identity(), [size; 2], texture)
 }
 
-/// Turned about the world's `+y`.
+/// Rotation about the world's `+y`.
 pub(super) fn tilted(angle: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Vector3::y_axis(), angle)
 }
@@ -100,7 +100,7 @@ pub(super) fn small_shot() -> Shot {
     Shot::new(camera_above([5, 5], 100.0))
 }
 
-/// A scene of nothing on a surface that fills the picture.
+/// A scene without objects on a surface that fills the picture.
 pub(super) fn empty_scene(camera: Camera) -> Scene {
     Scene {
         plate: "plate".into(),

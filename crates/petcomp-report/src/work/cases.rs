@@ -1,4 +1,4 @@
-//! The scenes, and what each of them must not pay for.
+//! The scenes, and the work that each of them must not cause.
 
 use super::world::{FILM, FixtureFolder, OPAQUE, dropped, made_of};
 use petcomp::LinearRgb;
@@ -6,33 +6,33 @@ use petcomp::scene::{Noise, PostProcess, Scene};
 use petcomp::work::Kind;
 use petcomp::work::Kind::*;
 
-/// A scene and what is asked of it.
+/// A scene and its output.
 #[derive(Clone, Debug)]
 pub(super) struct WorkCase {
     /// Its name.
     pub(super) name: &'static str,
-    /// What is in it.
+    /// Its contents.
     pub(super) about: &'static str,
     /// The scene.
     pub(super) scene: Scene,
-    /// What is made of it.
+    /// What is generated from it.
     pub(super) asked: Asked,
-    /// Work that it cannot do without.
+    /// Work that it needs.
     pub(super) used: Vec<Kind>,
 }
 
-/// What is made of a scene.
+/// What is generated from a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Asked {
-    /// What `petcomp render` makes.
+    /// The output of `petcomp render`.
     Picture,
-    /// What `petcomp label` makes.
+    /// The output of `petcomp label`.
     Labels,
-    /// What `petcomp dataset generate` makes of one scene.
+    /// The output of `petcomp dataset generate` for one scene.
     Dataset,
 }
 
-/// The work that parts of a scene take.
+/// The work that parts of a scene need.
 const CARDS: &[Kind] = &[TextureSamples, Bakes];
 const LAMP: &[Kind] = &[LightSamples];
 const LIT: &[Kind] = &[ShadowRays, ShadedSamples, ShadowedPixels];
@@ -40,8 +40,7 @@ const THROUGH: &[Kind] = &[Transmittances];
 const PICTURE: &[Kind] = &[Encodes];
 const LABELS: &[Kind] = &[LabelSamples, Masks];
 
-/// Work that every scene may take: what it is read from and written to, and levels of detail where
-/// cards are small.
+/// Work that every scene may need: reading and writing files, and levels of detail for small cards.
 const ALWAYS_ALLOWED: [Kind; 6] = [
     BytesWritten,
     SyncedFiles,
@@ -52,7 +51,7 @@ const ALWAYS_ALLOWED: [Kind; 6] = [
 ];
 
 impl WorkCase {
-    /// Work that the scene must not take: all that is not listed as used.
+    /// Work that the scene must not cause: everything that is not listed as used.
     pub(super) fn absent(&self) -> Vec<Kind> {
         Kind::ALL
             .into_iter()

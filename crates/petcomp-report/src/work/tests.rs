@@ -1,5 +1,5 @@
-//! What must hold of work: zero where a feature is absent, more than zero where it is present, and
-//! switches that are off.
+//! Laws of work: zero if a feature is absent, more than zero if it is present, and switches that
+//! turn it off.
 
 use super::world::dropped;
 use super::*;
@@ -60,7 +60,7 @@ fn a_scene_reads_the_files_that_it_names_and_no_others() {
     assert_eq!((read("labels"), read("map"), read("dim map")), (3, 5, 4));
 }
 
-/// What the program writes for a scene: the picture as it is displayed and its scene-linear values.
+/// The program's output for a scene: the displayed picture and its scene-linear values.
 fn made(world: &FixtureFolder, config: &DatasetConfig, scene: &Scene) -> (Vec<u8>, Work) {
     let folder = tempfile::tempdir().unwrap();
     let (_, work) = counted(|| {
@@ -176,7 +176,7 @@ fn quality_where_it_does_not_apply_changes_nothing() {
     };
     let finest = |config: &mut DatasetConfig| config.render = petcomp::Quality::Reference.render();
     assert!(with(finest, &no_cards) == with(|_| {}, &no_cards));
-    // How cards fall does not matter to cards that lie.
+    // Options of the fall do not affect cards at rest.
     let longer = |config: &mut DatasetConfig| config.scene.settle.time_limit *= 2.0;
     assert!(with(longer, &scene) == with(|_| {}, &scene));
     assert!(
@@ -185,7 +185,7 @@ fn quality_where_it_does_not_apply_changes_nothing() {
     );
 }
 
-/// A dataset of three scenes: every file and its bytes, but for notes of how long it took.
+/// A dataset of three scenes: every file and its bytes, except records of its run time.
 fn dataset(
     world: &FixtureFolder,
     threads: usize,

@@ -1,5 +1,4 @@
-//! The input files of the scenes, made in code: three assets, one labelled photo, one environment
-//! map.
+//! Synthetic input files of the scenes: three assets, one labelled photo, one environment map.
 
 use crate::pile::lamp;
 use petcomp::asset::{Asset, Manifest, PhotoRecord};
@@ -22,17 +21,16 @@ const SURFACE_CORNERS_PX: [[f64; 2]; 4] =
 const SURFACE_SIZE_M: [f64; 2] = [0.56, 0.37];
 /// Focal length of the photo, pixels.
 const PHOTO_FOCAL_PX: f64 = 343.7;
-/// Texels of a cut-out, and how many of them are a metre.
+/// Texels of a cut-out, and their number per metre.
 const TEXELS: [usize; 2] = [96, 48];
 const TEXELS_PER_METRE: f64 = 400.0;
-/// Cards of the default scene, and by how much each lies higher than the one below it, metres.
+/// Number of cards of the default scene, and height of each above the one below it, metres.
 const CARD_COUNT: usize = 3;
 const CARD_RISE_M: f64 = 0.02;
 /// File of the environment map.
 const PANORAMA: &str = "sky.exr";
 
-/// Names of the assets: a cut-out that is half see-through, one that is opaque all over, one that
-/// tints.
+/// Names of the assets: a half see-through cut-out, an opaque one, and a tinting one.
 pub(super) const SEE_THROUGH: &str = "bottle";
 pub(super) const OPAQUE: &str = "box";
 pub(super) const FILM: &str = "film";
@@ -82,7 +80,7 @@ impl FixtureFolder {
         io::write_json(folder.join("tray.label.json"), &label)
     }
 
-    /// The recipe that names the folders.
+    /// The recipe with these folders.
     pub(super) fn config(&self) -> DatasetConfig {
         let [assets, backgrounds] = ["assets", "photos"].map(|kind| self.path(kind));
         DatasetConfig {
@@ -112,7 +110,7 @@ impl FixtureFolder {
         }
     }
 
-    /// The light of a picture of the surroundings.
+    /// The light of an environment map.
     pub(super) fn environment(&self, strength: f64) -> Environment {
         Environment {
             file: PANORAMA.into(),
@@ -187,7 +185,7 @@ pub(super) fn dropped(mut scene: Scene) -> Scene {
     scene
 }
 
-/// The same scene of another asset.
+/// The same scene with another asset.
 pub(super) fn made_of(asset: &str, mut scene: Scene) -> Scene {
     for object in &mut scene.objects {
         object.asset = asset.into();
@@ -228,7 +226,7 @@ fn striped_cut_out(alpha: f32) -> Image<PremulRgba> {
     })
 }
 
-/// A film that lets green pass best.
+/// A film that transmits green best.
 fn tinted(p: PremulRgba) -> Film {
     Film::new(p.color(), LinearRgb::new(0.25, 0.75, 0.5))
 }

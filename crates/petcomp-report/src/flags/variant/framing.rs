@@ -1,4 +1,4 @@
-//! How much of the picture the object takes, and where it lies.
+//! Framing: the object's share of the picture, and its position.
 
 use super::super::Trial;
 use super::sensor::noisy;
@@ -32,7 +32,7 @@ fn cropped_box([left, top, right, bottom]: [f64; 4], roi: Roi) -> [f64; 4] {
     [left - x, top - y, right - x, bottom - y]
 }
 
-/// The photo and its mirror image beside each other.
+/// The photo and its mirror image side by side.
 pub(super) fn two(one: &Trial) -> Trial {
     Trial {
         photo: beside_its_mirror(&one.photo),
@@ -51,7 +51,7 @@ fn beside_its_mirror<P: Copy + Send + Sync>(image: &Image<P>) -> Image<P> {
 /// The longer side of a tiny photo, pixels.
 const TINY_PX: usize = 64;
 
-/// The photo made so small.
+/// The photo downsized to this.
 pub(super) fn tiny(whole: &Trial) -> Trial {
     let (w, h) = whole.photo.size();
     resized(whole, TINY_PX as f64 / w.max(h) as f64)
@@ -60,7 +60,7 @@ pub(super) fn tiny(whole: &Trial) -> Trial {
 /// Pixels of a huge photo.
 const HUGE_PX: f64 = 12e6;
 
-/// The photo made so large: as sharp, in its own pixels, as a small photo with a good lens is not.
+/// The photo enlarged to this: a small photo with a good lens is never as sharp per pixel.
 pub(super) fn huge(whole: &Trial) -> Trial {
     let (w, h) = whole.photo.size();
     resized(whole, (HUGE_PX / (w * h) as f64).sqrt())
@@ -82,7 +82,7 @@ fn scaled_box([left, top, right, bottom]: [f64; 4], [sx, sy]: [f64; 2]) -> [f64;
     [left * sx, top * sy, right * sx, bottom * sy]
 }
 
-/// The photo turned on its side: rows become columns.
+/// The photo transposed: rows become columns.
 pub(super) fn upright(flat: &Trial) -> Trial {
     let [left, top, right, bottom] = flat.box_px;
     Trial {
@@ -97,10 +97,10 @@ fn transposed<P: Copy + Send + Sync>(image: &Image<P>) -> Image<P> {
     Image::from_fn(image.height(), image.width(), |x, y| image[(y, x)])
 }
 
-/// Share of the picture that the box of an object that fills it has.
+/// Share of a full-frame picture that the object's box takes.
 const FULL_FRAME_SHARE: f64 = 0.8;
 
-/// The photo cut to the object's box and equal margins around it, as far as the photo reaches.
+/// The photo cropped to the object's box and equal margins around it, as far as the photo reaches.
 pub(super) fn full_frame(whole: Trial) -> Trial {
     let [left, top, right, bottom] = whole.box_px;
     let (w, h) = whole.photo.size();
@@ -136,7 +136,7 @@ fn total_coverage(mask: &Image<Coverage>) -> f64 {
     mask.pixels().iter().map(|c| f64::from(c.0)).sum()
 }
 
-/// Width of a thin object as a share of what it was.
+/// Width of a thin object as a share of the original.
 const THIN_SCALE: f64 = 0.125;
 
 /// The object squeezed across its length.
@@ -150,7 +150,7 @@ pub(super) fn thin_object(known: &Known, whole: Trial) -> Trial {
     shrunk(known, whole, scale)
 }
 
-/// The object made smaller by factors across and down, in the middle of its screen: `F + T K`, with
+/// The object downsized by factors across and down, in the middle of its screen: `F + T K`, with
 /// the sensor's noise.
 fn shrunk(known: &Known, whole: Trial, scale: [f64; 2]) -> Trial {
     let inset = Inset::new(known.photo.size(), scale);
@@ -162,7 +162,7 @@ fn shrunk(known: &Known, whole: Trial, scale: [f64; 2]) -> Trial {
     }
 }
 
-/// Where a picture that was made smaller lies in the middle of its old frame.
+/// Position of a downsized picture in the middle of its old frame.
 struct Inset {
     from: [usize; 2],
     to: [usize; 2],
@@ -193,7 +193,7 @@ impl Inset {
         self.image(|_, _, inside| inside.map_or(Coverage(0.0), |at| small[at]))
     }
 
-    /// A picture of the old frame from the pixels of it and, where there is one, of the smaller
+    /// A picture of the old frame from its pixels and, where there is one, that of the smaller
     /// picture.
     fn image<P: Copy + Send + Sync>(
         &self,
@@ -203,7 +203,7 @@ impl Inset {
         Image::from_fn(w, h, |x, y| pixel(x, y, self.at(x, y)))
     }
 
-    /// The pixel of the smaller picture at a pixel of the frame; nothing beside it.
+    /// The pixel of the smaller picture at a pixel of the frame; none outside it.
     fn at(&self, x: usize, y: usize) -> Option<(usize, usize)> {
         let [dx, dy] = [
             x.checked_sub(self.corner[0])?,

@@ -1,4 +1,4 @@
-//! What a lens and a hand do to a picture.
+//! Effects of a lens and of camera shake.
 
 use super::scaled;
 use petcomp::Image;
@@ -16,7 +16,7 @@ fn mean_of_shifts(photo: &Image<LinearRgb>, offsets: &[(isize, isize)]) -> Image
     })
 }
 
-/// A camera that moved by some pixels in a direction.
+/// Motion blur: a camera that moved by some pixels in a direction.
 pub(super) fn moved(photo: &Image<LinearRgb>, direction: f64, by_px: usize) -> Image<LinearRgb> {
     let (sin, cos) = libm::sincos(direction);
     let along = (0..=by_px).map(|i| i as f64 - 0.5 * by_px as f64);
@@ -30,7 +30,7 @@ fn nearest_pixel(offset: f64) -> isize {
     offset.round() as isize
 }
 
-/// A lens that makes a disc of every point.
+/// Defocus: a lens that images every point as a disc.
 pub(super) fn defocused(photo: &Image<LinearRgb>, radius_px: isize) -> Image<LinearRgb> {
     let disc: Vec<_> = square_offsets(radius_px)
         .filter(|(dx, dy)| dx * dx + dy * dy <= radius_px * radius_px)
@@ -44,7 +44,7 @@ fn square_offsets(radius_px: isize) -> impl Iterator<Item = (isize, isize)> {
         .flat_map(move |dx| side.clone().map(move |dy| (dx, dy)))
 }
 
-/// A lens that darkens the corners by a share.
+/// Vignetting: a lens that darkens the corners by a share.
 pub(super) fn vignetted(photo: &Image<LinearRgb>, share: f64) -> Image<LinearRgb> {
     let (w, h) = (photo.width() as f64, photo.height() as f64);
     let corner = 0.25 * (w * w + h * h);

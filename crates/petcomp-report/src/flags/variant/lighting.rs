@@ -39,13 +39,13 @@ pub(super) fn fallen_off(photo: &Image<LinearRgb>, direction: f64, share: f64) -
     })
 }
 
-/// What is left of the light in the shadow.
+/// Share of the light that is left in the shadow.
 const SHADOW_LIGHT: f64 = 0.6;
 /// Width of the shadow's edge, pixels.
 const PENUMBRA_PX: f64 = 1.5;
 
-/// A slanted shadow from the right; its edge lies `beyond` of the way from the object's box to the
-/// border, or, below 0, by so much of the object's width within it.
+/// A slanted shadow from the right. Its edge is at the share `beyond` of the distance from the
+/// object's box to the border or, if negative, at that share of the object's width inside the box.
 pub(super) fn shadowed(known: &Known, beyond: f64) -> Image<LinearRgb> {
     let edge = shadow_edge(known, beyond);
     let h = known.photo.height() as f64;
@@ -81,13 +81,13 @@ pub(super) fn two_hues(photo: &Image<LinearRgb>, direction: f64) -> Image<Linear
     })
 }
 
-/// How far a hard shadow reaches beyond the object, as a share of the shorter side of its box.
+/// Reach of a hard shadow beyond the object, as a share of the shorter side of its box.
 const CAST_SHADOW_REACH: f64 = 0.08;
 /// Blur of its edge, standard deviation in pixels.
 const CAST_BLUR_PX: f32 = 1.0;
 
-/// The shadow of the object in the light of a lamp behind the photographer, on the screen beside
-/// it: denser where the object lets less through.
+/// The shadow of the object from a lamp behind the photographer, on the screen around it: denser
+/// where the object transmits less.
 pub(super) fn cast_shadow(known: &Known, direction: f64) -> Image<LinearRgb> {
     let (w, h) = known.photo.size();
     let soft = soft_shadow(known, direction);
@@ -98,7 +98,7 @@ pub(super) fn cast_shadow(known: &Known, direction: f64) -> Image<LinearRgb> {
     })
 }
 
-/// How dense the shadow is, moved away from the object and blurred.
+/// Density of the shadow, moved away from the object and blurred.
 fn soft_shadow(known: &Known, direction: f64) -> Image<Coverage> {
     let (dx, dy) = shadow_offset(known.box_px, direction);
     let (w, h) = known.photo.size();

@@ -1,11 +1,11 @@
-//! What the screen is, and what lies on it.
+//! Variants of the screen and of what lies on it.
 
 use crate::matte::truth::Known;
 use crate::matte::{largest_channel, uniform};
 use petcomp::{Image, LinearRgb};
 use std::f64::consts::TAU;
 
-/// The photo on another screen, of which the object hides and shades the same shares.
+/// The photo on another screen, with the same shares hidden and shaded by the object.
 pub(super) fn on_screen(
     known: &Known,
     other: impl Fn(LinearRgb) -> LinearRgb + Sync,
@@ -20,7 +20,7 @@ pub(super) fn on_screen(
 fn pixel_on_screen(known: &Known, at: (usize, usize), other: LinearRgb) -> LinearRgb {
     let (photo, screen) = (known.photo[at], known.screen[at]);
     if known.mask[at].0 == 0.0 {
-        // Beside the object all is screen, shadow and noise.
+        // Next to the object everything is screen, shadow and noise.
         other.scale(light_on_screen(photo, screen))
     } else {
         photo + known.transmittance[at] * (other + screen.scale(-1.0))
@@ -39,8 +39,8 @@ const OPAQUE_TRANSMITTANCE: f32 = 0.15;
 /// The smallest share of an object that is painted where it is opaque.
 const MIN_PAINTED_SHARE: f64 = 0.02;
 
-/// The object with its opaque parts painted in the screen's hue, as bright as they were; nothing
-/// where it has none.
+/// The object with its opaque parts painted in the screen's hue, as bright as before; none if it
+/// has no such parts.
 pub(super) fn hued(known: &Known) -> Option<Image<LinearRgb>> {
     let opaque = known
         .transmittance
@@ -70,8 +70,7 @@ fn channel_sum(c: LinearRgb) -> f32 {
     c.r + c.g + c.b
 }
 
-/// The photo with the screen's light changed by a factor, as much of it as is seen through the
-/// object.
+/// The photo with the screen's light changed by a factor, as far as it is seen through the object.
 fn relit(known: &Known, light: impl Fn(f64, f64) -> f32 + Sync) -> Image<LinearRgb> {
     let (w, h) = known.photo.size();
     Image::from_fn(w, h, |x, y| {
@@ -124,7 +123,7 @@ impl Crease {
         }
     }
 
-    /// How the cloth is inclined at a point: 1 and -1 beside the crease.
+    /// Inclination of the cloth at a point: 1 and -1 on either side of the crease.
     fn bend(&self, x: f64, y: f64) -> f64 {
         let [u, v] = self.through;
         let across = ((x - u) * self.sin + (y - v) * self.cos) / CREASE_WIDTH_PX;
@@ -132,7 +131,8 @@ impl Crease {
     }
 }
 
-/// Specks on a screen, their radii in pixels from and to, and what they leave of the light.
+/// Specks on a screen, their minimum and maximum radii in pixels, and the share of light that they
+/// leave.
 const SPECK_COUNT: usize = 60;
 const SPECK_RADII_PX: [f64; 2] = [0.7, 2.2];
 const SPECK_LIGHT: f32 = 0.35;
@@ -164,7 +164,7 @@ impl Speck {
         }
     }
 
-    /// How much of a pixel it covers.
+    /// Coverage of a pixel.
     fn cover(&self, x: f64, y: f64) -> f64 {
         let [u, v] = self.center;
         (self.radius + 0.5 - (x - u).hypot(y - v)).clamp(0.0, 1.0)

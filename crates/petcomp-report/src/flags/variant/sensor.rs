@@ -1,4 +1,4 @@
-//! What a camera makes of light: noise and codes.
+//! Effects of a sensor and of encoding: noise and codes.
 
 use crate::matte::normal;
 use petcomp::color::{decode_srgb8, encode_srgb8};
@@ -15,7 +15,7 @@ pub(super) fn noisy(photo: &Image<LinearRgb>, sigma: f32, seed: u64) -> Image<Li
     noisy
 }
 
-/// The photo as a JPEG file of a quality holds it; nothing where it cannot be one.
+/// The photo after JPEG compression with a quality; none if it cannot be a JPEG.
 pub(super) fn jpeg(photo: &Image<LinearRgb>, quality: u8) -> Option<Image<LinearRgb>> {
     let codes = io::through_jpeg(&photo.map(encode_srgb8), quality, Chroma::Full)?;
     Some(codes.map(decode_srgb8))
