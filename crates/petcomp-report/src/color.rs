@@ -1,4 +1,5 @@
-//! Colour transfer: exact curves against tables and against a plain power, error against run time.
+//! Colour transfer: exact curves compared with tables and with a plain power, error against run
+//! time.
 //!
 //! The reference is the closed form of IEC 61966-2-1, evaluated here with the standard library's
 //! power in double precision; the stage computes with `libm`.
@@ -10,10 +11,10 @@ use petcomp::color::{
 };
 use petcomp::{LinearRgb, Result, Srgb8};
 
-/// Values that are converted: a megapixel of three channels.
+/// Values to convert: a megapixel of three channels.
 const VALUE_COUNT: usize = 3 << 20;
 const TIMED_RUNS: usize = 5;
-/// A power that is often used in place of the curve.
+/// A power that is often used instead of the curve.
 const PLAIN_GAMMA: f64 = 2.2;
 /// The largest codes of 8 and 16 bits.
 const MAX_CODE_8: f64 = 255.0;
@@ -22,7 +23,7 @@ const MAX_CODE_16: f64 = 65_535.0;
 /// this share of a code.
 const ROUNDING_RMS: f64 = 0.288_675_134_594_812_9;
 
-/// Encoding and decoding, a point for each form.
+/// Encoding and decoding, a point per variant.
 pub(crate) fn diagrams() -> Result<Vec<Diagram>> {
     Ok(vec![encoding()?, decoding()?])
 }
@@ -35,7 +36,7 @@ fn shuffled_lights() -> Vec<f32> {
     mixed.map(|i| (i as f64 / range as f64) as f32).collect()
 }
 
-/// Codes of 8 bits in such an order.
+/// Codes of 8 bits in a similar order.
 fn shuffled_codes() -> Vec<u8> {
     let mixed = (0..VALUE_COUNT).map(|i| i.wrapping_mul(2_654_435_761));
     mixed.map(|i| (i >> 8) as u8).collect()
@@ -57,15 +58,15 @@ fn decoded(value: f64) -> f64 {
     }
 }
 
-/// Values, what they must be converted to, and how the time and error of a form of the conversion
-/// are measured.
+/// Values, the exact result of their conversion, and measurements of time and error of its
+/// variants.
 struct Conversion<'a> {
     values: &'a [f32],
     exact: fn(f64) -> f64,
 }
 
 impl Conversion<'_> {
-    /// Seconds and error of a form; `meaning` of its codes is not timed.
+    /// Seconds and error of a variant; `meaning` of its codes is not timed.
     fn point<T: Send>(
         &self,
         [name, setting]: [&str; 2],
@@ -77,7 +78,7 @@ impl Conversion<'_> {
         Ok(Point::new(name, setting, seconds, self.rms_error(&found)))
     }
 
-    /// Of a form that converts value by value.
+    /// For a variant that converts value by value.
     fn point_of_each(&self, names: [&str; 2], form: fn(f32) -> f32) -> Result<Point> {
         self.point(
             names,
@@ -118,7 +119,7 @@ fn why_table(lights: &[f32]) -> String {
     )
 }
 
-/// What both diagrams share.
+/// Properties shared by both diagrams.
 fn color_diagram() -> Diagram {
     Diagram {
         cost: "CPU seconds per megapixel".into(),
@@ -162,7 +163,7 @@ fn encode_by_table_16(values: &[f32]) -> Vec<u16> {
     values.iter().map(|v| encode_srgb16(*v)).collect()
 }
 
-/// Codes that are not the nearest to what the closed form gives.
+/// Codes that are not the nearest to the closed form.
 fn count_wrong_codes(codes: &[u8], lights: &[f32]) -> usize {
     let all = codes.iter().zip(lights);
     all.filter(|(code, light)| is_wrong_code(**code, **light))
@@ -171,7 +172,7 @@ fn count_wrong_codes(codes: &[u8], lights: &[f32]) -> usize {
 
 fn is_wrong_code(code: u8, light: f32) -> bool {
     let exact = MAX_CODE_8 * encoded(f64::from(light));
-    // Half a code, and a little for the closed form's own rounding.
+    // Half a code, and a margin for the closed form's own rounding.
     (f64::from(code) - exact).abs() > 0.5 + 1e-9
 }
 
@@ -194,7 +195,7 @@ fn decoding_points(codes: &[u8]) -> Result<Vec<Point>> {
         values: &values,
         exact: decoded,
     };
-    // The tables take codes, not values: both stand for the same.
+    // The tables take codes, not values: both represent the same light.
 
     Ok(vec![
         conversion

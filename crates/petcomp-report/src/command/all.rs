@@ -1,4 +1,4 @@
-//! `petcomp-report all`: everything that is measured, on one page.
+//! `petcomp-report all`: all measurements on one page.
 
 use crate::ReportFlags;
 use petcomp_report::all::{self, AllOptions};

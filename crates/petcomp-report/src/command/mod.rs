@@ -1,4 +1,4 @@
-//! `petcomp-report`: how good a stage is, measured: one file per stage.
+//! `petcomp-report`: measures how well each stage works; one file per report.
 
 mod all;
 mod camera;
@@ -15,7 +15,7 @@ use petcomp_report::all::AllOptions;
 use petcomp_report::render::RenderReportOptions;
 use std::path::PathBuf;
 
-/// What a report of photos with known mattes needs.
+/// Arguments of reports on photos with known mattes.
 #[derive(clap::Args)]
 pub(crate) struct TruthArgs {
     /// Folder of photos with ground truth, laid out like the sample world

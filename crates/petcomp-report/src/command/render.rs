@@ -1,4 +1,4 @@
-//! `petcomp-report render`: the renderer against Cycles and against the quadrature of its
+//! `petcomp-report render`: the renderer compared with Cycles and with the quadrature of its
 //! definition.
 
 use crate::ReportFlags;

@@ -1,5 +1,5 @@
-//! `petcomp-report scale`: memory and rate, and what a million pictures take; of scenes made in
-//! code, or of a recipe.
+//! `petcomp-report scale`: memory and throughput, and the forecast for a million pictures; for
+//! synthetic scenes, or for a recipe.
 
 use crate::ReportFlags;
 use clap::builder::RangedU64ValueParser;

@@ -19,7 +19,7 @@ pub(crate) struct Args {
     stage: String,
 }
 
-/// Fails where a case fails, after all have been written.
+/// Fails if a case fails, after all have been written.
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let rows = common.with_progress("trying", |progress| {
         stability::write(&args.output, &args.stage, progress)
@@ -31,7 +31,7 @@ pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// How many cases failed.
+/// Prints the failed cases; returns their number.
 fn print_failures(rows: &[CaseResult]) -> usize {
     let failed = rows.iter().filter(|row| !row.outcome.passed);
     failed.inspect(|row| print_failure(row)).count()

@@ -1,4 +1,4 @@
-//! `petcomp-report work`: what scenes pay for, counted.
+//! `petcomp-report work`: the counted work of scenes.
 
 use crate::ReportFlags;
 use petcomp_report::work;
