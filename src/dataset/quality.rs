@@ -135,7 +135,7 @@ impl StageSettings {
 type Setting = (&'static str, &'static str, fn(&StageSettings) -> String);
 
 const SETTINGS: [Setting; 9] = [
-    ("matte", "longer side that is searched, px", |s| {
+    ("matte", "longer side of the searched image, px", |s| {
         s.cut_out.segment.working_size.to_string()
     }),
     ("matte", "longer side of a cut-out, px", |s| {
@@ -144,10 +144,10 @@ const SETTINGS: [Setting; 9] = [
     ("settle", "time step, s", |s| {
         format!("1/{}", libm::round(1.0 / s.settle.step))
     }),
-    ("settle", "iterations in a step", |s| {
+    ("settle", "iterations per step", |s| {
         s.settle.iterations.to_string()
     }),
-    ("light, shadow", "samples of a light", |s| {
+    ("light, shadow", "samples per light", |s| {
         square(s.render.light_samples)
     }),
     ("light, shadow", "directions of the sky", |s| {
@@ -156,10 +156,10 @@ const SETTINGS: [Setting; 9] = [
     ("light, shadow", "distance of irradiance samples, px", |s| {
         s.render.cell_px.to_string()
     }),
-    ("render", "samples of a pixel", |s| {
+    ("render", "samples per pixel", |s| {
         square(s.render.subsamples)
     }),
-    ("encode", "files of a picture", |s| {
+    ("encode", "output files", |s| {
         if s.pictures.exr {
             "PNG of 8 bits, EXR of half floats".into()
         } else {
@@ -279,15 +279,15 @@ mod tests {
             let config = quality.config(DatasetConfig::default());
             let sides = config.render.subsamples;
             assert_eq!(
-                cell("samples of a pixel", i),
+                cell("samples per pixel", i),
                 Some(format!("{sides} x {sides}"))
             );
             assert_eq!(
-                cell("iterations in a step", i),
+                cell("iterations per step", i),
                 Some(config.scene.settle.iterations.to_string())
             );
             assert_eq!(
-                cell("files of a picture", i).map(|t| t.contains("EXR")),
+                cell("output files", i).map(|t| t.contains("EXR")),
                 Some(config.pictures.exr)
             );
         }

@@ -101,7 +101,7 @@ fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Document
     }
     progress(steps, steps);
     Ok(Document {
-        title: "petcomp: what it does, how well, and at what cost".into(),
+        title: "petcomp: accuracy, speed and cost of every stage".into(),
         sections,
     })
 }
@@ -144,14 +144,14 @@ pub fn write(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<()> {
 
 fn about_report(options: &AllOptions) -> Section {
     let quick = if options.quick {
-        " It was made in a hurry (`--quick`): times are of few runs; extreme cases, counted work and scale are left out."
+        " It is a quick run (`--quick`): times are from few runs; extreme cases, counted work and scale are left out."
     } else {
         ""
     };
-    Section::new("What this is")
+    Section::new("About this report")
         .text(format!(
-            "One run of `petcomp-report all` on the machine below. Times are CPU seconds of one thread, medians; errors are \
-             the same at every run.{quick}"
+            "One run of `petcomp-report all` on the machine below. Times are median CPU seconds of one thread; errors \
+             are the same in every run.{quick}"
         ))
         .table("machine", machine::machine_table(&options.date))
 }
@@ -159,8 +159,9 @@ fn about_report(options: &AllOptions) -> Section {
 fn error_curves(diagrams: &[Diagram]) -> Section {
     Section::new("Error against run time")
         .text(
-            "Each point is a setting: further left is cheaper, further down is more exact, and what nothing beats in both is \
-             the efficient front. A ring marks the default. Names in brackets are the qualities that use a setting.",
+            "Each point is a setting: further left is cheaper, further down is more accurate. Points that no other \
+             beats in both form the efficient (Pareto) front. A ring marks the default. Names in brackets are the \
+             qualities that use a setting.",
         )
         .table("defaults", Diagram::summary(diagrams))
         .diagrams(diagrams)
@@ -169,9 +170,9 @@ fn error_curves(diagrams: &[Diagram]) -> Section {
 fn quality_table() -> Section {
     Section::new("Quality")
         .text(
-            "`--quality draft|normal|reference` moves every approximate stage of a run along its curve at once. What is not \
-             in the table is exact at every quality, or so quick that nothing is gained: colour transfer, the keyer, masks \
-             and boxes, the camera.",
+            "`--quality draft|normal|reference` moves every approximate stage of a run along its curve at once. Stages \
+             missing from the table are exact at every quality, or so fast that there is nothing to gain: colour \
+             transfer, the keyer, masks and boxes, the camera.",
         )
         .table("quality", Quality::table())
 }
@@ -200,7 +201,7 @@ fn stability_of_stages() -> Result<Section> {
     let passed = rows.iter().filter(|row| row.outcome.passed).count();
     Ok(Section::new("Stability")
         .text(format!(
-            "{passed} of {} stiff and extreme cases come out as they must.",
+            "{passed} of {} stiff and extreme cases pass.",
             rows.len()
         ))
         .table("stability_summary", stability::summary(&rows))
@@ -210,10 +211,10 @@ fn stability_of_stages() -> Result<Section> {
 fn counted_work() -> Result<Section> {
     let rows = work::measure(|_, _| ())?;
     let kept = rows.iter().filter(|row| row.is_as_expected()).count();
-    Ok(Section::new("A scene pays for what it uses")
+    Ok(Section::new("Cost of scene features")
         .text(format!(
-            "Work, counted and not timed: the same at every run and on every machine. A marked zero is promised; {kept} of {} \
-             scenes keep their promises.",
+            "Work is counted, not timed, and the same in every run and on every machine. A marked zero is guaranteed; \
+             {kept} of {} scenes are as expected.",
             rows.len()
         ))
         .table("work", work::table(&rows).transposed()))

@@ -96,7 +96,7 @@ impl Conversion<'_> {
 
 fn encoding() -> Result<Diagram> {
     let lights = shuffled_lights();
-    let reason = "what rounding to 8 bits costs, and 1 % for the few values";
+    let reason = "error of rounding to 8 bits, plus 1 % for the finite number of values";
     Ok(Diagram {
         file: "color_encode".into(),
         title: "color: light to display values".into(),

@@ -208,7 +208,7 @@ impl Diagram {
             return "It is on the efficient front.".to_owned();
         };
         format!(
-            "It is not on the efficient front: {} is at least as exact (error {} instead of {}) at {} of its cost.",
+            "It is not on the efficient front: {} is at least as accurate (error {} instead of {}) at {} of its cost.",
             better.name(),
             three(better.error),
             three(default.error),
@@ -381,14 +381,14 @@ fn paragraph(sentences: &[&str]) -> String {
 }
 
 const SUMMARY_TITLES: [&str; 8] = [
-    "stage and what is asked",
-    "compared with",
+    "stage and question",
+    "reference",
     "default",
-    "error is",
+    "error measure",
     "error",
-    "cost is",
+    "cost measure",
     "cost",
-    "cheaper and as exact",
+    "cheaper and at least as accurate",
 ];
 
 #[cfg(test)]

@@ -84,7 +84,7 @@ impl EncodingComparison {
             file: "encode_bytes".into(),
             title: "encode: error against size".into(),
             cost: "bytes per pixel".into(),
-            why: "A dataset is written once and read often: `pictures.format = \"jpg\"` is for those who pay for storage.".into(),
+            why: "A dataset is written once and read often: use `pictures.format = \"jpg\"` if storage is expensive.".into(),
             ..self.diagram(|s| s.bytes as f64 / self.pixels())
         }
     }
@@ -110,8 +110,8 @@ impl EncodingComparison {
         let png = self.stored_as(PNG, "normal")?;
         let jpeg = self.stored_as("JPEG", "95")?;
         Some(format!(
-            "Trainers read files of 8 bits: PNG loses what 8 bits lose, and takes {} of the time of JPEG at 95, which has {} \
-             times its error in {} of its bytes. `reference` keeps half floats beside it.",
+            "Trainers read 8-bit files: PNG loses only what 8 bits lose, and takes {} of the time of JPEG at quality \
+             95, which has {} times its error and {} of its size. `reference` also keeps half floats.",
             three(png.seconds / jpeg.seconds),
             three(jpeg.error / png.error),
             three(jpeg.bytes as f64 / png.bytes as f64)

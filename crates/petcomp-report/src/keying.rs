@@ -33,7 +33,7 @@ pub(crate) fn diagrams() -> Result<Vec<Diagram>> {
     Ok(vec![Diagram {
         file: "matte_blur".into(),
         title: "matte: blur of the keyer".into(),
-        input: format!("a soft disc before a screen, {w} x {h}; key and blur"),
+        input: format!("a soft disc in front of a screen, {w} x {h}; key and blur"),
         error: "RMS error of the matte".into(),
         cost: "CPU seconds".into(),
         reference: "mean over the window in double precision (closed form)".into(),
@@ -74,9 +74,9 @@ fn why_exact(exact: &[Point], running: &[Point]) -> String {
         })
         .collect();
     format!(
-        "Sizes are different work, not different precision: compare the two forms at one size. Blender's order takes {} times \
-         as long as running sums, and is further from the mean. It is the default all the same: its bits are Blender's, and \
-         the default size is 0, which is no blur at all. `blur = \"running_sum\"` is for large sizes.",
+        "Sizes differ in work, not in precision: compare the two forms at one size. Blender's order takes {} times as \
+         long as running sums, and is further from the mean. It is still the default, since it is bit-identical to \
+         Blender and the default size is 0, which means no blur. Use `blur = \"running_sum\"` for large sizes.",
         ratios.join(", ")
     )
 }

@@ -213,10 +213,11 @@ fn label_diagram() -> Diagram {
         input: input_words(),
         error: "1 - IoU".into(),
         reference: "the ellipse (closed form)".into(),
-        why: "Masks are read from the deep samples, like the picture, so they agree with what is seen of see-through objects; the \
-              outline is what the geometry says. A pixel counts from a coverage of 0.1, where film can still be distinguished from \
-              noise: masks are a fraction of a pixel too wide for that, and boxes hold all of the object. Polygons keep all corners \
-              of their pixels unless a recipe sets a tolerance (`labels.simplify`)."
+        why: "Masks are computed from the deep samples, like the picture, so they agree with the visible parts of \
+              see-through objects; the outline is purely geometric. A pixel counts from a coverage of 0.1, at which \
+              film can still be distinguished from noise: masks are therefore a fraction of a pixel too wide, and \
+              boxes contain the whole object. Polygons keep all corners of their pixels unless a recipe sets a \
+              tolerance (`labels.simplify`)."
             .into(),
         ..Diagram::default()
     }

@@ -82,7 +82,7 @@ impl LightKind {
             Self::Area => [
                 "shadow_light",
                 "shadow: a card under an area light",
-                "Lambert's formula for the part of the light that is seen (closed form)",
+                "Lambert's formula for the visible part of the light (closed form)",
             ],
             Self::Sky => [
                 "shadow_sky",
@@ -102,7 +102,8 @@ impl LightKind {
             cost: "CPU seconds of a picture".into(),
             reference,
             limit: invisible_error(),
-            why: "Piles cast many shadows on each other, so the error of a single one should be a fraction of what is visible."
+            why: "Cards in piles cast many overlapping shadows, so the error of a single one should be a fraction of \
+                  what is visible."
                 .into(),
             ..Diagram::default()
         }

@@ -149,7 +149,7 @@ impl PeerComparison {
             return String::new();
         }
         let absent = self.absent.iter();
-        let sentences = absent.map(|a| format!(" Not here: {} ({}).", a.program, a.why));
+        let sentences = absent.map(|a| format!(" Not available: {} ({}).", a.program, a.why));
         format!("{}:{}", self.stage, sentences.collect::<String>())
     }
 }
@@ -173,7 +173,7 @@ pub(crate) fn ratios(comparisons: &[PeerComparison]) -> Table {
         "program",
         "setting",
         "seconds",
-        "times petcomp's",
+        "times petcomp's time",
         "error",
         "times petcomp's error",
         "runs",

@@ -306,7 +306,7 @@ mod tests {
         );
         let text = io::read_text(folder.path().join("render.md")).unwrap();
         assert!(
-            text.contains("Cycles' own curve is not there")
+            text.contains("Cycles' curve is missing")
                 && folder.path().join("render.svg").exists()
         );
     }

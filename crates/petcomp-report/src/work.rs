@@ -154,7 +154,7 @@ fn csv(rows: &[WorkRow]) -> Table {
 fn scenes_by_kinds(rows: &[WorkRow], shown: impl Fn(&WorkRow, Kind, u64) -> String) -> Table {
     let counts = rows.first().map_or(&[][..], |row| &row.counts);
     let kinds = counts.iter().map(|(kind, _)| kind.name());
-    let mut table = Table::new(["scene", "what is in it"].into_iter().chain(kinds));
+    let mut table = Table::new(["scene", "contents"].into_iter().chain(kinds));
     for row in rows {
         let names = [row.scene, row.about].map(String::from);
         let counts = row.counts.iter();
@@ -168,8 +168,8 @@ fn scenes_by_kinds(rows: &[WorkRow], shown: impl Fn(&WorkRow, Kind, u64) -> Stri
 fn markdown(rows: &[WorkRow]) -> String {
     let kept = rows.iter().filter(|row| row.is_as_expected()).count();
     let head = format!(
-        "# What scenes pay for\n\nCounted, not timed; the same numbers at any thread count. ✓ marks a zero that is \
-         guaranteed and tested. {kept} of {} scenes are as expected.\n\n",
+        "# Cost of scene features\n\nCounted, not timed; the same numbers with any number of threads. ✓ marks a zero \
+         that is guaranteed and tested. {kept} of {} scenes are as expected.\n\n",
         rows.len()
     );
     format!(
@@ -180,7 +180,7 @@ fn markdown(rows: &[WorkRow]) -> String {
 }
 
 fn meanings() -> Table {
-    let mut kinds = Table::new(["count", "of what"]);
+    let mut kinds = Table::new(["count", "meaning"]);
     for kind in Kind::ALL {
         kinds.push([kind.name(), kind.meaning()]);
     }

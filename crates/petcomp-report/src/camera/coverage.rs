@@ -156,13 +156,13 @@ pub(super) fn csv(rows: &[StatedErrors]) -> String {
 }
 
 const MARKDOWN_COLUMNS: [Column<StatedErrors>; 12] = [
-    ("off the middle", |r| format!("{} %", 100.0 * r.off_center)),
-    ("corners to, px", |r| r.noise_px.to_string()),
-    ("label says", |r| label_words(r.framing).to_owned()),
+    ("off centre", |r| format!("{} %", 100.0 * r.off_center)),
+    ("corner noise, px", |r| r.noise_px.to_string()),
+    ("label", |r| label_words(r.framing).to_owned()),
     ("refused", |r| format!("{} of {}", r.refused, r.views)),
     ("error, %", |r| three(r.focal_percent[0])),
     ("stated, %", |r| three(r.focal_percent[1])),
-    ("50 mm up, px", |r| three(r.height_px[0])),
+    ("at 50 mm, px", |r| three(r.height_px[0])),
     ("stated, px", |r| three(r.height_px[1])),
     ("within 1", |r| format!("{:.2}", r.within[0])),
     ("within 2", |r| format!("{:.2}", r.within[1])),
@@ -179,10 +179,11 @@ fn label_words(framing: Framing) -> &'static str {
     }
 }
 
-const EXPLANATION: &str = "\n## Is the stated error true?\n\n\
-    Principal points in the middle of the picture, as in whole ones, and off it by a share of its longer side, as in \
-    cropped ones; tilts of 5 to 60 degrees; nothing is known of the focal length. Focal length: median error, median of \
-    the stated standard deviation, parts within one, two and three of those, and the worst.\n\n";
+const EXPLANATION: &str = "\n## Coverage of the stated error\n\n\
+    Principal points in the centre of the picture, as in whole ones, and off it by a share of its longer side, as in \
+    cropped ones; tilts of 5 to 60 degrees; unknown focal length. Focal length: median error, median stated standard \
+    deviation, shares within one, two and three standard deviations, and the worst error. At 50 mm above the surface: \
+    reprojection error.\n\n";
 
 pub(super) fn markdown(rows: &[StatedErrors]) -> String {
     EXPLANATION.to_owned() + &table_of(&MARKDOWN_COLUMNS, rows).markdown()

@@ -21,14 +21,15 @@ fn tilt_diagram(tilt_deg: f64, views: u64) -> Diagram {
         file: format!("camera_{tilt_deg}_degrees"),
         title: format!("camera: four corners, {tilt_deg} degrees from straight above"),
         input: format!(
-            "{views} simulated views, corners to {CORNER_NOISE_PX} px, lens and tape measure with their typical uncertainty"
+            "{views} simulated views, corner noise {CORNER_NOISE_PX} px, lens and tape measure with typical \
+             uncertainty"
         ),
         error: "focal length, median error, %".into(),
         cost: "CPU microseconds per photo".into(),
-        reference: "the cameras that the views were drawn with (closed form)".into(),
+        reference: "the cameras of the simulated views (closed form)".into(),
         points: points(tilt_deg, views),
-        why: "The whole refinement is the default at every quality: it alone reports its own uncertainty and tries every start, \
-              and it takes less than a hundredth of the time that rendering a picture does."
+        why: "Full refinement is the default at every quality: only it reports its uncertainty and tries every \
+              starting point, and it takes less than a hundredth of the time of rendering a picture."
             .into(),
         ..Diagram::default()
     }

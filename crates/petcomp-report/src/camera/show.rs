@@ -50,7 +50,7 @@ pub(super) fn markdown(rows: &[CameraRow]) -> String {
 
 fn markdown_table(rows: &[CameraRow]) -> String {
     let (lens, noise_px) = (rows[0].lens.name(), rows[0].noise_px);
-    let head = format!("\n## {lens} camera, corners to {noise_px} px\n\n");
+    let head = format!("\n## {lens} camera, corner noise {noise_px} px\n\n");
     head + &method_table(rows).markdown()
 }
 
@@ -94,7 +94,7 @@ pub(super) fn charts(rows: &[CameraRow]) -> [(&'static str, String); 3] {
     };
     let height = TiltChart {
         rows,
-        title: "50 mm up, median error, px",
+        title: "50 mm above the surface, median error, px",
         error: |row| row.height_px[0],
     };
     let time = TIMED_TILTS_DEG.map(|tilt_deg| time_chart(rows, tilt_deg));
@@ -122,7 +122,7 @@ impl TiltChart<'_> {
     fn chart(&self, noise_px: f64) -> Chart {
         let errors = self.rows.iter().map(self.error);
         Chart {
-            title: format!("corners to {noise_px} px"),
+            title: format!("corner noise {noise_px} px"),
             names: SolveMethod::ALL.map(SolveMethod::name).into(),
             across: Axis {
                 title: "tilt, degrees".into(),
@@ -154,7 +154,7 @@ fn time_chart(rows: &[CameraRow], tilt_deg: f64) -> Chart {
     Chart {
         title: format!("tilt {tilt_deg} degrees: closed form, 1 to 5 steps, full, joint"),
         names: NOISES_PX
-            .map(|noise| format!("corners to {noise} px"))
+            .map(|noise| format!("corner noise {noise} px"))
             .into(),
         across: Axis::over_decades("run time per photo, microseconds", times),
         up: Axis::over_decades(FOCAL_ERROR, errors),

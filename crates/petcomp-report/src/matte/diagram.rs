@@ -14,17 +14,17 @@ const SECONDS_PER_MS: f64 = 1e-3;
 pub(crate) fn diagrams(truth: Option<&Path>) -> Result<Vec<Diagram>> {
     let (rows, input, source) = if let Some(truth) = truth {
         let rows = measure(truth, |_, _| ())?;
-        (rows, KNOWN_INPUT, "what the photos' renderer knows")
+        (rows, KNOWN_INPUT, "ground truth of the photos' renderer")
     } else {
         let rows = measure_known(made::PHOTO_COUNT, |i| Ok(made::photo(i)), |_, _| ())?;
-        (rows, MADE_INPUT, "the formula that the photos are made by")
+        (rows, MADE_INPUT, "the formula that generates the photos")
     };
     let photos = rows.len() / MattingMethod::ALL.len();
     let input = format!("{photos} {input}");
     Ok(summary_diagrams(&summaries(&rows), &input, source))
 }
 
-const MADE_INPUT: &str = "photos of see-through bottles made in code, 600 x 320";
+const MADE_INPUT: &str = "synthetic photos of see-through bottles, 600 x 320";
 const KNOWN_INPUT: &str = "photos with known mattes";
 
 fn summary_diagrams(summaries: &[MethodSummary], input: &str, source: &str) -> Vec<Diagram> {

@@ -71,7 +71,7 @@ fn input_of(photos: usize) -> String {
         1 => "1 photo of a see-through bottle".into(),
         _ => format!("{photos} photos of see-through bottles"),
     };
-    format!("{photos} on an uneven screen with noise, made in code")
+    format!("{photos} on an uneven screen with noise, synthetic")
 }
 
 /// Searches of all sizes in `count` photos of one size.
@@ -167,9 +167,10 @@ fn search_diagram(
         reference: "the bottles' outline (closed form)".into(),
         points: found.iter().map(|search| search.point(error)).collect(),
         inputs: true,
-        why: "However large a photo is, its outline is moved to where the photo itself changes, so that a search of 640 px \
-              is right to 0.2 % of the object; a box that is a few pixels off in a photo of 2400 is off by a fraction of one in a \
-              picture of 640 into which the object is put. Draft and reference move along the curve."
+        why: "Whatever the size of a photo, the outline is snapped to edges in the photo itself, so a search at 640 px \
+              is accurate to 0.2 % of the object; a box that is a few pixels off in a photo of 2400 px is off by a \
+              fraction of a pixel in a picture of 640 px that the object is composited into. Draft and reference move \
+              along the curve."
             .into(),
         ..Diagram::default()
     }

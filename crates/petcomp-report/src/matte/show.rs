@@ -63,7 +63,9 @@ pub(super) fn details(rows: &[MatteRow]) -> Table {
 /// Error against run time, a point per method: over backgrounds lit independently, and in the
 /// object's own shadow.
 pub(super) fn chart(summaries: &[MethodSummary]) -> String {
-    let lit = error_chart(summaries, "new background, lit by itself", |s| s.mae_lit);
+    let lit = error_chart(summaries, "new background, lit independently", |s| {
+        s.mae_lit
+    });
     let shaded = error_chart(summaries, "new background, shaded by the object", |s| {
         s.mae_shaded
     });

@@ -112,15 +112,15 @@ fn filter_points(scene: &GoldenScene, subsamples: usize, runs: usize) -> Result<
 }
 
 /// Scenes that need more samples.
-const EDGE_NOTE: &str = "Cards of the scenes that are no piles are bare rectangles, whose edges want more samples of a pixel than \
-    cut-outs do, which end in their own soft alpha.";
+const EDGE_NOTE: &str = "Cards in scenes other than piles are bare rectangles, whose edges need more samples per pixel \
+    than those of cut-outs, which have a soft alpha of their own.";
 
 /// Properties shared by all diagrams.
 fn golden_diagram(points: Vec<Point>) -> Diagram {
     Diagram {
         error: "RMS error, scene-linear".into(),
         cost: "CPU seconds per megapixel".into(),
-        reference: "Blender 3.4.1 Cycles, 2048 samples or more a pixel (golden/render)".into(),
+        reference: "Blender 3.4.1 Cycles, 2048 or more samples per pixel (golden/render)".into(),
         points,
         limit: invisible_error(),
         ..Diagram::default()
@@ -167,12 +167,10 @@ fn render_settings() -> Vec<RenderSetting> {
     presets
         .into_iter()
         .chain(PIXEL_SAMPLES.map(|n| {
-            RenderSetting::changed("samples of a pixel", square_name(n), |o| o.subsamples = n)
+            RenderSetting::changed("samples per pixel", square_name(n), |o| o.subsamples = n)
         }))
         .chain(LIGHT_SAMPLES.map(|n| {
-            RenderSetting::changed("samples of a light", square_name(n), |o| {
-                o.light_samples = n
-            })
+            RenderSetting::changed("samples per light", square_name(n), |o| o.light_samples = n)
         }))
         .chain(SKY_SAMPLES.map(|n| {
             RenderSetting::changed("directions of the sky", n.to_string(), |o| {

@@ -73,6 +73,7 @@ fn described(options: &RenderOptions) -> String {
         ..
     } = options;
     format!(
-        "{subsamples} x {subsamples} a pixel, {light_samples} x {light_samples} a light, {ambient_samples} of the sky, cells of {cell_px} px"
+        "{subsamples} x {subsamples} per pixel, {light_samples} x {light_samples} per light, {ambient_samples} for the \
+         sky, cells of {cell_px} px"
     )
 }

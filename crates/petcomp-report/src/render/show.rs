@@ -15,7 +15,7 @@ const TITLES: [&str; 9] = [
     "SSIM",
     "FLIP",
     "RMSE to quadrature",
-    "times less CPU than Cycles at that RMSE",
+    "times faster than Cycles at that RMSE",
 ];
 
 /// The measurements as a table.
@@ -142,7 +142,7 @@ pub(super) fn markdown(
     let ([w, h], scene) = (options.size(), options.scene.display());
     let mut text = format!("# Error of the renderer against run time\n\n{scene}, {w} x {h}\n\n");
     if rows.iter().all(RenderRow::is_petcomp) {
-        text += "Cycles' own curve is not there: `tests/benches/peers/render.py` makes it.\n\n";
+        text += "Cycles' curve is missing: `tests/benches/peers/render.py` generates it.\n\n";
     }
     text += &table(rows).markdown();
     if !golden.is_empty() {

@@ -47,14 +47,14 @@ const TIME_TERMS: [Term; 6] = [
 /// Textures of cards are held with a border, and light with the cards above it that overlap.
 const MEMORY_TERMS: [Term; 5] = [
     ("process", |_| 1.0),
-    ("megapixel in hand", |p| in_hand(p, p.case.megapixels())),
-    ("megapixel of a layer in hand", |p| {
+    ("megapixel in progress", |p| in_hand(p, p.case.megapixels())),
+    ("megapixel of a layer in progress", |p| {
         in_hand(p, p.case.megapixels() * p.layers)
     }),
-    ("1000 px of card sides in hand", |p| {
+    ("1000 px of card sides in progress", |p| {
         in_hand(p, card_sides(p))
     }),
-    ("pair of cards that overlap in hand", |p| {
+    ("pair of cards that overlap in progress", |p| {
         in_hand(p, p.case.cards as f64 * p.layers)
     }),
 ];

@@ -219,40 +219,40 @@ impl RecipeRecord {
         let hours = FORECAST_PICTURES / SECONDS_PER_HOUR;
         let lines = [
             [
-                format!("CPU ms a picture, of the first {first}"),
+                format!("CPU ms per picture, first {first}"),
                 beginning.words(MS_PER_SECOND),
             ],
             [
-                format!("CPU ms a picture, of all {last}"),
+                format!("CPU ms per picture, all {last}"),
                 all.words(MS_PER_SECOND),
             ],
             [
-                format!("CPU hours of all, forecast from the first {first}"),
+                format!("core-hours for all, forecast from the first {first}"),
                 beginning.words(pictures / SECONDS_PER_HOUR),
             ],
             [
-                "CPU hours of all, measured".into(),
+                "core-hours for all, measured".into(),
                 format!("{:.4}", all.value * pictures / SECONDS_PER_HOUR),
             ],
-            ["CPU hours of a million".into(), all.words(hours)],
+            ["core-hours per million".into(), all.words(hours)],
             [
-                "KB a picture, all files".into(),
+                "KB per picture, all files".into(),
                 format!("{:.1}", self.bytes / pictures / 1e3),
             ],
             ["files".into(), self.files.to_string()],
             [
-                "GB of a million".into(),
+                "GB per million".into(),
                 format!(
                     "{:.1}",
                     self.bytes / pictures * FORECAST_PICTURES * GB_PER_BYTE
                 ),
             ],
             [
-                "most memory, MB".into(),
+                "peak memory, MB".into(),
                 format!("{:.0}", self.peak_bytes() * MB_PER_BYTE),
             ],
             [
-                "memory, KB more each 1,000 pictures".into(),
+                "memory growth, KB per 1,000 pictures".into(),
                 slope.words(1.0),
             ],
             [
@@ -260,7 +260,7 @@ impl RecipeRecord {
                 many.words(MB_PER_BYTE),
             ],
         ];
-        Ok(table_from(["of the recipe", "with 95 % interval"], lines))
+        Ok(table_from(["of the recipe", "with 95 % CI"], lines))
     }
 
     /// Memory and CPU time by pictures done.
@@ -278,7 +278,7 @@ impl RecipeRecord {
         };
         Chart::row(&[
             chart("memory", "resident MB", |s| s.resident_bytes * MB_PER_BYTE),
-            chart("processor time", "CPU seconds", |s| s.cpu_seconds),
+            chart("CPU time", "CPU seconds", |s| s.cpu_seconds),
         ])
     }
 }

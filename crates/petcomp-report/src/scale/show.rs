@@ -44,12 +44,14 @@ const POINT_COLUMNS: [Column<ModelledPoint>; 13] = [
     ("Mpx", |m| format!("{:.2}", m.point.case.megapixels())),
     ("cards", |m| m.point.case.cards.to_string()),
     ("layers", |m| format!("{:.3}", m.point.layers)),
-    ("CPU s a picture", |m| format!("{:.4}", m.point.cpu_seconds)),
+    ("CPU s per picture", |m| {
+        format!("{:.4}", m.point.cpu_seconds)
+    }),
     ("model", |m| format!("{:.4}", m.seconds)),
     ("residual %", |m| {
         m.time.map_or(String::new(), |[seen, _]| percent(seen))
     }),
-    ("unseen %", |m| {
+    ("held-out %", |m| {
         m.time.map_or(String::new(), |[_, unseen]| percent(unseen))
     }),
     ("pictures/s", |m| format!("{:.2}", m.point.rate)),
@@ -114,7 +116,7 @@ fn price_lines(fit: &CostFit, cost: &str, words: fn(f64) -> String) -> Vec<[Stri
 
 fn spread_line(fit: &CostFit, cost: &str) -> [String; 3] {
     [
-        "nine in ten points that the fit has not seen".into(),
+        "nine in ten held-out points".into(),
         format!("within {:.0} %", 100.0 * fit.spread()),
         cost.to_owned(),
     ]
@@ -123,9 +125,9 @@ fn spread_line(fit: &CostFit, cost: &str) -> [String; 3] {
 const THREAD_TITLES: [&str; 6] = [
     "threads",
     "pictures/s",
-    "times one thread",
+    "speed-up",
     "efficiency %",
-    "CPU s a picture",
+    "CPU s per picture",
     "peak MB",
 ];
 
@@ -153,7 +155,10 @@ fn falls_table(measured: &ScaleMeasurements) -> Table {
         .falls
         .iter()
         .map(|(cards, seconds)| [cards.to_string(), format!("{:.1}", MS_PER_SECOND * seconds)]);
-    table_from(["cards that fall together", "CPU ms until they lie"], lines)
+    table_from(
+        ["cards that fall together", "CPU ms until they are at rest"],
+        lines,
+    )
 }
 
 fn forecast_table(forecast: &Forecast) -> Table {
@@ -168,8 +173,11 @@ fn picture_lines(forecast: &Forecast) -> Vec<[String; 2]> {
     let fall_ms = MS_PER_SECOND * forecast.fall_seconds;
     vec![
         ["picture".into(), format!("{image}, {cards} cards")],
-        ["CPU ms a picture".into(), interval_words(ms, 1)],
-        ["CPU ms until its cards lie".into(), format!("{fall_ms:.1}")],
+        ["CPU ms per picture".into(), interval_words(ms, 1)],
+        [
+            "CPU ms until its cards are at rest".into(),
+            format!("{fall_ms:.1}"),
+        ],
     ]
 }
 
@@ -180,7 +188,7 @@ fn machine_lines(forecast: &Forecast) -> Vec<[String; 2]> {
             format!("efficiency of {cores} threads"),
             format!("{:.0} %", 100.0 * forecast.efficiency),
         ],
-        ["core hours".into(), interval_words(forecast.core_hours, 0)],
+        ["core-hours".into(), interval_words(forecast.core_hours, 0)],
     ];
     lines.extend(MACHINES.map(|machines| hours_line(forecast, machines)));
     lines.push([
@@ -213,8 +221,10 @@ pub(crate) fn charts(measured: &ScaleMeasurements) -> Result<Vec<(String, String
         time_chart(CARD_COUNT, &cards, &model),
     ];
     Ok(vec![
-        (Chart::row(&machine), "Left: every thread makes a picture of its own; the model is as many times one thread. Right: one picture in hand.".into()),
-        (Chart::row(&time), "One thread: rendered, labelled, encoded, written; cards lie already. By pixels with 12 cards, by cards at 640 x 480.".into()),
+        (Chart::row(&machine), "Left: every thread renders a picture of its own; the model is one thread times their \
+                                number. Right: one picture at a time.".into()),
+        (Chart::row(&time), "One thread: rendered, labelled, encoded, written; cards already at rest. By pixels with \
+                             12 cards, by cards at 640 x 480.".into()),
     ])
 }
 
@@ -248,7 +258,7 @@ fn rate_chart(measured: &ScaleMeasurements) -> Chart {
         curve_of(&points, THREAD_COUNT, |p| p.rate),
         curve_of(&points, THREAD_COUNT, |p| one * p.case.threads as f64),
     ];
-    model_chart("pictures a second", THREAD_COUNT.0, curves)
+    model_chart("pictures per second", THREAD_COUNT.0, curves)
 }
 
 fn memory_chart(points: &[&ScalePoint], model: &CostModel) -> Chart {
@@ -264,7 +274,7 @@ fn time_chart(along: Along, points: &[&ScalePoint], model: &CostModel) -> Chart 
         curve_of(points, along, |p| p.cpu_seconds),
         curve_of(points, along, |p| model.seconds(p)),
     ];
-    model_chart("CPU s a picture", along.0, curves)
+    model_chart("CPU s per picture", along.0, curves)
 }
 
 fn curve_of(points: &[&ScalePoint], (_, x): Along, y: impl Fn(&ScalePoint) -> f64) -> Curve {

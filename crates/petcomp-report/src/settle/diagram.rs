@@ -33,7 +33,7 @@ fn overlap_diagram(rows: &[SettleRow]) -> Diagram {
         title: "settle: overlap at rest".into(),
         error: "worst overlap, mm".into(),
         reference: "separating-axis test, independent of the engine".into(),
-        limit: Some((max_overlap_mm(), "more is refused".into())),
+        limit: Some((max_overlap_mm(), "more is rejected".into())),
         why: why_default(rows),
         ..base_diagram(rows, |row| row.overlap_mm[1])
     }
@@ -45,13 +45,13 @@ fn energy_diagram(rows: &[SettleRow]) -> Diagram {
         title: "settle: spurious energy".into(),
         error: "worst energy rise, %".into(),
         reference: "conservation of energy (closed form)".into(),
-        limit: Some((max_energy_percent(), "more is refused".into())),
+        limit: Some((max_energy_percent(), "more is rejected".into())),
         ..base_diagram(rows, |row| row.energy_percent[1])
     }
 }
 
 fn stack_diagram(rows: &[SettleRow]) -> Diagram {
-    let why_limit = "what is accepted of overlaps".into();
+    let why_limit = "accepted overlap".into();
     Diagram {
         file: "settle_stack".into(),
         title: "settle: height of a stack".into(),
@@ -128,9 +128,9 @@ fn why_default(rows: &[SettleRow]) -> String {
     };
     let judged = if default.is_right() { "is" } else { "is NOT" };
     format!(
-        "A setting is right where every heap comes to rest at the first attempt, all three errors are under their limits, and \
-         plates slide on slopes as the closed form says: {} of {} are, and the default {judged} one of them. The cheapest of them is \
-         1/{} s with {} iterations, at {} of the default's cost.",
+        "A setting is right if every heap comes to rest at the first attempt, all three errors are below their limits, \
+         and plates slide on slopes as in the closed form: {} of {} are, and the default {judged} one of them. The \
+         cheapest of them is 1/{} s with {} iterations, at {} of the default's cost.",
         right.len(),
         rows.len(),
         best.rate,
