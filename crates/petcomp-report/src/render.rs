@@ -306,8 +306,7 @@ mod tests {
         );
         let text = io::read_text(folder.path().join("render.md")).unwrap();
         assert!(
-            text.contains("Cycles' curve is missing")
-                && folder.path().join("render.svg").exists()
+            text.contains("Cycles' curve is missing") && folder.path().join("render.svg").exists()
         );
     }
 }

@@ -17,32 +17,31 @@ pub(super) fn cases() -> Result<Vec<HardCase>> {
         HardCase::new(
             "tilted by 0.01 degrees",
             format!("exact corners of {VIEW_COUNT} views"),
-            "corners met to 1e-6 px, sound numbers",
+            "reprojection error at most 1e-6 px, valid numbers",
             solve_nearly_level_views,
         ),
         HardCase::new(
-            "no perspective, nothing known",
-            "a rectangle tilted by 30 degrees as seen from infinitely far",
-            "focal length at its bound of 100 widths and reported as such; tilt 30 degrees to 0.1",
+            "no perspective, no priors",
+            "a rectangle tilted by 30 degrees seen from infinitely far away",
+            "focal length at its bound of 100 widths, reported as unbounded; tilt 30 degrees to 0.1",
             solve_without_perspective,
         ),
         HardCase::new(
             "no perspective, the default prior of the lens",
             "the same corners",
-            "an answer that is not reported as unbounded, sound numbers",
+            "a solution that is not reported as unbounded, valid numbers",
             solve_with_priors,
         ),
         HardCase::new(
-            "perspective the wrong way round",
-            "corners that no camera can have seen of a rectangle: the square of its focal length \
-             is negative",
-            "a camera with sound numbers that reports how far off it is, or an error",
+            "reversed perspective",
+            "corners that are no image of a rectangle: the square of the focal length is negative",
+            "a camera with valid numbers that reports its error, or an error message",
             solve_inverse_perspective,
         ),
         HardCase::new(
             "corners in any order",
-            "the same four corners, criss-cross and the other way round",
-            "one camera: centres 1e-9 m apart",
+            "the same four corners, crossed and in reverse order",
+            "the same camera: centres at most 1e-9 m apart",
             solve_in_any_order,
         ),
     ]);
@@ -105,7 +104,7 @@ fn grazing_view(degrees: f64) -> HardCase {
     HardCase::new(
         format!("tilted by {degrees} degrees"),
         "exact corners of a 0.6 x 0.4 m rectangle, nothing else known",
-        "focal length back to 1e-7, with a warning that the view is grazing",
+        "focal length recovered to 1e-7, with a warning that the view is grazing",
         move || solve_grazing_view(degrees),
     )
 }
@@ -159,7 +158,7 @@ fn extreme_cameras() -> Vec<HardCase> {
     vec![
         focal_recovery("a short lens, 0.4 of the width", short, 1e-9),
         focal_recovery("a long lens, 12 times the width", long, 2e-5),
-        focal_recovery("sides of 1 to 900", of_size([0.9, 0.001]), 2e-5),
+        focal_recovery("aspect ratio of 1 to 900", of_size([0.9, 0.001]), 2e-5),
         focal_recovery("a picture of 64 x 48", small_image, 1e-9),
     ]
 }
@@ -169,7 +168,7 @@ fn extreme_cameras() -> Vec<HardCase> {
 fn focal_recovery(name: &str, scenario: Scenario, limit: f64) -> HardCase {
     let input = format!("exact corners of {VIEW_COUNT} views at 25 degrees");
     let expectation =
-        format!("focal length back to {limit:e}, or two corners reported as coincident");
+        format!("focal length recovered to {limit:e}, or two corners reported as coincident");
     HardCase::new(name, input, expectation, move || {
         recover_focal_lengths(&scenario, limit)
     })
@@ -352,7 +351,7 @@ fn invalid_labels() -> Vec<HardCase> {
         }),
         refused_width("rectangle without width", "0 m", 0.0),
         refused_width("rectangle of negative width", "-0.6 m", -0.6),
-        refused_width("rectangle of 1250 to 1", "ratio of at most 1000", 500.0),
+        refused_width("aspect ratio of 1250 to 1", "ratio of at most 1000", 500.0),
         refused("focal length of 0", "camera.focal_px: 0", |label| {
             label.camera.focal_px = Some(0.0)
         }),

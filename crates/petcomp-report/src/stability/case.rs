@@ -54,7 +54,7 @@ impl HardCase {
         cause: &'static str,
         attempt: impl Fn() -> Result<T> + Send + Sync + 'static,
     ) -> Self {
-        let expectation = format!("refused, by \"{cause}\"");
+        let expectation = format!("rejected with \"{cause}\"");
         Self::new(name, input, expectation, move || {
             Ok(Outcome::refused(attempt(), cause))
         })
@@ -143,7 +143,7 @@ impl Outcome {
             return Self::failed("no error");
         };
         let message = error.to_string();
-        Self::new(format!("refused: {message}"), message.contains(cause))
+        Self::new(format!("rejected: {message}"), message.contains(cause))
     }
 }
 

@@ -18,13 +18,13 @@ fn layers_and_shares() -> Vec<HardCase> {
     vec![
         stacked_films(),
         HardCase::new(
-            "10 000 pixels of alpha 1/255 over each other",
+            "10 000 layers of alpha 1/255",
             "white",
             "alpha 1 and light 1, to 1e-4, never above 1",
             || Ok(stack_pixels()),
         ),
         HardCase::new(
-            "scene with everything off",
+            "scene with everything switched off",
             "a plate; no card, light, ambient, environment, finish",
             "the plate's bits in every pixel, no shadow, no label: 0 differ",
             composite_with_everything_off,
@@ -36,21 +36,21 @@ fn layers_and_shares() -> Vec<HardCase> {
             composite_empty_shot,
         ),
         HardCase::new(
-            "shares that add up to a little over 1",
-            "300 objects that hide 1/300 of a pixel each, each rounded up, over a plate of 1e5",
-            "nothing of the plate passes: 0, not below",
+            "shares with a sum slightly above 1",
+            "300 objects that each hide 1/300 of a pixel, rounded up, over a plate of 1e5",
+            "nothing of the plate is visible: 0, not negative",
             composite_shares_rounded_up,
         ),
         HardCase::new(
-            "1e5 beside 1e-4",
+            "1e5 next to 1e-4",
             "two opaque cards in neighbouring pixels, over a plate of 1e5",
-            "1e-4 keeps its bits",
+            "1e-4 is bit-identical",
             composite_bright_beside_dim,
         ),
         HardCase::new(
             "plate with one pixel of NaN",
             "64 x 48 pixels, no card",
-            "no more than that pixel is NaN: 1",
+            "only that pixel is NaN: 1",
             composite_broken_plate,
         ),
     ]
@@ -63,8 +63,7 @@ fn finishes() -> [HardCase; 4] {
         HardCase::new(
             "finish: sharpening a pixel of 1e5 among 1e-4",
             "an amount of 2",
-            "every value in 0..3e5, and 1e-4 kept (to 1e-6) where the window of 4 pixels does not \
-             reach",
+            "every value in 0..3e5, and 1e-4 unchanged (to 1e-6) beyond the window of 4 pixels",
             || Ok(sharpen_spot()),
         ),
         HardCase::new(
@@ -83,9 +82,11 @@ fn default_shot() -> Shot {
 fn stacked_films() -> HardCase {
     let expected = libm::pow(0.97, 200.0);
     HardCase::new(
-        "200 films over each other",
-        "transmittance 0.97 each, light 0.03, so that they tend to white",
-        format!("0.97^200 = {expected:.6} passes and 1 minus that is the light: to 200 roundings"),
+        "200 layers of film",
+        "transmittance 0.97 and light 0.03 each, so that they converge to white",
+        format!(
+            "0.97^200 = {expected:.6} is transmitted, and 1 minus that is the light: to 200 roundings"
+        ),
         move || Ok(stack_films(expected)),
     )
 }
@@ -192,7 +193,7 @@ fn exposed(ev: f64) -> HardCase {
     HardCase::new(
         format!("finish: exposure of {ev} EV"),
         "pixels of 0, 1e-4 and 1",
-        "black stays 0, order stays, nothing is NaN",
+        "black stays 0, the order is preserved, nothing is NaN",
         move || Ok(expose(ev)),
     )
 }

@@ -38,13 +38,13 @@ fn written_pictures() -> Vec<HardCase> {
         HardCase::new(
             "dataset of empty scenes",
             "5 pictures without an object, as YOLO, COCO and VOC",
-            "no label, no fault: 0",
+            "no labels, no faults: 0",
             generate_empty_pictures,
         ),
         HardCase::new(
             "300 objects in one pixel",
-            "equal boxes of equal class, all labelled",
-            "YOLO's equal rows are one; no fault",
+            "equal boxes of the same class, all labelled",
+            "one row for YOLO's equal rows; no faults",
             generate_crowded_pictures,
         ),
         HardCase::new(
@@ -68,15 +68,15 @@ fn written_pictures() -> Vec<HardCase> {
 fn runs() -> Vec<HardCase> {
     vec![
         HardCase::new(
-            "journal cut off in the middle of a line",
+            "journal truncated in the middle of a line",
             "10 pictures; the run continues",
-            "only the picture of that line is made again: 1; then no fault",
+            "only the picture of that line is regenerated: 1; then no faults",
             resume_with_cut_journal,
         ),
         HardCase::new(
-            "a picture lost, another cut off",
+            "one picture missing, another truncated",
             "10 pictures; the folder is repaired, and the run continues",
-            "8 are good, 2 are made again; then no fault",
+            "8 are intact, 2 are regenerated; then no faults",
             resume_after_repair,
         ),
         HardCase::refused(
@@ -96,19 +96,19 @@ fn splits() -> Vec<HardCase> {
         HardCase::new(
             "the largest index",
             "picture 2^64 - 1 of 2^64 - 1",
-            "a part, without overflow",
+            "assigned to a split, without overflow",
             split_last_index,
         ),
         HardCase::new(
             "more shards than pictures",
             "10 pictures on 1000 machines",
-            "each picture on exactly one: 10",
+            "each picture in exactly one shard: 10",
             contain_in_shards,
         ),
         HardCase::new(
             "shard 0, shard 5 of 4, shard 1 of 0",
             "as --shard",
-            "refused: 3",
+            "rejected: 3",
             make_invalid_shards,
         ),
     ]
@@ -117,15 +117,15 @@ fn splits() -> Vec<HardCase> {
 fn draws() -> Vec<HardCase> {
     vec![
         HardCase::new(
-            "recipe of empty scenes alone",
+            "recipe with only empty scenes",
             "negatives = 1, and objects = 0, 20 scenes of each, without a catalog",
-            "no object in any: 0",
+            "no object in any scene: 0",
             draw_empty_scenes,
         ),
         HardCase::new(
-            "seeds and numbers at their ends",
+            "seeds and numbers at the ends of their ranges",
             "seeds 0, 1 and 2^64 - 1, scenes 0, 1 and 2^64 - 1",
-            "nine different scenes, each the same when it is drawn again",
+            "nine different scenes, each the same when drawn again",
             compare_draws,
         ),
     ]
@@ -306,7 +306,7 @@ fn resume_with_cut_journal() -> Result<Outcome> {
     let again = dataset.generate_missing(with_a_card)?;
     let faults = dataset.faults()?.len();
     Ok(Outcome::new(
-        format!("{again} made, {faults} faults"),
+        format!("{again} generated, {faults} faults"),
         again == 1 && faults == 0,
     ))
 }
@@ -320,7 +320,7 @@ fn resume_after_repair() -> Result<Outcome> {
     let again = dataset.generate_missing(with_a_card)?;
     let faults = dataset.faults()?.len();
     Ok(Outcome::new(
-        format!("{good} good, {lost} lost, {again} made, {faults} faults"),
+        format!("{good} intact, {lost} lost, {again} generated, {faults} faults"),
         (good, lost, again, faults) == (8, 2, 2, 0),
     ))
 }
@@ -338,7 +338,7 @@ fn split_counts(percent: u8) -> HardCase {
     HardCase::new(
         format!("{percent} % for validation"),
         "1000 pictures, interleaved and consecutive",
-        format!("{expected} for validation, either way"),
+        format!("{expected} for validation in both orders"),
         move || count_splits(percent, expected),
     )
 }

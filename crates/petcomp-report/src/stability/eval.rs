@@ -22,25 +22,24 @@ pub(super) fn cases() -> Result<Vec<HardCase>> {
         HardCase::new(
             "coco: 100 000 boxes in one image",
             "all found; COCO looks at 100 detections",
-            "recall 0.001, so that 1 of 101 readings (at recall 0) finds precision 1: 1/101, to \
-             1e-9",
+            "recall 0.001, so that 1 of 101 samples (at recall 0) has precision 1: 1/101, to 1e-9",
             score_crowded_image,
         ),
         HardCase::new(
             "yolov5: 2000 boxes in one image",
-            "all found, all of one confidence",
+            "all found, all with the same confidence",
             format!("mAP {PERFECT_YOLO}, to 1e-9"),
             score_one_image,
         ),
         HardCase::new(
             "coco: equal confidences, half of them wrong",
-            "100 found rightly, then 100 where nothing is, all of 0.5",
-            "equal ones keep their order, the right ones first: mAP 1, to 1e-9",
+            "100 true positives, then 100 false positives, all with confidence 0.5",
+            "equal ones keep their order, the true ones first: mAP 1, to 1e-9",
             score_half_right,
         ),
         HardCase::new(
             "interval of no images",
-            "a bootstrap of 100 rounds over nothing",
+            "a bootstrap of 100 rounds without images",
             "0 from 0 to 0; no curve",
             score_no_images,
         ),
@@ -53,7 +52,7 @@ pub(super) fn cases() -> Result<Vec<HardCase>> {
         HardCase::new(
             "overlap of boxes of 1e150 pixels",
             "one half of the other; areas of 1e300",
-            "intersection over union 1/2, to 1e-12; of infinite ones a number, not NaN",
+            "intersection over union 1/2, to 1e-12; for infinite ones a number, not NaN",
             overlap_huge_boxes,
         ),
     ]);
@@ -108,7 +107,7 @@ const WITHOUT_MATCHES: [Input; 4] = [
     }),
     (
         "boxes without area",
-        "points found where points are",
+        "points detected at the true points",
         image_of_points,
     ),
 ];
@@ -116,12 +115,14 @@ const WITHOUT_MATCHES: [Input; 4] = [
 const ALL_FOUND: [Input; 6] = [
     (
         "equal confidences",
-        "100 boxes, all found, all of 0.5",
+        "100 boxes, all found, all with 0.5",
         || vec![grid_image(100, 100, equal_confidence)],
     ),
-    ("confidences of 0", "100 boxes, all found, all of 0", || {
-        vec![grid_image(100, 100, |_| 0.0)]
-    }),
+    (
+        "confidences of 0",
+        "100 boxes, all found, all with 0",
+        || vec![grid_image(100, 100, |_| 0.0)],
+    ),
     ("confidences of 1e-300", "100 boxes, all found", || {
         vec![grid_image(100, 100, |i| 1e-300 * (i + 1) as f64)]
     }),
@@ -130,7 +131,7 @@ const ALL_FOUND: [Input; 6] = [
     }),
     (
         "a detection twice",
-        "1 box, named twice",
+        "1 box, detected twice",
         image_with_duplicate,
     ),
     ("100 000 boxes in 1000 images", "all found", || {
@@ -250,7 +251,7 @@ fn overlap_huge_boxes() -> Result<Outcome> {
     let [whole, half, endless] = [1e150, 0.5e150, f64::INFINITY].map(box_of_width);
     let (of_half, of_endless) = (iou(&whole, &half), iou(&endless, &endless));
     Ok(Outcome::new(
-        format!("{of_half}, of infinite ones {of_endless}"),
+        format!("{of_half}, for infinite ones {of_endless}"),
         (of_half - 0.5).abs() < 1e-12 && !of_endless.is_nan(),
     ))
 }

@@ -28,15 +28,14 @@ fn values_at_the_ends() -> [HardCase; 3] {
     [
         HardCase::new(
             "half-float channels above 65504",
-            "1e5 and -1e5 in a channel of its own, as cut-outs have",
+            "1e5 and -1e5 in a separate channel, as in cut-outs",
             "65504 and -65504",
             write_half_channels,
         ),
         HardCase::new(
-            "float samples at the ends of their range",
-            "the smallest denormal, the smallest normal, 1e-4 beside 1e5, the largest, in EXR and \
-             TIFF",
-            "every bit comes back: 0 differ",
+            "float samples at the ends of the range",
+            "the smallest denormal, the smallest normal, 1e-4 next to 1e5, the largest, in EXR and TIFF",
+            "bit-identical: 0 differ",
             || {
                 let differ = count_changed_floats("a.exr")? + count_changed_floats("a.tif")?;
                 Ok(Outcome::none(differ, "differ"))
@@ -57,8 +56,7 @@ fn large_and_endless() -> [HardCase; 3] {
             "16k image",
             "a matte of 16384 x 16384 pixels to an 8-bit PNG and back",
             format!(
-                "refused by Limits::pixels (128 Mi) until that is raised, then the same; at most \
-                 {SIXTEEN_K_GIB} GiB"
+                "rejected by Limits::pixels (128 Mi) until that is raised, then identical; at most {SIXTEEN_K_GIB} GiB"
             ),
             write_sixteen_k,
         )
@@ -66,7 +64,7 @@ fn large_and_endless() -> [HardCase; 3] {
         HardCase::new(
             "document of 100 000 brackets",
             "[[[[...",
-            "refused, not a stack overflow",
+            "rejected, without a stack overflow",
             || {
                 let brackets = "[".repeat(100_000);
                 read_document::<serde_json::Value>(&brackets, "nested deeper")
@@ -75,7 +73,7 @@ fn large_and_endless() -> [HardCase; 3] {
         HardCase::new(
             "document with the number 1e999",
             "[1e999]",
-            "refused, not infinity",
+            "rejected, not read as infinity",
             || read_document::<Vec<f64>>("[1e999]", "number out of range"),
         ),
     ]
@@ -169,7 +167,7 @@ fn one_pixel(format: &'static str) -> HardCase {
     HardCase::new(
         format!("{format}: one-pixel image"),
         "1 x 1 pixel of green 1/2",
-        "1 x 1 pixel back, to 1 code of 255",
+        "1 x 1 pixel read back, to 1 code of 255",
         move || write_one_pixel(format),
     )
 }
@@ -189,9 +187,9 @@ fn write_one_pixel(format: &str) -> Result<Outcome> {
 
 fn no_pixel(format: &'static str) -> HardCase {
     HardCase::new(
-        format!("{format}: no pixel"),
+        format!("{format}: no pixels"),
         "0 x 0 and 5 x 0 pixels",
-        "refused, and nothing is written",
+        "rejected, and nothing is written",
         move || write_no_pixel(format),
     )
 }
@@ -203,7 +201,7 @@ fn write_no_pixel(format: &str) -> Result<Outcome> {
         [(0, 0), (5, 0)].map(|(w, h)| io::write(&path, &Image::<LinearRgb>::new(w, h)).is_err());
     let is_written = path.exists();
     Ok(Outcome::new(
-        format!("{refused:?}, a file: {is_written}"),
+        format!("{refused:?}, file written: {is_written}"),
         refused == [true; 2] && !is_written,
     ))
 }
@@ -236,7 +234,7 @@ fn write_sixteen_k() -> Result<Outcome> {
     let (sound, peak) = memory::peak_gib(|| sixteen_k_through_file(&path));
     let ([refused, same], peak_gib) = (sound?, peak.unwrap_or(0.0));
     Ok(Outcome::new(
-        format!("refused at first: {refused}, then the same: {same}; {peak_gib:.1} GiB"),
+        format!("rejected at first: {refused}, then identical: {same}; {peak_gib:.1} GiB"),
         refused && same && peak_gib < SIXTEEN_K_GIB,
     ))
 }

@@ -14,18 +14,18 @@ pub(super) fn cases() -> Vec<HardCase> {
         HardCase::new(
             "keyer: object of the screen's colour",
             "64 x 64 pixels of the key, in all four profiles",
-            "nothing is left: matte and cut-out sum to 0",
+            "nothing is left: the sum of matte and cut-out is 0",
             key_screen_color,
         ),
         HardCase::new(
             "keyer: values of 1e-42 to 1e30, some negative",
-            "17 x 13 pixels, alphas of 0 to 1.5, all stages, all four profiles",
+            "17 x 13 pixels, alpha 0 to 1.5, all stages, all four profiles",
             "no NaN in matte or cut-out: 0",
             key_extreme_pixels,
         ),
         HardCase::new(
             "keyer: NaN and infinity, robust profile",
-            "9 x 9 pixels, one NaN, one of infinite alpha, a column of NaN in the garbage matte",
+            "9 x 9 pixels, one NaN, one with infinite alpha, a column of NaN in the garbage matte",
             "2 pixels and 9 mattes counted; matte in 0..1, cut-out finite",
             key_non_finite_pixels,
         ),
@@ -37,15 +37,15 @@ pub(super) fn cases() -> Vec<HardCase> {
             key_with_wide_windows,
         ),
         HardCase::new(
-            "keyer: no pixel",
+            "keyer: no pixels",
             "0 x 0, 0 x 5 and 5 x 0 pixels, all stages",
-            "a matte and a cut-out of no pixel: 0",
+            "a matte and a cut-out without pixels: 0",
             key_no_pixels,
         ),
         HardCase::new(
             "keyer: 12 megapixels",
             "4000 x 3000 pixels, a pattern that repeats every 64",
-            "the matte repeats, too, away from the border: 0 differ",
+            "the matte also repeats away from the border: 0 differ",
             key_twelve_megapixels,
         )
         .for_the_report(),
@@ -93,7 +93,7 @@ fn count_outside_unit_range(matte: &Image<Coverage>) -> usize {
 
 fn weak_screen(saturation: f32) -> HardCase {
     HardCase::new(
-        format!("keyer: grey screen, {saturation:e} of colour"),
+        format!("keyer: grey screen, saturation {saturation:e}"),
         "nearly grey pixels against it, in all four profiles",
         "every matte value in 0..1: 0 wrong",
         move || key_weak_screen(saturation),
@@ -118,7 +118,7 @@ fn nearly_grey_photo() -> Image<LinearRgb> {
 
 fn known_pixel(name: &str, value: [f32; 3], expected: f32) -> HardCase {
     let input = format!("{value:?} against {:?}", <[f32; 3]>::from(GREEN));
-    let expectation = format!("a matte of {expected}, as Blender 3.4.1 prints it, to 1e-7");
+    let expectation = format!("a matte of {expected}, as in Blender 3.4.1, to 1e-7");
     HardCase::new(name, input, expectation, move || {
         key_known_pixel(value, expected)
     })
@@ -186,7 +186,7 @@ fn key_non_finite_pixels() -> Result<Outcome> {
     let mattes = keyed.deviations.unusable_mattes;
     let is_sound = is_sound(&keyed);
     Ok(Outcome::new(
-        format!("{pixels} pixels, {mattes} mattes, sound: {is_sound}"),
+        format!("{pixels} pixels, {mattes} mattes, valid: {is_sound}"),
         (pixels, mattes, is_sound) == (2, 9, true),
     ))
 }

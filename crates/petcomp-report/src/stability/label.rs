@@ -24,20 +24,20 @@ fn small_objects() -> Vec<HardCase> {
         }),
         HardCase::new(
             "object of one pixel",
-            "pixel (3, 2) alone",
+            "only pixel (3, 2)",
             "box [3, 2] to [4, 3], area 1, fully visible",
             label_one_pixel,
         ),
         HardCase::new(
             "object of a hundredth of a pixel",
-            "a card of 1 x 1 mm where a pixel is 10 mm",
+            "a card of 1 x 1 mm at 10 mm per pixel",
             "below the threshold of 0.1 in every pixel: no label, 0",
             label_tiny_object,
         ),
         HardCase::new(
             "300 objects in one pixel",
-            "each opaque, each behind the one before it",
-            "300 labels of that pixel; the first is seen, the others are not; shares sum to 1",
+            "opaque, each behind the one before it",
+            "300 labels of that pixel; only the first is visible; the shares sum to 1",
             || Ok(label_many_in_a_pixel()),
         ),
     ]
@@ -48,13 +48,13 @@ fn covered_and_cut() -> Vec<HardCase> {
         HardCase::new(
             "object that is completely hidden",
             "an opaque card under a larger one",
-            "a label with its whole box, nothing of it visible, occluded by the other",
+            "a label with its whole box, visible share 0, occluded by the other card",
             label_hidden_object,
         ),
         HardCase::new(
             "object cut by the corner of the picture",
             "an opaque card of 20 x 20 px, its middle on the corner [64, 48]",
-            "box and outline within the picture: a quarter, 100 px to one row and column",
+            "box and outline inside the picture: a quarter, 100 px, to one row and column",
             label_cut_object,
         ),
         HardCase::new(
@@ -75,19 +75,19 @@ fn covered_and_cut() -> Vec<HardCase> {
 fn awkward_objects() -> Vec<HardCase> {
     vec![
         HardCase::new(
-            "objects out of sight",
+            "invisible objects",
             "a card edge-on, one behind the camera, one 3 m away",
             "no label: 0",
             label_out_of_sight,
         ),
         HardCase::new(
             "outline without an area",
-            "no corner, one, two, three on a line, one of NaN",
-            "the box of the mask all the same, no outline: 5 of 5",
+            "no corner, one, two, three collinear ones, one with NaN",
+            "still the box of the mask, no outline: 5 of 5",
             label_broken_outlines,
         ),
         HardCase::new(
-            "300 cards in a stack",
+            "stack of 300 cards",
             "equal opaque cards, each 1 mm above the one before",
             "299 covered, the last on top; visible pixels sum to those of one card",
             label_deep_stack,
@@ -95,14 +95,14 @@ fn awkward_objects() -> Vec<HardCase> {
         HardCase::new(
             "mask of 16384 x 16384 pixels",
             "every pixel of every other column",
-            "2^27 pixels, the whole box but the last column, in 16385 runs",
+            "2^27 pixels, the whole box except the last column, in 16385 runs",
             || Ok(count_mask_of_16k()),
         )
         .for_the_report(),
         HardCase::new(
             "coverage at the threshold",
             "a pixel covered by exactly 0.1, and one by the next number above it",
-            "a pixel belongs when it is covered by more: 0 and 1 labels",
+            "a pixel counts only above the threshold: 0 and 1 labels",
             label_at_the_threshold,
         ),
     ]
@@ -186,7 +186,7 @@ fn only_object(objects: &[ObjectLabel], is_right: impl Fn(&ObjectLabel) -> bool)
     let BBox { x0, y0, x1, y1 } = one.amodal_box;
     let (area, seen) = (one.amodal_mask.area(), one.visible_fraction);
     Outcome::new(
-        format!("[{x0}, {y0}] to [{x1}, {y1}], {area} px, seen {seen:.4}"),
+        format!("[{x0}, {y0}] to [{x1}, {y1}], {area} px, visible {seen:.4}"),
         is_right(one),
     )
 }
@@ -204,7 +204,7 @@ fn label_many_in_a_pixel() -> Outcome {
     let boxed = found.iter().filter(|o| is_boxed_rightly(o)).count();
     let labels = found.len();
     Outcome::new(
-        format!("{labels} labels, {boxed} boxed rightly, {seen} seen"),
+        format!("{labels} labels, {boxed} correct boxes, {seen} visible"),
         labels == CROWD_SIZE as usize && boxed == labels && seen == 1.0,
     )
 }

@@ -28,8 +28,8 @@ fn extreme_lamps() -> Vec<HardCase> {
     let mut cases: Vec<_> = shapes.into_iter().flat_map(lamps_of_shape).collect();
     cases.push(HardCase::new(
         "receiver in the middle of a light",
-        "a light of 1 x 1 m, the point its centre",
-        "finite: 0, since it shines away",
+        "a light of 1 x 1 m, the receiver at its centre",
+        "finite: 0, since it emits away from its plane",
         || {
             let found = received(&lamp([0.0; 3], 1.0, 10.0));
             Ok(Outcome::near(found, 0.0, 0.0, "W/m2"))
@@ -72,8 +72,8 @@ fn small_lamp(shape: LightShape, position: [f64; 3], side: f64, what: &str) -> H
     let expected = light.power * to.normalize().z / (PI * to.norm_squared());
     HardCase::new(
         lamp_case_name(shape, what),
-        "10 W turned to a level receiver",
-        format!("a point's irradiance P cos / (pi r^2) = {expected:.4e}, to 0.1 %"),
+        "10 W facing a level receiver",
+        format!("irradiance of a point light P cos / (pi r^2) = {expected:.4e}, to 0.1 %"),
         move || Ok(Outcome::ratio(received(&light), expected, 1e-3)),
     )
 }
@@ -84,22 +84,22 @@ fn wide_lamp(shape: LightShape, position: [f64; 3], side: f64, what: &str) -> Ha
     let expected = PI * f64::from(radiance(&light).g);
     HardCase::new(
         lamp_case_name(shape, what),
-        "10 W over a level receiver",
-        format!("that of a sky as bright, pi L = {expected:.4e}, to 1 %"),
+        "10 W above a level receiver",
+        format!("irradiance of an equally bright sky, pi L = {expected:.4e}, to 1 %"),
         move || Ok(Outcome::ratio(received(&light), expected, 0.01)),
     )
 }
 
 fn extreme_skies() -> Vec<HardCase> {
     vec![
-        even_sky("map all black", (16, 8), 0.0),
+        even_sky("entirely black map", (16, 8), 0.0),
         even_sky("map of one pixel of 1e5", (1, 1), 1e5),
         even_sky("map of the largest half float", (16, 8), 65504.0),
         even_sky("map of the smallest float", (16, 8), f32::MIN_POSITIVE),
         HardCase::new(
             "one texel of 1e5 among 1e-4",
-            "a map of 64 x 32, cut into 32 pieces, for receivers turned four ways",
-            "pieces sum to the irradiance of the whole map, to 1e-5",
+            "a map of 64 x 32, cut into 32 pieces, for receivers with four orientations",
+            "the sum over pieces is the irradiance of the whole map, to 1e-5",
             sum_pieces_of_sky,
         ),
     ]
@@ -133,7 +133,7 @@ fn even_sky(name: &str, (width, height): (usize, usize), radiance: f32) -> HardC
     HardCase::new(
         name,
         format!("{width} x {height} pixels"),
-        format!("pi L = {expected:.4e} on receivers turned any way, to 0.2 %"),
+        format!("pi L = {expected:.4e} on receivers with any orientation, to 0.2 %"),
         move || {
             sum_even_sky(
                 Image::filled(width, height, LinearRgb::grey(radiance)),
@@ -227,7 +227,7 @@ fn plates_to_expose() -> Vec<HardCase> {
 
 fn plates_to_match() -> Vec<HardCase> {
     [
-        ("surface all black", 0.0),
+        ("entirely black surface", 0.0),
         ("surface of NaN", f32::NAN),
         ("surface of grey 1e-30", 1e-30),
         ("surface of grey 1e30", 1e30),

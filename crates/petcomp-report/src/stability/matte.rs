@@ -35,17 +35,16 @@ enum ExpectedCutOut {
 impl ExpectedCutOut {
     fn description(self) -> String {
         let right = format!(
-            "outline right (IoU {GOOD_IOU}, box to {GOOD_BOX_PX} px of the picture that is \
-             searched)"
+            "outline right (IoU {GOOD_IOU}, box to {GOOD_BOX_PX} px of the searched picture)"
         );
         match self {
             Self::Right => format!(
-                "{right} and not flagged, matte of the bare screen below {MAX_RESIDUAL_MATTE}"
+                "{right} and not flagged, residual matte of the bare screen below {MAX_RESIDUAL_MATTE}"
             ),
             Self::RightOrFlagged => {
-                format!("{right}, or flagged, or refused; never silently wrong")
+                format!("{right}, or flagged, or rejected; never silently wrong")
             }
-            Self::Flagged(what) => format!("flagged, by \"{what}\""),
+            Self::Flagged(what) => format!("flagged with \"{what}\""),
         }
     }
 
@@ -65,7 +64,7 @@ impl ExpectedCutOut {
                 Ok(Outcome::new(measured, self.is_met(&cut, &found)))
             }
             (Err(error), Self::RightOrFlagged) => {
-                Ok(Outcome::new(format!("refused: {error}"), true))
+                Ok(Outcome::new(format!("rejected: {error}"), true))
             }
             (Err(error), _) => Err(error),
         }
@@ -128,7 +127,7 @@ fn ordinary_cut_outs() -> Vec<HardCase> {
         HardCase::new(
             "film on a grey screen",
             "the same photo",
-            "transmittance cannot be measured, and that is flagged",
+            "flagged, since transmittance cannot be measured",
             cut_out_film_on_grey,
         ),
         cut_out_case("cap of the screen's hue", RightOrFlagged, same_hue),
@@ -325,8 +324,8 @@ fn film_mattes() -> Vec<HardCase> {
         ),
         HardCase::new(
             "screen without background",
-            "no pixel of it to fit to",
-            "refused: there is not enough",
+            "no background pixel to fit to",
+            "rejected: not enough background",
             fit_without_background,
         ),
     ]);
@@ -371,7 +370,7 @@ fn flagged_film(
     } else {
         format!("; reported: \"{cause}\"")
     };
-    let expectation = format!("opacity in 0..1 and light finite in every pixel{reported}");
+    let expectation = format!("opacity in 0..1 and finite light in every pixel{reported}");
     HardCase::new(
         name,
         "neutral film on an even screen",
@@ -385,7 +384,7 @@ fn judge_soundness(found: &FilmMatte, cause: &str) -> Outcome {
     let messages: Vec<_> = found.diagnostics.iter().map(ToString::to_string).collect();
     let reported = joined(&messages, "nothing reported");
     let passed = unsound == 0 && reported.contains(cause);
-    Outcome::new(format!("{unsound} px unsound, {reported}"), passed)
+    Outcome::new(format!("{unsound} px invalid, {reported}"), passed)
 }
 
 /// A photo of one colour: transmittance is 0 where it is black, and 1 where it has the screen's
@@ -471,18 +470,17 @@ fn two_screens() -> Vec<HardCase> {
     vec![
         exact_screens("two screens, green and blue", [GREEN, BLUE]),
         exact_screens("two screens, one of them black", [GREEN, black]),
-        similar_screens("two screens that are the same", [GREEN, GREEN]),
+        similar_screens("two identical screens", [GREEN, GREEN]),
         similar_screens("two screens, both black", [black; 2]),
         HardCase::refused(
             "two photos clipped all over",
-            "film on green and blue, 100 times too bright: screens and photos are white",
+            "film on green and blue, 100 times too bright: screens and photos are clipped to white",
             "too similar",
             || triangulated([GREEN, BLUE], 100.0),
         ),
         HardCase::new(
             "two photos with a clipped screen",
-            "film on green and blue, 3 times too bright: the green of one screen is cut from 1.26 \
-             to 1",
+            "film on green and blue, 3 times too bright: the green of one screen is clipped from 1.26 to 1",
             "T to 0.05 on average, or flagged, or a residual or mean uncertainty above 0.05",
             || Ok(judge_clipped_screen(&triangulated([GREEN, BLUE], 3.0)?)),
         ),
@@ -499,7 +497,7 @@ fn exact_screens(name: &str, screens: [LinearRgb; 2]) -> HardCase {
     HardCase::new(
         name,
         "neutral film on two even screens, no noise",
-        "photo = F + T screen has one solution in green: T to 1e-4 on average",
+        "photo = F + T screen has a unique solution in green: T to 1e-4 on average",
         move || judge_exact_screens(screens),
     )
 }

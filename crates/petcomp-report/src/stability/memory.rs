@@ -8,7 +8,7 @@ use std::fs;
 pub(super) fn shortage(needed_gib: f64) -> Option<Outcome> {
     let free = gib_of("/proc/meminfo", "MemAvailable").filter(|free| *free < needed_gib)?;
     Some(Outcome::failed(format!(
-        "not tried: {free:.1} GiB are free"
+        "skipped: only {free:.1} GiB are free"
     )))
 }
 

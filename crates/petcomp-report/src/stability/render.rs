@@ -52,27 +52,25 @@ fn extreme_pictures() -> [HardCase; 5] {
     [
         HardCase::new(
             "camera 1 cm above a card",
-            "an opaque card of albedo 1/2, 20 cm wide, 1 cm under the eye, under even light of 1",
+            "an opaque card of albedo 1/2, 20 cm wide, 1 cm below the eye, under uniform light of 1",
             "alpha 1, light 1/2 and depth 0.01 m in every pixel, to 1e-5",
             render_near_card,
         ),
         HardCase::new(
             "camera 1 cm above a card, looking along it",
-            "an opaque card 20 m wide, the eye 1 cm over it, tilted by 80 degrees, under even \
-             light of 1",
-            "below the horizon, 1 pixel away from it, alpha 1 and light 1/2, to 1e-4; above it \
-             nothing",
+            "an opaque card 20 m wide, the eye 1 cm above it, tilted by 80 degrees, under uniform light of 1",
+            "more than 2 pixels from the horizon: below it alpha 1 and light 1/2, above it nothing, to 1e-4",
             render_near_and_grazing,
         ),
         HardCase::new(
             "one-pixel image",
-            "a tilted card in a shadow of its own, seen by 1 x 1 pixel",
-            "the middle pixel of 65 x 65 that the same camera sees, to 1e-5",
+            "a tilted card in its own shadow, seen by 1 x 1 pixel",
+            "the middle pixel of 65 x 65 from the same camera, to 1e-5",
             render_one_pixel,
         ),
         HardCase::new(
             "light between two white planes",
-            "a surface of albedo 1 under a white opaque card, which reflects all that it gets",
+            "a surface of albedo 1 under a white opaque card, which reflects all light",
             "no more than 20 times as bright (reflected light is limited to 0.95); never infinite",
             reflect_between_planes,
         ),
@@ -80,8 +78,7 @@ fn extreme_pictures() -> [HardCase; 5] {
             "16k image",
             "16384 x 16384 pixels with a card of 2000 x 2000 in the last corner",
             format!(
-                "{SHOWN_PX:.0} pixels covered, to 1e-4; the last pixel's plate untouched; at most \
-                 {SIXTEEN_K_GIB} GiB"
+                "{SHOWN_PX:.0} pixels covered, to 1e-4; the last pixel's plate unchanged; at most {SIXTEEN_K_GIB} GiB"
             ),
             || Ok(memory::shortage(SIXTEEN_K_GIB).unwrap_or_else(render_sixteen_k)),
         )
@@ -135,8 +132,8 @@ fn tinted_layers() -> HardCase {
     let [r, g, b] = expected;
     HardCase::new(
         "200 layers of tinted film",
-        "200 level cards that pass 0.999, 0.99 and 0.9 of red, green and blue",
-        format!("{r:.4}, {g:.4} and {b:.1e} pass, to 200 roundings"),
+        "200 level cards of transmittance 0.999, 0.99 and 0.9 for red, green and blue",
+        format!("{r:.4}, {g:.4} and {b:.1e} are transmitted, to 200 roundings"),
         move || Ok(render_tinted_layers(&expected)),
     )
 }
@@ -231,12 +228,13 @@ fn steep_card(degrees: f64) -> HardCase {
     let width = area / STEEP_SIDE_PX;
     let mean_bound = 0.01 + 1.0 / (f64::from(SUBPIXEL_POSITIONS) * width);
     HardCase::new(
-        format!("card turned by {degrees} degrees"),
+        format!("card tilted by {degrees} degrees"),
         format!(
-            "an opaque card of which {area:.1} pixels are seen, at {SUBPIXEL_POSITIONS} places across a pixel"
+            "an opaque card with a visible area of {area:.1} pixels, at {SUBPIXEL_POSITIONS} positions within a pixel"
         ),
         format!(
-            "coverage sums to the area of the projected corners: to {:.0} % on average, to a row of samples ({strip:.0} px) each",
+            "the sum of coverage is the area of the projected corners: to {:.0} % on average, to a row of samples \
+             ({strip:.0} px) each",
             100.0 * mean_bound
         ),
         move || {
@@ -380,7 +378,7 @@ fn nothing_to_see() -> Vec<HardCase> {
         invisible("infinite card", card_of_size([f64::INFINITY, 0.2])),
         invisible("card at NaN", card_at_nan()),
         invisible("card without a texel", card_without_texel()),
-        invisible("card that is transparent", transparent),
+        invisible("transparent card", transparent),
     ]
 }
 
@@ -410,8 +408,8 @@ fn texture() -> Image<PremulRgba> {
 }
 
 fn invisible(name: &str, card: Card) -> HardCase {
-    let expectation = "no light, no coverage, in either renderer: exactly 0 px";
-    HardCase::new(name, "alone over a plate", expectation, move || {
+    let expectation = "no light, no coverage, in both renderers: exactly 0 px";
+    HardCase::new(name, "a single card over a plate", expectation, move || {
         render_invisible(&card)
     })
 }
@@ -435,9 +433,9 @@ fn awkward_cards() -> Vec<HardCase> {
     let twice = card_at_height(0.1).with_card(level_card(2, [0.0, 0.0, 0.1], 0.4, grey(0.5)));
     let even = [0.8; 2];
     vec![
-        covering("card under the surface", card_at_height(-0.1), even),
+        covering("card below the surface", card_at_height(-0.1), even),
         covering("card on the surface", card_at_height(0.0), even),
-        covering("two cards in one place", twice, [1.0 - 0.2 * 0.5; 2]),
+        covering("two coincident cards", twice, [1.0 - 0.2 * 0.5; 2]),
         covering("card in the plane of the light", card_at_height(0.9), even),
         covering("light below the surface", from_below, even),
         covering("card through the eye", card_through_the_eye(), [0.0, 1.0]),
@@ -484,7 +482,7 @@ fn covering(name: &str, shot: Shot, [least, most]: [f64; 2]) -> HardCase {
         format!("{least:.2} to {most}")
     };
     let expectation = format!(
-        "coverage {coverage} in the middle (to 1e-5), light finite, shadows in 0..1, in either renderer"
+        "coverage {coverage} in the middle (to 1e-5), finite light, shadows in 0..1, in both renderers"
     );
     HardCase::new(name, "under a light of 10 W", expectation, move || {
         Ok(judge_coverage(&by_both_renderers(&shot), [least, most]))
@@ -493,7 +491,7 @@ fn covering(name: &str, shot: Shot, [least, most]: [f64; 2]) -> HardCase {
 
 fn judge_coverage(pictures: &[DeepImage; 2], [least, most]: [f64; 2]) -> Outcome {
     let is_sound = pictures.iter().all(is_sound);
-    let state = if is_sound { "sound" } else { "not sound" };
+    let state = if is_sound { "valid" } else { "invalid" };
     let found = pictures.each_ref().map(middle_coverage);
     let expected = least - 1e-5..=most + 1e-5;
     Outcome::new(

@@ -36,7 +36,7 @@ pub(super) fn cases() -> Vec<HardCase> {
         HardCase::new(
             "sky of 1e-4 in the shadow of a sun of 1e5",
             "the surface where a small opaque card hides the sun",
-            "what the rest of the sky gives, as a share of all, by the midpoint rule: to 1e-4",
+            "the share of the rest of the sky, by the midpoint rule: to 1e-4",
             shade_sunny_sky,
         ),
     ]);
@@ -85,7 +85,7 @@ fn small_light(side: f64) -> HardCase {
     let name = if side > 0.0 {
         format!("light of {side} m")
     } else {
-        "light of no size".into()
+        "light without size".into()
     };
     HardCase::new(
         name,
@@ -100,7 +100,7 @@ fn cut_by_the_horizon((quality, options): (&str, RenderOptions)) -> HardCase {
     let expected = reflected_from_upper_half(&light);
     HardCase::new(
         format!("light half below the horizon, quality {quality}"),
-        "an upright light of 1 x 1 m, 1 m away, half of it under the plane of a white level card",
+        "an upright light of 1 x 1 m, 1 m away, half of it below the plane of a white level card",
         format!("Lambert's formula for the upper half, {expected:.6}: to 5 %, 0.07 stops"),
         move || {
             let found = light_reflected(small_shot().with_light(light), &options);
@@ -160,8 +160,8 @@ fn bright_beside_dim() -> HardCase {
     let [bright, dim] = [1e5, 1e-4].map(|power| lamp([0.3, 0.2, 0.9], 0.001, power));
     let expected = from_a_point(&bright) + from_a_point(&dim);
     HardCase::new(
-        "light of 1e5 W beside one of 1e-4 W",
-        "both small, in one place, over a white level card",
+        "light of 1e5 W next to one of 1e-4 W",
+        "both small, at the same position, above a white level card",
         format!("their sum: {expected:.1}, to 0.1 %"),
         move || {
             let shot = small_shot().with_light(bright).with_light(dim);

@@ -124,8 +124,8 @@ impl ExpectedEnd {
             Self::Rests => format!(
                 "rests; overlap at most {overlap} % of a card, energy rise at most {rise} %"
             ),
-            Self::IsRefused => "refused: it cannot be right".into(),
-            Self::Ends => "an end in time, reported as what it is".into(),
+            Self::IsRefused => "rejected: it cannot be right".into(),
+            Self::Ends => "ends in time, with a correct verdict".into(),
         }
     }
 
@@ -163,11 +163,11 @@ fn end_in_words(end: &Settled, typical: f64) -> String {
 fn verdict_in_words(verdict: &SettleVerdict) -> String {
     match verdict {
         SettleVerdict::Rested => "rests".into(),
-        SettleVerdict::TimedOut => "still moves".into(),
+        SettleVerdict::TimedOut => "still moving".into(),
         SettleVerdict::Escaped(ids) => format!("{} escaped", ids.len()),
         SettleVerdict::Penetrating(_) => "sinks in".into(),
         SettleVerdict::Exploded(_) => "gains energy".into(),
-        SettleVerdict::Hanging(ids) => format!("{} float", ids.len()),
+        SettleVerdict::Hanging(ids) => format!("{} hanging", ids.len()),
     }
 }
 
@@ -197,7 +197,7 @@ fn card_counts() -> Result<Vec<HardFall>> {
 }
 
 fn heap_of_cards(n: usize) -> Result<HardFall> {
-    let mut fall = resting_fall(format!("{n} in a heap"), heap(2, n)?);
+    let mut fall = resting_fall(format!("heap of {n}"), heap(2, n)?);
     if n > MAX_TEST_CARDS {
         // An attempt with many cards takes ten seconds.
         fall.options.attempts = 1;
@@ -309,12 +309,12 @@ fn shortened(mut fall: HardFall) -> HardFall {
 fn impossible_falls() -> Result<Vec<HardFall>> {
     let larger = changed(heap(6, 3)?, 0.3, |_, object| object.size = [0.9, 0.7]);
     let in_one_place = changed(heap(6, 12)?, 0.0, drop_in_one_place);
-    let mut longer_steps = resting_fall("steps half as long again", heap(6, 20)?).that_ends();
+    let mut longer_steps = resting_fall("steps 1.5 times as long", heap(6, 20)?).that_ends();
     longer_steps.options = with_step_times(1.5);
     let longest_steps = resting_fall("steps 4 times too long", heap(6, 20)?);
     Ok(vec![
         resting_fall("larger than the box", larger).that_is_refused(with_step_times(1.0)),
-        resting_fall("started in one place", in_one_place).that_ends(),
+        resting_fall("started at the same position", in_one_place).that_ends(),
         longer_steps,
         longest_steps.that_is_refused(with_step_times(4.0)),
     ])
