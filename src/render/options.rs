@@ -74,7 +74,6 @@ impl Default for RenderOptions {
 
 /// `Quality::Reference` has 6; beyond 16 the error is below a code of 8 bits, and the time
 /// unbounded.
-/// bounds.
 const SUBSAMPLES: Bounds = Bounds::new(1.0, 16.0, "quality reference has 6");
 const LIGHT_SAMPLES: Bounds = Bounds::new(1.0, 32.0, "quality reference has 8");
 const AMBIENT_SAMPLES: Bounds = Bounds::new(1.0, 4096.0, "quality reference has 400");

@@ -248,7 +248,6 @@ mod tests {
 
     /// Reference: whether the ray from a point in the room to the camera leaves the room through a
     /// wall, found by walking along the ray.
-    /// walking along the ray.
     fn is_hidden(point: Vector3<f64>, eye: Vector3<f64>, surface: &Surface) -> bool {
         let wall = surface.wall.unwrap();
         let slope = wall.slope_deg.to_radians().tan();

@@ -67,7 +67,6 @@ impl Folder {
     /// # Errors
     /// 404 for a missing file, for a name or a link that leads outside the folder, and for anything
     /// but a regular file.
-    /// no regular file.
     pub(crate) fn file(&self, name: &str) -> Answer<PathBuf> {
         check_name(name)?;
         io::inside(&self.root, name).map_err(not_found)

@@ -13,7 +13,6 @@ use crate::scene::Grade;
 /// less what is opaque: paint, labels and caps keep their colours, and soft borders do not tint
 /// what is next to them. Light that comes back out of the plastic is multiplied likewise; glints
 /// come from its surface and keep the colour of the light.
-/// glints come from its surface and keep the colour of the light.
 pub(super) fn dye(film: &mut Image<Film>, surface: &Image<SurfaceTexel>, grade: &Grade) {
     let texels = film.pixels_mut().iter_mut().zip(surface.pixels());
     for (film, surface) in texels {

@@ -24,6 +24,7 @@ const CATCHER_RATIO: f64 = 3.0;
 /// Every quad has its pose, and its texture is a premultiplied scene-linear EXR. The plate is
 /// averaged over the pixels of the picture, as the script does.
 ///
+/// # Errors
 /// A file that cannot be read or lacks a key; a picture in it that cannot be read.
 pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
     let path = path.as_ref();

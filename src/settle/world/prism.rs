@@ -18,7 +18,6 @@ const FACE_CORNERS: usize = 4;
 /// The engine makes contacts with at most four corners of a face, so a plate with more corners
 /// would rest on a part of itself. Where its upper or lower face is touched, the engine gets the
 /// largest part with four corners around that point.
-/// of four corners around that place.
 #[derive(Clone)]
 pub(super) struct Prism {
     /// Corners of the upper face, counter-clockwise.

@@ -130,6 +130,7 @@ pub(crate) fn summary(rows: &[CaseResult]) -> Table {
 
 /// Runs the cases of a stage, or of all (an empty name), and writes `stability.csv` and
 /// `stability.md` into a folder.
+///
 /// # Errors
 /// As [`cases`]; files that cannot be written. A case that fails is a row, not an error.
 pub fn write(folder: &Path, stage: &str, progress: impl Fn(u64, u64)) -> Result<Vec<CaseResult>> {

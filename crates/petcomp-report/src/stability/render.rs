@@ -217,9 +217,9 @@ const STEEP_SIDE_PX: f64 = STEEP_SIDE_M * STEEP_FOCAL_PX / 0.9;
 
 /// A card that is nearly edge-on: its coverage, in pixels, must be the area of its projected
 /// corners.
+///
 /// Each row of the picture has two samples per pixel: a strip thinner than their distance is hit or
 /// missed, depending on its position.
-/// missed, depending on where it is.
 fn steep_card(degrees: f64) -> HardCase {
     let area = area_of_card(&steep_shot(degrees, 0));
     // Half the height of the card: a row of samples.
