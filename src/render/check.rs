@@ -7,7 +7,7 @@ use crate::scene::{AreaLight, Card, EnvironmentMap, Shot};
 
 /// Checks that a shot can be rendered.
 ///
-/// Reads every texel, so call it once per shot from an untrusted source, not once per frame.
+/// Reads every texel, so call it once per shot from an external source, not once per frame.
 /// [`render`](super::render) itself neither checks nor panics: a NaN in a texture becomes a NaN in
 /// the picture. Cards that are edge-on, behind the eye or without area are valid and simply not
 /// visible.

@@ -38,7 +38,7 @@ const TILE_SIDE_PX: usize = 32;
 ///
 /// Same bits for any number of threads and any order of the cards. Never fails: invisible cards are
 /// left out, and numbers in `options` are clamped to the supported range. Use `check` for shots
-/// from untrusted sources.
+/// from external sources.
 ///
 /// # Method
 /// Everything is planar, so each map between two planes seen from a point is a homography.

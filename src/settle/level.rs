@@ -69,7 +69,7 @@ fn can_touch(a: &Solid, b: &Solid) -> bool {
 ///
 /// Cards that are already at rest count as the upright boxes around them. A card that reaches
 /// through a wall is moved inside. Returns the poses of the objects that fall, in their order. The
-/// work is one for each object plus one for each object that is already there.
+/// work is one for each object plus one for each object already in place.
 ///
 /// # Errors
 /// [`Allowance::take`].
