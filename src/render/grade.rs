@@ -5,6 +5,7 @@ use crate::render::float4::Float4;
 use crate::render::float8::Float8;
 use crate::render::texel_grid::SIMD_LANES;
 use crate::scene::Grade;
+use bytemuck::Pod;
 
 /// Opacity of film after a hue shift and a change of saturation of its transmittance; grey is
 /// unchanged.
@@ -30,14 +31,21 @@ pub(super) fn channel_mean(c: LinearRgb) -> f32 {
     }
 }
 
-/// Grades the colours of texels, and the opacity of those that are film.
-pub(super) fn grade_texels(texels: &mut [Float8], grade: &Grade) {
-    let halves: &mut [Float4] = bytemuck::cast_slice_mut(texels);
+/// Grades the colours of texels, the first numbers of each.
+pub(super) fn grade_colors<T: Pod>(texels: &mut [T], grade: &Grade) {
     if *grade != Grade::default() {
-        shift_colors(halves, grade.hue_deg, grade.saturation, grade.value);
+        let step = size_of::<T>() / size_of::<Float4>();
+        let parts = bytemuck::cast_slice_mut(texels);
+        shift_colors(parts, step, grade.hue_deg, grade.saturation, grade.value);
     }
+}
+
+/// Grades the colours of film, and its opacity.
+pub(super) fn grade_film(texels: &mut [Float8], grade: &Grade) {
+    grade_colors(texels, grade);
     if turns_opacity(grade) {
-        shift_opacities(halves, 2, grade.hue_deg, grade.saturation);
+        let parts = bytemuck::cast_slice_mut(texels);
+        shift_opacities(parts, 2, grade.hue_deg, grade.saturation);
     }
 }
 
@@ -54,14 +62,14 @@ fn turns_opacity(grade: &Grade) -> bool {
     (grade.hue_deg, grade.saturation) != (0.0, 1.0)
 }
 
-/// Every second element is a colour.
+/// The first of every `step` elements is a colour.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn shift_colors(halves: &mut [Float4], hue_deg: f32, saturation: f32, value: f32) {
-    map_colors(halves, 2, 0, |color| {
+fn shift_colors(texels: &mut [Float4], step: usize, hue_deg: f32, saturation: f32, value: f32) {
+    map_colors(texels, step, 0, |color| {
         crate::color::shift_hsv(color, hue_deg, saturation, value)
     });
 }

@@ -246,6 +246,21 @@ impl IrradianceMap {
         holds_cell(&self.columns, column.0 as usize) && holds_cell(&self.rows, row.0 as usize)
     }
 
+    /// Which of some positions along a row, from left to right, are inside, with all four nodes
+    /// around each.
+    pub(super) fn held_positions(
+        &self,
+        row: LatticePosition,
+        columns: &[LatticePosition],
+    ) -> Range<usize> {
+        if !holds_cell(&self.rows, row.0 as usize) {
+            return 0..0;
+        }
+        let start = columns.partition_point(|column| (column.0 as usize) < self.columns.start);
+        let end = columns.partition_point(|column| (column.0 as usize) + 1 < self.columns.end);
+        start..end.max(start)
+    }
+
     /// The value at a position; that of the nearest cell for one outside.
     ///
     /// Maps hold at least two nodes a side.

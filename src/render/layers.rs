@@ -232,6 +232,25 @@ impl SampleGrid {
         }
     }
 
+    /// The pixels of a row, among these, that a map holds; all of them if that varies along the row
+    /// or within pixels.
+    fn pixels_on(&self, map: &IrradianceMap, pixels: &Range<usize>, y: usize) -> Range<usize> {
+        if self.per_subsample || self.bent.is_some() {
+            return pixels.clone();
+        }
+        let held = map.held_positions(self.rows[y], &self.columns[pixels.clone()]);
+        pixels.start + held.start..pixels.start + held.end
+    }
+
+    /// The pixels, among these, whose sub-samples are all on the surface; none if light is looked up
+    /// for each sub-sample.
+    fn whole_pixels(&self, spans: &CatcherSpans, pixels: &Range<usize>) -> Range<usize> {
+        if self.per_subsample {
+            return pixels.start..pixels.start;
+        }
+        integer_range(spans.inner.0 - 0.5, spans.inner.1 - 0.5, pixels)
+    }
+
     /// Picture coordinate of a position of the grid, along one axis.
     fn coordinate_of(&self, index: usize) -> f64 {
         let n = self.positions_per_side();
@@ -623,49 +642,46 @@ impl LayerStack {
         for y in part.y.clone() {
             if let Some(row) = tile.shadow_row(part, y) {
                 let spans = CatcherSpans::new(&self.samples, &edges, y);
-                self.fill_pixel_shares(map, part, y, &mut shares);
-                self.shade_row((map, &shares), part, (&spans, y), through, row);
+                self.shade_row((map, &spans), (part, y), through, (row, &mut shares));
             }
         }
     }
 
-    /// The shadow of a row; `shares` holds the pixels' shares.
+    /// The shadow of a row of factors that are still 1; `shares` is scratch.
     fn shade_row(
         &self,
-        (map, shares): (&IrradianceMap, &[Float4]),
-        part: &PixelBlock,
-        (spans, y): (&CatcherSpans, usize),
+        (map, spans): (&IrradianceMap, &CatcherSpans),
+        (part, y): (&PixelBlock, usize),
         through: &Transmittance,
-        row: &mut [LinearRgb],
+        (row, shares): (&mut [LinearRgb], &mut Vec<Float4>),
     ) {
-        for (i, shadow) in row.iter_mut().enumerate() {
-            let x = part.x.start + i;
-            *shadow = match shares.get(i) {
-                Some(share) if spans.hold_pixel(x) => share.rgb(),
-                _ => {
-                    let through = through.of_pixel(i, y - part.y.start);
-                    self.mean_share(map, [x, y], spans, through)
-                }
-            };
+        let shadowed = self.samples.pixels_on(map, &part.x, y);
+        let whole = self.samples.whole_pixels(spans, &shadowed);
+        self.fill_shares(map, &whole, y, shares);
+        let copied = &mut row[whole.start - part.x.start..][..whole.len()];
+        for (shadow, share) in copied.iter_mut().zip(shares) {
+            *shadow = share.rgb();
+        }
+        for x in (shadowed.start..whole.start).chain(whole.end..shadowed.end) {
+            let i = x - part.x.start;
+            let through = through.of_pixel(i, y - part.y.start);
+            row[i] = self.mean_share(map, [x, y], spans, through);
         }
     }
 
-    /// Looks up the share at the pixels of a row; none if it is looked up per sub-sample.
-    fn fill_pixel_shares(
+    /// Looks up the share at some pixels of a row.
+    fn fill_shares(
         &self,
         map: &IrradianceMap,
-        part: &PixelBlock,
+        pixels: &Range<usize>,
         y: usize,
         shares: &mut Vec<Float4>,
     ) {
-        if self.samples.per_subsample {
-            return;
-        }
-        self.samples.look_up_row(map, part.x.clone(), y, shares);
-        for (x, share) in part.x.clone().zip(shares) {
-            let (column, row) = self.samples.position_of(x, y);
-            if !map.holds(column, row) {
-                *share = Float4::ONE;
+        match self.samples.bent {
+            None => self.samples.look_up_row(map, pixels.clone(), y, shares),
+            Some(_) => {
+                shares.clear();
+                shares.extend(pixels.clone().map(|x| self.share_at(map, x, y)));
             }
         }
     }
@@ -740,12 +756,6 @@ impl CatcherSpans {
             rows,
             inner: (low + reach, high - reach),
         }
-    }
-
-    /// Whether all sub-samples of a pixel are on the surface.
-    #[inline(always)]
-    fn hold_pixel(&self, x: usize) -> bool {
-        x as f64 + 0.5 >= self.inner.0 && x as f64 + 0.5 <= self.inner.1
     }
 
     #[inline(always)]

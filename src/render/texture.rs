@@ -5,7 +5,7 @@ use crate::geom::Vector3;
 use crate::pixel::{Film, Mix, PremulRgba};
 use crate::render::float4::Float4;
 use crate::render::float8::Float8;
-use crate::render::grade::{channel_mean, grade_opacities, grade_texels};
+use crate::render::grade::{channel_mean, grade_colors, grade_film, grade_opacities};
 use crate::render::resample::{BorderedTexels, DetailLevel};
 use crate::render::texel_extent::TexelExtent;
 use crate::render::texel_grid::TexelGrid;
@@ -70,16 +70,22 @@ impl BakedTexture {
         let level = level.clamp(0.0, (texture.levels() - 1) as f64);
         let grid = TexelGrid::new(texture.size(), level);
         let detail = DetailLevel::new(level);
-        if content == TexelContent::Opacity {
-            let baked = resample_opacity(texture, detail, grade);
-            return Self::from_texels(baked, grid, BakedTexels::Opacity);
-        }
-        let baked = resample_film(texture, detail, grade);
         match content {
-            TexelContent::Film => Self::from_texels(baked, grid, BakedTexels::Film),
-            _ => Self::from_texels(baked, grid, |texels| {
-                BakedTexels::Alpha(texels.iter().map(|t| t.color()).collect())
-            }),
+            TexelContent::Alpha => Self::from_texels(
+                resample_colors(texture, detail, grade),
+                grid,
+                BakedTexels::Alpha,
+            ),
+            TexelContent::Film => Self::from_texels(
+                resample_film(texture, detail, grade),
+                grid,
+                BakedTexels::Film,
+            ),
+            TexelContent::Opacity => Self::from_texels(
+                resample_opacity(texture, detail, grade),
+                grid,
+                BakedTexels::Opacity,
+            ),
         }
     }
 
@@ -118,19 +124,43 @@ fn film_alpha(opacity: Float4) -> f32 {
     channel_mean(opacity.clamped().rgb())
 }
 
-fn resample_film(texture: &Texture, detail: DetailLevel, grade: &Grade) -> BorderedTexels<Float8> {
-    let finish = |row: &mut [Float8]| {
-        grade_texels(row, grade);
-        if texture.is_film() {
-            row.iter_mut().for_each(|t| {
-                let color = t.color().with_fourth(film_alpha(t.opacity()));
-                *t = Float8::new(color, t.opacity());
-            });
-        }
-    };
+/// Colour and alpha; for film the mean opacity, which is not graded.
+fn resample_colors(
+    texture: &Texture,
+    detail: DetailLevel,
+    grade: &Grade,
+) -> BorderedTexels<Float4> {
+    let finish = |row: &mut [Float4]| grade_colors(row, grade);
     match texture {
-        Texture::Rgba(pyramid) => detail.resample(|l| pyramid.level(l), Float8::from, finish),
-        Texture::Film(pyramid) => detail.resample(|l| pyramid.level(l), Float8::from, finish),
+        Texture::Rgba(pyramid) => detail.resample(|l| pyramid.level(l), Float4::from, finish),
+        Texture::Film(pyramid) => detail.resample(|l| pyramid.level(l), flat_film, finish),
+    }
+}
+
+/// Film without its tint.
+#[inline(always)]
+fn flat_film(film: Film) -> Float4 {
+    Float4::from(film.color).with_fourth(film_alpha(film.opacity.into()))
+}
+
+fn resample_film(texture: &Texture, detail: DetailLevel, grade: &Grade) -> BorderedTexels<Float8> {
+    match texture {
+        Texture::Rgba(pyramid) => detail.resample(
+            |l| pyramid.level(l),
+            Float8::from,
+            |row| grade_colors(row, grade),
+        ),
+        Texture::Film(pyramid) => detail.resample(
+            |l| pyramid.level(l),
+            Float8::from,
+            |row| {
+                grade_film(row, grade);
+                row.iter_mut().for_each(|t| {
+                    let color = t.color().with_fourth(film_alpha(t.opacity()));
+                    *t = Float8::new(color, t.opacity());
+                });
+            },
+        ),
     }
 }
 
