@@ -67,11 +67,11 @@ kinds! {
     PhysicsWorlds, "physics worlds";
     /// Time steps of all physics worlds
     PhysicsSteps, "physics steps";
-    /// Places on receivers times samples of area lights: light before anything is in its way
+    /// Receiver nodes times samples of area lights: light before occlusion
     LightSamples, "light samples";
-    /// Places on receivers times samples of lights and sky that a card, or the surface, may be in the way of
+    /// Receiver nodes times samples of lights and sky that a card or the surface may occlude
     ShadowRays, "shadow rays";
-    /// Readings of how much light a see-through card lets pass: one for each card in the way of a shadow ray
+    /// Transmittance lookups of see-through cards: one per card that a shadow ray crosses
     Transmittances, "transmittances";
     /// The same for cards that are opaque all over, whose textures are read along their edges alone
     OpaqueEdges, "opaque edges";
@@ -85,9 +85,9 @@ kinds! {
     ShadedSamples, "shaded samples";
     /// Pixels of the surface that a shadow is looked up for
     ShadowedPixels, "shadowed pixels";
-    /// Pixels of cards that what lies behind is displaced in
+    /// Pixels of cards in which the background is displaced
     BentPixels, "bent pixels";
-    /// Textures made ready for a picture or a shadow: a level of detail in the card's own colours
+    /// Textures prepared for a picture or a shadow: a mip level in the card's own colours
     Bakes, "bakes";
     /// Levels of detail made
     Levels, "levels of detail";
@@ -97,7 +97,7 @@ kinds! {
     NoisyPixels, "noisy pixels";
     /// Deep samples looked at for labels
     LabelSamples, "label samples";
-    /// Masks drawn for labels, two an object
+    /// Masks drawn for labels, two per object
     Masks, "masks";
     /// Pictures encoded
     Encodes, "encodes";
@@ -127,7 +127,7 @@ mod tests {
         );
         assert_eq!(
             (Kind::Masks.name(), Kind::Masks.meaning()),
-            ("masks", "Masks drawn for labels, two an object")
+            ("masks", "Masks drawn for labels, two per object")
         );
     }
 }

@@ -49,7 +49,7 @@ fn print_table() -> Result<()> {
         &|_, _| (),
         &AtomicBool::new(false),
     )?;
-    println!("CPU ms a picture, mean of {pictures}; all but the last column add up to `picture`");
+    println!("CPU ms per picture, mean of {pictures}; all but the last column add up to `picture`");
     println!("size         objects  picture  {}", STAGES.join("  "));
     for (image, objects) in ROWS {
         let pipeline = Pipeline::open(config(&samples, folder.path(), image, objects)?)?;
