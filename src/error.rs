@@ -45,9 +45,11 @@ pub enum Error {
         what: String,
     },
     /// A rectangle that no camera can have seen; in a file it is an [`Error::Field`].
-    #[error("{what}")]
+    #[error("{at}: {what}")]
     Camera {
-        /// Where it is wrong (usually `surface.corners_px`), how, and what was expected.
+        /// Where it is wrong, usually `surface.corners_px`.
+        at: String,
+        /// What is wrong, and what was expected.
         what: String,
     },
     /// Dropped objects that would not come to rest.
@@ -97,11 +99,7 @@ impl Error {
     pub fn in_file(self, path: impl AsRef<Path>) -> Self {
         let path = path.as_ref().to_path_buf();
         match self {
-            Self::Value { at, what } => Self::Field { path, at, what },
-            Self::Camera { what } => {
-                let (at, what) = field_and_rest(&what);
-                Self::Field { path, at, what }
-            }
+            Self::Value { at, what } | Self::Camera { at, what } => Self::Field { path, at, what },
             Self::Photo { .. } => Self::File {
                 path,
                 what: self.to_string(),
@@ -109,12 +107,6 @@ impl Error {
             other => other,
         }
     }
-}
-
-/// Splits a message into the field that it begins with and what is wrong there.
-fn field_and_rest(message: &str) -> (String, String) {
-    let (at, what) = message.split_once(": ").unwrap_or(("surface", message));
-    (at.into(), what.into())
 }
 
 /// The system's message without its number, in our spelling: `no such file or directory`.

@@ -354,7 +354,7 @@ mod tests {
             doubt([0.5, 0.5])
                 .unwrap()
                 .message
-                .ends_with("0.500 x 0.500 m; are width and height right?")
+                .ends_with("0.500 x 0.500 m poorly; are width and height right?")
         );
     }
 

@@ -145,19 +145,18 @@ pub enum SolveError {
 }
 
 impl SolveError {
-    /// The field of a label whose value is impossible whatever the corners are; the message begins
-    /// with it.
-    fn impossible_field(&self) -> Option<&str> {
-        match self {
-            Self::NonFinite(at)
-            | Self::OutOfRange { at, .. }
-            | Self::NotPositive { at, .. }
-            | Self::OutOfBounds { at, .. } => Some(at),
-            Self::BadImage(_) => Some("image"),
-            Self::CropOutside { .. } => Some("image.crop"),
-            Self::BadDimensions(_) => Some("surface"),
-            _ => None,
-        }
+    /// Whether a single value is one that nothing can have, rather than the values together.
+    fn is_impossible_value(&self) -> bool {
+        matches!(
+            self,
+            Self::NonFinite(_)
+                | Self::OutOfRange { .. }
+                | Self::NotPositive { .. }
+                | Self::OutOfBounds { .. }
+                | Self::BadImage(_)
+                | Self::CropOutside { .. }
+                | Self::BadDimensions(_)
+        )
     }
 }
 
@@ -188,13 +187,15 @@ fn remedy(exchanged: Option<[f64; 2]>, heights_m: Option<[f64; 2]>) -> String {
 }
 
 impl From<SolveError> for Error {
+    /// Every message begins with the field.
     fn from(error: SolveError) -> Self {
-        let what = error.to_string();
-        let Some(at) = error.impossible_field() else {
-            return Self::Camera { what };
-        };
-        let place = format!("{at}: ");
-        Self::value(at, what.strip_prefix(&place).unwrap_or(&what))
+        let message = error.to_string();
+        let (at, what) = message.split_once(": ").unwrap_or(("surface", &message));
+        let (at, what) = (at.into(), what.into());
+        match error.is_impossible_value() {
+            true => Self::Value { at, what },
+            false => Self::Camera { at, what },
+        }
     }
 }
 

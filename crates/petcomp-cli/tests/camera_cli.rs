@@ -391,7 +391,7 @@ fn a_photo_that_is_not_the_label_s_is_noticed() {
     label["image"]["file"] = json!("typo.png");
     desk.label("a", &label);
     let [_, said] = desk.ok(&["camera", "solve", "bg/a.label.json"]);
-    assert!(said.contains("\"typo.png\" is not there"), "{said}");
+    assert!(said.contains("\"typo.png\" is missing"), "{said}");
 }
 
 #[test]
@@ -784,7 +784,7 @@ fn colmap_is_given_no_picture_without_a_name_of_its_own() {
     let export = [&export[..], &["--to", "colmap", "-o", "model"]].concat();
     let said = desk.refused(&export);
     assert!(
-        said.contains("other.camera.json: image.file: \"a.png\", which bg/a.camera.json has too"),
+        said.contains("other.camera.json: image.file: \"a.png\", which bg/a.camera.json also has"),
         "{said}"
     );
     camera["image"]["file"] = json!("");

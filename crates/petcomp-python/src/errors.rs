@@ -48,11 +48,12 @@ fn exception(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
     match error {
         Error::File { path, what } => with_parts(py, made, Some(path), None, what),
         Error::Field { path, at, what } => with_parts(py, made, Some(path), Some(at), what),
-        Error::Value { at, what } => with_parts(py, made, None, Some(at), what),
-        Error::Photo { what }
-        | Error::Camera { what }
-        | Error::Unsettled { what }
-        | Error::Interrupted { what } => with_parts(py, made, None, None, what),
+        Error::Value { at, what } | Error::Camera { at, what } => {
+            with_parts(py, made, None, Some(at), what)
+        }
+        Error::Photo { what } | Error::Unsettled { what } | Error::Interrupted { what } => {
+            with_parts(py, made, None, None, what)
+        }
         _ => Ok(made),
     }
 }

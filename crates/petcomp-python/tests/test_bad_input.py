@@ -112,8 +112,9 @@ def test_every_kind_of_error_has_its_class(tmp_path):
     assert raised.value.at == "render.subsamples" and isinstance(raised.value, ValueError)
     with pytest.raises(errors.PhotoError, match="^no cut-out: "):
         petcomp.matte.cut_out(np.full((64, 64, 3), 0.3, np.float32))
-    with pytest.raises(errors.CameraError):
+    with pytest.raises(errors.CameraError) as raised:
         petcomp.Camera.from_rectangle([[0, 0], [1, 1], [2, 2], [3, 3]], [0.6, 0.4], [640, 480])
+    assert raised.value.at == "surface.corners_px" and raised.value.what in str(raised.value)
     with pytest.raises(errors.InvalidValueError):
         petcomp.Scene(image=[0, 0], surface={"size": [1, 1]}, camera=petcomp.Camera.looking_down(1, 80, [64, 48]))
 

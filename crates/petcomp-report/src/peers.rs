@@ -230,7 +230,10 @@ mod tests {
         let diagram = found[0].diagram();
         assert_eq!(diagram.points.len(), 3, "what has no error has no place");
         assert_eq!(diagram.cost, "seconds, median");
-        assert_eq!(found[0].missing(), "matte: Not here: Gone (no package).");
+        assert_eq!(
+            found[0].missing(),
+            "matte: Not available: Gone (no package)."
+        );
         assert_eq!(commands(&found).rows[2][3], "slow");
     }
 

@@ -170,7 +170,11 @@ fn markers_are_found_by_themselves() {
     browser.press("m", 0);
     browser.fill("#width", "0.57");
     browser.wait("document.querySelector('footer').innerText.startsWith('4 markers')");
-    assert!(browser.text("footer").contains("16 corners of known place"));
+    assert!(
+        browser
+            .text("footer")
+            .contains("16 corners with known positions")
+    );
     browser.screenshot("markers");
     // What was typed meanwhile stays.
     browser.press("s", CTRL);
@@ -277,7 +281,7 @@ fn a_photo_of_another_size_than_its_label_says_is_not_shown() {
     let studio = Studio::over(dir.path());
     open_photo(&mut browser, &studio, "bg0000.jpg");
     let expected =
-        "bg0000.jpg: 1280 x 960 pixels in this browser, expected 640 x 480 as its label says";
+        "bg0000.jpg: 1280 x 960 pixels in this browser, expected 640 x 480 as in its label";
     assert_eq!(browser.text("footer"), expected);
     let is_disabled = browser.eval("document.querySelector('#save').disabled");
     assert_eq!(is_disabled, true);
@@ -603,7 +607,7 @@ fn a_mistyped_length_is_named_and_left_behind_with_its_photo() {
     browser.fill("#width", "0,5,6");
     browser.press("s", CTRL);
     browser.wait(
-        "document.querySelector('footer').innerText === 'not saved: width: 0,5,6, expected a length, a number'",
+        "document.querySelector('footer').innerText === 'not saved: width: 0,5,6, expected a length (a number)'",
     );
     choose_photo(&mut browser, "bg0003.jpg");
     let valid = browser.eval("document.querySelector('#width').validity.valid");
@@ -649,7 +653,7 @@ fn corners_that_moved_while_edges_were_looked_for_stay() {
     browser.wait("!!window.goOn");
     browser.press("r", 0);
     browser.eval("window.goOn(), 0");
-    browser.wait("document.querySelector('footer').innerText.includes('moved meanwhile')");
+    browser.wait("document.querySelector('footer').innerText.includes('moved in the meantime')");
     browser.press("s", CTRL);
     browser.wait("document.querySelector('footer').innerText.startsWith('saved')");
     let label: Label = io::read_json(dir.path().join("bg0000.label.json")).unwrap();

@@ -486,7 +486,7 @@ mod tests {
     #[test]
     fn what_no_document_may_hold_is_named_with_its_line() {
         let e = json("{\"seed\": 1,\n\"objects\": {\"count\": 3},\n\"seed\": 2}");
-        assert_eq!(e, "recipe.json: line 3: key \"seed\" twice");
+        assert_eq!(e, "recipe.json: line 3: duplicate key \"seed\"");
         assert!(toml("seed = 1\nseed = 2").starts_with("recipe.toml: line 2: duplicate key"));
         let e = toml("seed = 1\n[objects]\ncount = 1\nsize_m = -inf");
         assert_eq!(e, "recipe.toml: line 4: -inf, expected a finite number");

@@ -416,7 +416,10 @@ mod tests {
         };
         let off_axis = shot().with_k1(0.1);
         let said = told(&off_axis).unwrap_err();
-        assert!(said.starts_with("lens.k1: 0.1, expected the"), "{said}");
+        assert!(
+            said.starts_with("lens.k1: 0.1, expected a centred"),
+            "{said}"
+        );
         let mut bent = off_axis;
         bent.camera.focal_px = Vector2::new(11.0, 11.0);
         bent.camera.principal_px = Point2::new(4.04, 3.0);

@@ -162,7 +162,7 @@ fn distractors_that_no_asset_is_are_told() {
     };
     let told = seldom.check_room(&[tray("a")], &catalog(10)).unwrap_err();
     assert!(
-        told.to_string().starts_with("distractors: 1 asked for"),
+        told.to_string().starts_with("distractors: 1 requested"),
         "{told}"
     );
     // An asset that is never drawn may have any size.
