@@ -40,7 +40,7 @@ def key(image, screen=GREEN, **options):
         (PHOTO[:0], ValueError, "image: 8 x 0 pixels, expected at least 1 x 1"),
         (np.float32(1), TypeError, "image: <class 'numpy.float32'>"),
         (np.broadcast_to(np.float32(0.5), (10**6, 10**6, 3)), ValueError, "image: 1000000 x 1000000 pixels"),
-        (np.broadcast_to(np.float32(0.5), (32768, 32768, 3)), ValueError, "at most 32768 a side and 134217728 in all"),
+        (np.broadcast_to(np.float32(0.5), (32768, 32768, 3)), ValueError, "at most 32768 a side and 134217728 in total"),
     ],
 )
 def test_a_wrong_array_is_named(image, kind, says):
@@ -298,7 +298,7 @@ def test_what_a_function_would_not_hear_is_refused(tmp_path):
         ({"quality": "draft"}, "set, quality: apply only to recipes"),
         ({"labels": {"min_visible": 0.5}}, "labels.min_visible: acts when labels are made"),
         ({"labels": {"alpha_threshold": 0.5}}, "labels.alpha_threshold: acts when labels are made"),
-        ({"labels": {"formats": ["webdataset"]}}, "labels.formats: webdataset alone"),
+        ({"labels": {"formats": ["webdataset"]}}, "labels.formats: only webdataset"),
     ):
         with pytest.raises(errors.InvalidValueError, match=says):
             petcomp.generate(lambda k: sample, 1, tmp_path / "set", classes=["a"], **arguments)
