@@ -38,6 +38,7 @@ pub fn with_edits(text: &str, edits: &[KeyEdit]) -> Result<String> {
     // Its message includes the line of a mistake.
     io::parse_toml::<toml::Table>(text)?;
     edits.iter().try_fold(text.to_owned(), |text, edit| {
+        io::check_depth(&edit.path)?;
         with_edit(&text, edit).map_err(|what| Error::value(&edit.path, what))
     })
 }

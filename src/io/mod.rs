@@ -105,13 +105,13 @@ pub use codec::codes::ToFile;
 pub use codec::exr::Compression;
 #[doc(hidden)]
 pub use codec::jpeg::{Chroma, through_jpeg};
-#[cfg(feature = "pipeline")]
-pub(crate) use document::parse_toml;
 #[doc(hidden)]
 pub use document::{
     Override, from_json, from_overrides, has_extension, read_json, read_text, read_toml,
     write_json, write_text, write_toml,
 };
+#[cfg(feature = "pipeline")]
+pub(crate) use document::{check_depth, parse_toml};
 pub(crate) use document::{
     from_table, from_table_with, parse_json, parse_toml_with, read_bytes, read_json_data,
     suggestion,

@@ -362,11 +362,31 @@ fn labels_of(
             Ok(object_of(id, mask, *class))
         })
         .collect();
+    let mut objects = objects?;
+    hide_behind_later(&mut objects, (width, height));
     Ok(Labels {
         image: [width as u32, height as u32],
-        objects: objects?,
+        objects,
         ..Labels::default()
     })
+}
+
+/// Leaves of each object what none after it covers.
+fn hide_behind_later(objects: &mut [ObjectLabel], (width, height): (usize, usize)) {
+    let mut is_covered = Image::<u8>::new(width, height);
+    for object in objects.iter_mut().rev() {
+        let mut visible = Image::<u8>::new(width, height);
+        for (x, y) in object.amodal_mask.pixels() {
+            let at = (x as usize, y as usize);
+            visible[at] = 1 - is_covered[at];
+            is_covered[at] = 1;
+        }
+        let mask = runs_of(visible.view(), |code| code != 0);
+        let whole = object.amodal_mask.area().max(1);
+        object.visible_fraction = mask.area() as f64 / whole as f64;
+        object.visible_box = mask.bounds();
+        object.visible_mask = mask;
+    }
 }
 
 fn object_of(id: u32, mask: &GivenMatte, class: u32) -> ObjectLabel {
@@ -378,10 +398,7 @@ fn object_of(id: u32, mask: &GivenMatte, class: u32) -> ObjectLabel {
         id: ObjectId(id),
         class,
         amodal_box: mask.bounds(),
-        visible_box: mask.bounds(),
-        amodal_mask: mask.clone(),
-        visible_mask: mask,
-        visible_fraction: 1.0,
+        amodal_mask: mask,
         ..ObjectLabel::default()
     }
 }

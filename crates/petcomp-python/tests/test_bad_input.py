@@ -334,6 +334,9 @@ def test_evaluation_of_what_cannot_be_is_refused():
         ("folder", [truth], "expected a path or a list"),
         ([{**found, "boxes": [[5, 0, 0, 5]]}], [truth], "expected x0 <= x1"),
         ([{**found, "scores": [math.nan]}], [truth], "scores: NaN"),
+        ([{**found, "scores": np.array([0.9 + 1j])}], [truth], "scores: not real numbers"),
+        ([{**found, "scores": ["0.9"]}], [truth], "scores: not real numbers"),
+        ([{**found, "scores": [10**400]}], [truth], "scores: .*expected numbers"),
         ([{**found, "scores": [87.5]}], [truth], "scores: 87.5, expected a confidence, 0 to 1"),
         ([{**found, "boxes": [[0, 0, math.inf, 5]]}], [truth], "expected x0 <= x1"),
         ([{**found, "classes": [-1]}], [truth], "classes: -1, expected whole numbers"),
@@ -374,6 +377,18 @@ def test_evaluation_of_files_takes_nothing_in_vain(tmp_path, monkeypatch, caplog
 def test_assets_go_into_a_folder(world):
     with pytest.raises(errors.InvalidValueError, match="folder: s3://bucket/assets is a URL, expected a folder"):
         petcomp.asset.build(world / "photos.csv", "s3://bucket/assets")
+
+
+@pytest.mark.parametrize("classes", [[""], [" a "], ["a\nb"], ["\x01"], ["x" * 121]])
+def test_class_names_fit_every_format(tmp_path, classes):
+    sample = petcomp.Sample.from_masks(np.zeros((4, 4, 3), np.uint8), [], [], ["a"])
+    for use in (
+        lambda: petcomp.generate(lambda k: sample, 1, tmp_path / "set", classes=classes),
+        lambda: petcomp.Sample.from_masks(np.zeros((4, 4, 3), np.uint8), [], [], classes),
+    ):
+        with pytest.raises(errors.InvalidValueError, match="^classes: .*expected a name on one line") as refused:
+            use()
+        assert refused.value.at == "classes" and refused.value.what.endswith("spaces")
 
 
 @pytest.mark.parametrize("classes", ["bottle", ["a", "a"], ["a", 1], 3])

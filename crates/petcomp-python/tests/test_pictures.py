@@ -219,6 +219,18 @@ def test_ids_of_masks_are_those_of_the_last_one_there():
     assert np.isinf(sample.depth).all()
 
 
+def test_masks_behind_others_are_hidden_there():
+    masks = np.zeros((3, 3, 4), bool)
+    masks[0, 1, 1] = masks[1, :2, :3] = masks[2, 1:, 1:] = True
+    sample = petcomp.Sample.from_masks(np.zeros((3, 4, 3), np.uint8), list(masks), [0, 0, 0], ["a"])
+    shares = [found["visible_fraction"] for found in sample.labels["objects"]]
+    assert np.allclose(shares, [0, 4 / 6, 1])
+    for found in sample.labels["objects"]:
+        x0, y0, x1, y1 = found["visible_box"]
+        seen = np.argwhere(sample.ids == found["id"])
+        assert seen.size == 0 or [x0, y0, x1, y1] == [*seen.min(0)[::-1], *(seen.max(0) + 1)[::-1]]
+
+
 def test_a_card_above_covers_the_one_below():
     two = shot().with_card(
         petcomp.Card(id=2, texture=np.full((4, 4, 3), 200, np.uint8), size=(0.2, 0.1), position=(0, 0, 0.1))

@@ -78,7 +78,7 @@ impl Folder {
     /// As [`Folder::file`].
     pub(crate) fn folder(&self, name: &str) -> Answer<PathBuf> {
         if name.is_empty() {
-            return Ok(self.root.clone());
+            return Ok(self.here().to_path_buf());
         }
         check_name(name)?;
         let path = io::below(&self.root, name).map_err(not_found)?;
@@ -268,6 +268,14 @@ mod tests {
         std::fs::write(dir.path().join("secret.txt"), "b").unwrap();
         let folder = Folder::open(&root).unwrap();
         (dir, folder)
+    }
+
+    #[test]
+    fn the_working_folder_can_be_listed() {
+        for root in [".", "./"] {
+            let folder = Folder::open(Path::new(root)).unwrap().folder("").unwrap();
+            assert!(std::fs::read_dir(folder).is_ok(), "{root}");
+        }
     }
 
     #[test]

@@ -7,6 +7,8 @@ mod overrides;
 
 pub(crate) use mistake::suggestion;
 pub use overrides::Override;
+#[cfg(feature = "pipeline")]
+pub(crate) use overrides::check_depth;
 
 use super::fs::{read_regular, write_bytes};
 use super::options::ReadOptions;

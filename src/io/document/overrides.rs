@@ -6,6 +6,9 @@ use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 use toml::Value;
 
+/// Most levels of a path.
+const MAX_DEPTH: usize = 60;
+
 /// A value and its path in a document.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Override {
@@ -23,6 +26,7 @@ impl FromStr for Override {
             return Err(Error::value(text, "no value, expected KEY=VALUE"));
         };
         let path = path.trim().to_owned();
+        check_depth(&path)?;
         let value = parse_value(value).map_err(|what| Error::value(&path, what))?;
         if is_finite(&value) {
             return Ok(Self { path, value });
@@ -30,6 +34,17 @@ impl FromStr for Override {
         let what = format!("{value}, expected a finite number");
         Err(Error::value(path, what))
     }
+}
+
+/// Fails for a path of more names than a document has levels: some take the stack for each level.
+pub(crate) fn check_depth(path: &str) -> Result<()> {
+    let depth = path.split(['.', '[']).count();
+    if depth <= MAX_DEPTH {
+        return Ok(());
+    }
+    let start: String = path.chars().take(MAX_DEPTH).collect();
+    let what = format!("{depth} names deep, expected at most {MAX_DEPTH}");
+    Err(Error::value(format!("{start}.."), what))
 }
 
 impl Display for Override {
@@ -133,6 +148,16 @@ mod tests {
         let mut table: toml::Table = document.parse().expect("valid TOML");
         text.parse::<Override>()?.apply(&mut table)?;
         Ok(toml::to_string(&table).expect("was TOML before"))
+    }
+
+    #[test]
+    fn a_path_of_any_depth_is_refused() {
+        let text = format!("{}=1", vec!["a"; 100_000].join("."));
+        let refused = text.parse::<Override>().unwrap_err().to_string();
+        assert!(
+            refused.ends_with("100000 names deep, expected at most 60"),
+            "{refused}"
+        );
     }
 
     #[test]

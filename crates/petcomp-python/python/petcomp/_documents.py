@@ -5,16 +5,31 @@ from __future__ import annotations
 import json
 import math
 import os
+import unicodedata
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from .errors import ArgumentTypeError, InvalidValueError
 
-__all__ = ["check_array", "class_names", "dumped", "folder_of", "loaded", "overrides", "path_of", "plain"]
+__all__ = [
+    "check_array",
+    "class_names",
+    "dumped",
+    "folder_of",
+    "label_names",
+    "loaded",
+    "numbers_in",
+    "overrides",
+    "path_of",
+    "plain",
+]
 
 _MOST_LEVELS = 60
+# Of a class.
+_MOST_NAME_BYTES = 120
 #: An array that only claims to be large, as by broadcasting, must not be written out.
 _MOST_NUMBERS = 10_000_000
 
@@ -103,6 +118,15 @@ def _toml(at: str, value: Any) -> str:
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
+def numbers_in(value: Any) -> npt.NDArray[Any]:
+    """Convert to an array; fail for what NumPy would convert to numbers: texts, dates, complex numbers."""
+    given = np.asarray(value)
+    texts = given.dtype == object and any(isinstance(one, (str, bytes)) for one in given.flat)
+    if texts or given.dtype.kind not in "biufO":
+        raise TypeError(f"not real numbers: {given.dtype}")
+    return given
+
+
 def class_names(value: Any) -> list[str]:
     """Check a list of class names, which must be unique."""
     if isinstance(value, str) or not isinstance(value, Iterable):
@@ -114,6 +138,22 @@ def class_names(value: Any) -> list[str]:
     if len(set(names)) < len(names):
         raise InvalidValueError(f"classes: {names}, expected each name once")
     return names
+
+
+def label_names(value: Any) -> list[str]:
+    """Check a list of class names that are to be written."""
+    names = class_names(value)
+    for name in names:
+        if not _is_class_name(name):
+            what = "expected a name on one line without leading or trailing spaces"
+            raise InvalidValueError(f"classes: {name[:_MOST_NAME_BYTES]!r}, {what}")
+    return names
+
+
+def _is_class_name(name: str) -> bool:
+    """Whether every format of labels can hold a name, as in photo lists."""
+    is_short = 0 < len(name.encode(errors="replace")) <= _MOST_NAME_BYTES
+    return is_short and name == name.strip() and not any(unicodedata.category(c) == "Cc" for c in name)
 
 
 def path_of(name: str, value: Any) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _petcomp
-from ._documents import check_array, dumped, loaded
+from ._documents import check_array, dumped, loaded, numbers_in
 from ._show import table
 from .errors import InvalidValueError
 
@@ -39,12 +39,7 @@ def _array(name: str, value: Any, shape: tuple[int, ...]) -> npt.NDArray[np.floa
     """The same, as a C-contiguous array."""
     check_array(name, value, _MOST_COORDINATES)
     try:
-        given = np.asarray(value)
-        # NumPy would parse strings, convert dates and drop imaginary parts.
-        texts = given.dtype == object and any(isinstance(one, (str, bytes)) for one in given.flat)
-        if texts or given.dtype.kind not in "biufO":
-            raise TypeError
-        array = np.require(given, np.float64, ["C", "A"])
+        array = np.require(numbers_in(value), np.float64, ["C", "A"])
     except (TypeError, ValueError, OverflowError):
         raise InvalidValueError(f"{name}: {value!r}, expected numbers of shape {shape}") from None
     fits = array.ndim == len(shape) and all(want in (-1, got) for want, got in zip(shape, array.shape))

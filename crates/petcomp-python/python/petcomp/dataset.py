@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import _petcomp
-from ._documents import class_names, dumped, loaded, path_of
+from ._documents import dumped, label_names, loaded, path_of
 from .errors import ArgumentTypeError, InvalidValueError
 from .pipeline import Pipeline, _number
 from .sample import Sample
@@ -157,7 +157,7 @@ def _with(make: Any, classes: Sequence[str] | None, layout: list[str], target: A
             return sample._native
         raise ArgumentTypeError(f"source: returned {type(sample).__name__} for {k}, expected a Sample")
 
-    return _petcomp.generate_with(native, class_names(classes), layout, target, report)
+    return _petcomp.generate_with(native, label_names(classes), layout, target, report)
 
 
 def _opened(source: Any, seed: int | None, set: Mapping[str, Any] | None, quality: str | None) -> Pipeline:

@@ -29,6 +29,14 @@ class Error(Exception):
     what: str | None = None
 
 
+class _OfValue(Error):
+    """An error whose message names the value, then says what is wrong with it."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.at, _, self.what = message.partition(": ")
+
+
 class FileError(Error, OSError):
     """A file that cannot be read, parsed or written."""
 
@@ -41,11 +49,11 @@ class FieldError(Error, ValueError):
     """An invalid value in a well-formed document."""
 
 
-class InvalidValueError(Error, ValueError):
+class InvalidValueError(_OfValue, ValueError):
     """An invalid argument, scene or option."""
 
 
-class ArgumentTypeError(Error, TypeError):
+class ArgumentTypeError(_OfValue, TypeError):
     """An argument of the wrong type, or an array of the wrong dtype."""
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _petcomp
-from ._documents import check_array, class_names, folder_of, loaded, path_of
+from ._documents import check_array, class_names, folder_of, loaded, numbers_in, path_of
 from ._show import table
 from .camera import _pixels
 from .errors import ArgumentTypeError, InvalidValueError
@@ -149,8 +149,8 @@ def _numbers(at: str, value: Any) -> npt.NDArray[np.float64]:
         raise InvalidValueError(f"{at}: missing, expected numbers")
     check_array(at, value)
     try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        return np.asarray(numbers_in(value), dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidValueError(f"{at}: {error}, expected numbers") from None
 
 

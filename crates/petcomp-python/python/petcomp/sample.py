@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _petcomp
-from ._documents import class_names, loaded
+from ._documents import label_names, loaded
 from ._show import image_tag, png, table
 from .errors import InvalidValueError
 from .scene import Scene
@@ -47,7 +47,7 @@ class Sample:
         * ``object_classes``: the class of each object, an index into ``classes``
         """
         numbers = [_class_number(number) for number in object_classes]
-        return cls(_petcomp.Sample.from_masks(image, list(masks), numbers, class_names(classes)))
+        return cls(_petcomp.Sample.from_masks(image, list(masks), numbers, label_names(classes)))
 
     @property
     def size(self) -> tuple[int, int]:

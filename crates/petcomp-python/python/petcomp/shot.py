@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _petcomp
-from ._documents import class_names, dumped
+from ._documents import dumped, label_names
 from .camera import Camera, _floats
 from .errors import ArgumentTypeError, InvalidValueError
 from .sample import Sample
@@ -122,7 +122,7 @@ def render(shot: Shot) -> Sample:
             "exposure": shot.exposure,
             "render": shot.options,
             "labels": shot.labels,
-            "classes": class_names(shot.classes),
+            "classes": label_names(shot.classes),
         },
     )
     places = [card._place() for card in shot.cards]
