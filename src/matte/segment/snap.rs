@@ -12,6 +12,9 @@ use rayon::prelude::*;
 /// How far to either side of the outline the change is searched for, in pixels of the picture that
 /// was searched.
 const PROFILE_REACH_PX: f64 = 1.5;
+/// How far inside the outline a change that still rises at the end of the profile is followed,
+/// likewise: the outline of a blurred object lies outside it by the width of its edge.
+const INNER_REACH_PX: f64 = 4.0;
 /// Where the outside is taken from, beyond the reach, likewise.
 const OUTSIDE_PX: f64 = 2.0;
 /// Steps of a profile to a pixel of the search.
@@ -24,6 +27,8 @@ const LANE_COUNT: i32 = 3;
 const MIN_CHANGE_SIGMAS: f32 = 5.0;
 /// .. and from this share of the strongest one nearby: less is a shadow before the object.
 const MIN_CHANGE_SHARE: f32 = 0.2;
+/// How many times as large the change must be a step farther inside to be followed beyond the reach.
+const MIN_RISE: f32 = 1.08;
 /// Least noise: a step of an 8-bit picture.
 const ROUNDING_STEP: f32 = 1.0 / 255.0;
 /// Points to either side whose median a displacement becomes.
@@ -38,7 +43,8 @@ const MEDIAN_REACH: usize = 2;
 /// # Method
 /// Along the normal through each point, from the outside inwards: the first local maximum of the
 /// difference from the outside (of square roots, all channels) that stands out of the noise; the
-/// outline is where the difference has half that value. Displacements pass a median of five along
+/// outline is where the difference has half that value. A difference that still rises clearly at the
+/// inner end is followed farther inwards. Displacements pass a median of five along
 /// the outline. A blurred step of light has half its height at its true place, whatever the blur;
 /// one of square roots farther to its darker side, the more it is blurred.
 pub(super) fn snapped(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -> Outline {
@@ -150,9 +156,14 @@ fn is_near_border(v: f64, len: f64, scale: f64) -> bool {
     v <= scale || v >= len - scale
 }
 
+/// Number of steps of a profile over a length, pixels of the search.
+fn steps(length_px: f64) -> usize {
+    (length_px * STEPS_PER_PX as f64) as usize
+}
+
 /// The colours along the normal beyond the reach of a profile.
 fn outside_colors(roots: &Image<LinearRgb>, point: &EdgePoint, scale: f64) -> Vec<LinearRgb> {
-    (0..(OUTSIDE_PX * STEPS_PER_PX as f64) as usize)
+    (0..steps(OUTSIDE_PX))
         .map(|k| point.mean_at(roots, PROFILE_REACH_PX + k as f64 * STEP_PX, scale))
         .collect()
 }
@@ -168,14 +179,19 @@ struct EdgeProfile {
 impl EdgeProfile {
     fn new(roots: &Image<LinearRgb>, point: &EdgePoint, scale: f64) -> Self {
         let (mean, noise) = mean_and_deviation(&outside_colors(roots, point, scale));
-        let change = (0..=(2.0 * PROFILE_REACH_PX * STEPS_PER_PX as f64) as usize).map(|k| {
+        let change_at = |k: usize| {
             let inwards = point.mean_at(roots, PROFILE_REACH_PX - k as f64 * STEP_PX, scale);
             distance(inwards, mean)
-        });
-        Self {
-            change: change.collect(),
-            noise,
+        };
+        let mut change: Vec<f32> = (0..=steps(2.0 * PROFILE_REACH_PX)).map(change_at).collect();
+        for k in change.len()..=steps(PROFILE_REACH_PX + INNER_REACH_PX) {
+            let next = change_at(k);
+            if next <= MIN_RISE * change[k - 1] {
+                break;
+            }
+            change.push(next);
         }
+        Self { change, noise }
     }
 
     /// Where the first clear change is half done: outwards from the outline, pixels of the search.
@@ -268,6 +284,14 @@ mod tests {
             // half of less lies farther out.
             assert!(worst < 0.6, "from {radius}: {worst} px off");
         }
+    }
+
+    #[test]
+    fn an_outline_around_a_blurred_edge_comes_to_it() {
+        let blurred = filter::gaussian_blur(&photo(), 0.8);
+        let snapped = snapped(&circle(32.6), &blurred, 1.0);
+        let radius = (snapped.area() / std::f64::consts::PI).sqrt();
+        assert!((radius - 30.3).abs() < 0.5, "radius {radius}");
     }
 
     #[test]
