@@ -59,6 +59,10 @@ impl EvalTruth {
             check_alone(images, size)?;
             return Self::of_images(path, path.join("data.yaml"), YoloSet::read(path)?.val);
         }
+        if path.is_file() {
+            let what = "a file, expected a folder of YOLO labels, a list of images (.txt) or a COCO document (.json)";
+            return Err(Error::file(path, what));
+        }
         let keypoints = YoloSet::keypoint_numbers_of(path)?;
         let truth = read_pose_truth(path, images, size, keypoints)?;
         Ok(Self::of_yolo(truth, path.into()))
@@ -103,13 +107,23 @@ impl EvalTruth {
     pub fn with_detections(&self, predictions: &Path) -> Result<Vec<EvalImage>> {
         match &self.boxes {
             Boxes::Coco(truth) => {
+                if predictions.is_dir() {
+                    let what = "a folder, expected COCO results (.json), since the truth is a COCO document";
+                    return Err(Error::file(predictions, what));
+                }
                 let mut truth = truth.clone();
                 read_coco_results(predictions, &mut truth)?;
                 Ok(truth.sheets)
             }
-            Boxes::Yolo { truth, .. } => {
+            Boxes::Yolo { truth, place } => {
+                if predictions.is_file() {
+                    let what =
+                        "a file, expected a folder of YOLO labels, since the truth has YOLO labels";
+                    return Err(Error::file(predictions, what));
+                }
                 let mut truth = truth.clone();
                 read_yolo_detections(predictions, &mut truth)?;
+                warn_of_unnamed(predictions, &truth.sheets, place);
                 Ok(truth.sheets)
             }
         }
@@ -166,6 +180,23 @@ fn by_name(mut images: Vec<PathBuf>) -> Vec<PathBuf> {
     images
 }
 
+/// Warns of detections of classes that the truth's data.yaml does not name: often both number them
+/// differently.
+fn warn_of_unnamed(predictions: &Path, sheets: &[EvalImage], place: &Path) {
+    let named = YoloSet::class_names_of(place).map_or(0, |names| names.len());
+    let classes = sheets.iter().flat_map(|sheet| &sheet.found);
+    let unnamed = classes
+        .map(|found| found.class as usize)
+        .filter(|&class| class >= named);
+    if let (1.., Some(highest)) = (named, unnamed.clone().max()) {
+        log::warn!(
+            "{}: {} detections of classes up to {highest}, but data.yaml names {named}, numbered from 0",
+            predictions.display(),
+            unnamed.count()
+        );
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -215,6 +246,18 @@ mod tests {
                 (vec!["cap".into()], 2)
             );
         }
+    }
+
+    #[test]
+    fn files_of_another_kind_are_refused() {
+        let root = set_and_choice();
+        let told = |refused: Error| refused.to_string();
+        let yaml = root.path().join("choice/data.yaml");
+        let refused = EvalTruth::read(&yaml, None, None).map(drop).unwrap_err();
+        assert!(told(refused).contains("a file, expected a folder of YOLO labels"));
+        let truth = EvalTruth::read(&root.path().join("choice"), None, None).unwrap();
+        let refused = truth.with_detections(&yaml).unwrap_err();
+        assert!(told(refused).contains("a file, expected a folder of YOLO labels"));
     }
 
     #[test]

@@ -330,7 +330,8 @@ impl Pipeline {
         seed: u64,
         k: u64,
     ) -> Result<(Scene, Vec<Drawn>)> {
-        recipe.explained(seed, k, &self.backgrounds, &self.catalog)
+        let explained = recipe.explained(seed, k, &self.backgrounds, &self.catalog);
+        explained.map_err(|e| e.within("scene"))
     }
 
     /// Fails if a scene of another recipe could not be composed of the same assets and photos.

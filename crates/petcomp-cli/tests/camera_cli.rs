@@ -675,6 +675,18 @@ fn an_image_beyond_the_dataset_is_refused() {
 }
 
 #[test]
+fn the_part_of_one_of_consecutive_images_needs_their_number() {
+    let desk = Desk::with_recipe();
+    desk.label("a", &desk.photo("a", IMAGE));
+    let generate = "dataset generate recipe.toml -o out --set split.order=\"consecutive\" --only 3";
+    let told = desk.refused(&words(generate));
+    assert!(told.contains("--count: missing, expected"), "{told}");
+    assert!(!desk.path("out").exists());
+    desk.ok(&words(&format!("{generate} -n 20")));
+    assert!(desk.path("out/images/train/000003.png").is_file());
+}
+
+#[test]
 fn a_recipe_is_fitted_to_its_photos() {
     let desk = Desk::with_recipe();
     desk.label("a", &desk.photo("a", IMAGE));

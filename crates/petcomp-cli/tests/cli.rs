@@ -350,6 +350,39 @@ fn a_set_for_training_alone_has_batches_and_anchors() {
     ));
     let said = desk.ok(&words("dataset anchors set -n 1"));
     assert!(said.contains("mean IoU 1.000"), "{said}");
+    desk.write("set/labels/a.txt", "");
+    let told = desk.refused(&words("dataset anchors set -n 1"));
+    assert!(told.contains("no boxes in the labels"), "{told}");
+}
+
+#[test]
+fn a_missing_image_is_found_once() {
+    let desk = Desk::new();
+    write_slab(&desk.path("set/images/a.png"));
+    desk.write("set/labels/a.txt", "0 0.5 0.5 0.4 0.4\n");
+    desk.write("set/train.txt", "images/a.png\nimages/gone.png\n");
+    desk.write("set/none.txt", "");
+    let yaml = "train: train.txt\nval: none.txt\nnames: [cap]\n";
+    desk.write("set/data.yaml", yaml);
+    let output = desk.run(&words("dataset check set"));
+    let told = text(&[output.stdout, output.stderr].concat());
+    assert_eq!(told.matches("gone").count(), 1, "{told}");
+}
+
+#[test]
+fn detections_of_classes_without_a_name_are_told() {
+    let desk = Desk::new();
+    write_slab(&desk.path("set/images/a.png"));
+    desk.write("set/labels/a.txt", "0 0.5 0.5 0.4 0.4\n");
+    let yaml = "train: images\nval: images\nnames: [cap]\n";
+    desk.write("set/data.yaml", yaml);
+    let eval = words("eval found set/labels -o report");
+    for (class, is_told) in [("0", false), ("1", true)] {
+        desk.write("found/a.txt", format!("{class} 0.5 0.5 0.4 0.4 0.9\n"));
+        let told = text(&desk.run(&eval).stderr);
+        let expected = "1 detections of classes up to 1, but data.yaml names 1, numbered from 0";
+        assert_eq!(told.contains(expected), is_told, "{told}");
+    }
 }
 
 #[test]
@@ -1779,6 +1812,8 @@ fn an_environment_map_lies_beside_its_recipe() {
     // A scene file names it as the recipe does, and no file of elsewhere.
     let draw = format!("scene draw demo/recipe.toml -o scene.toml {set}");
     desk.ok(&words(&draw));
+    let told = desk.refused(&words(&format!("{draw} --set scene.distractors=2")));
+    assert!(told.contains("scene.distractors: 2 requested"), "{told}");
     let render = "render scene.toml demo/recipe.toml -o frame.png";
     desk.ok(&words(&format!("{render} {set}")));
     desk.ok(&words(render));

@@ -79,6 +79,10 @@ impl CheckedImage {
     fn read_labels(&mut self, folder: &Path, class_count: Option<usize>) {
         let label = YoloSet::label_of(&self.path);
         let Ok(text) = io::read_text(folder.join(&label)) else {
+            // A missing image is reported already.
+            if !folder.join(&self.path).exists() {
+                return;
+            }
             let message = format!("missing or not text, but {} exists", self.path.display());
             return self
                 .findings

@@ -10,7 +10,7 @@ use crate::output::Output;
 use crate::print;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use petcomp::dataset::{self, DatasetConfig, Pipeline, Plan};
-use petcomp::dataset::{SampleRange, ShardChoice};
+use petcomp::dataset::{SampleRange, ShardChoice, SplitOrder};
 use petcomp::{Error, Quality};
 use std::path::{Path, PathBuf};
 
@@ -63,6 +63,7 @@ pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()
     let whole = args.recipe.read_config_at(args.quality)?;
     let range = args.sample_range()?;
     let (whole_px, config) = (whole.scene.image, args.reduced(whole));
+    args.check_count(config.split.order)?;
     let archives = config.labels.archives();
     let folder = range.folder(&args.output.folder(args.scratch.as_deref())?, archives);
     if args.resume {
@@ -114,6 +115,17 @@ impl GenerateArgs {
             store: self.output.open()?,
             ..pipeline.plan(self.image_count(), self.seed, folder)?
         })
+    }
+
+    /// Fails if the part of a single image depends on a number of images that is not given.
+    fn check_count(&self, order: SplitOrder) -> petcomp::Result<()> {
+        let is_unknown = self.count.is_none() && self.only.is_some();
+        if is_unknown && order == SplitOrder::Consecutive {
+            let what = "missing, expected the number of images in the whole dataset: with split.order = \
+                        \"consecutive\" the part of image --only depends on it";
+            return Err(Error::value("--count", what));
+        }
+        Ok(())
     }
 
     /// Number of images of the whole dataset, or of the preview.

@@ -5,6 +5,7 @@ use crate::output::folder_parser;
 use crate::print;
 use crate::values::count;
 use clap::value_parser;
+use petcomp::Error;
 use petcomp::dataset::YoloSet;
 use petcomp::eval::{YoloTruth, read_yolo_truth_of};
 use petcomp::io;
@@ -205,7 +206,12 @@ fn fit_anchors(args: &AnchorsArgs) -> anyhow::Result<()> {
     let set = train::kit::open_for_training(&args.folder)?;
     let truth = read_yolo_truth_of(&set.train)?;
     let sides = box_sides(&truth, f64::from(args.side));
-    print_anchors(&train::anchors(&sides, args.count, args.seed));
+    let found = train::anchors(&sides, args.count, args.seed);
+    if found.sizes.is_empty() {
+        let what = "no boxes in the labels of its training images, expected at least one";
+        return Err(Error::file(&args.folder, what).into());
+    }
+    print_anchors(&found);
     Ok(())
 }
 
