@@ -98,6 +98,21 @@ impl Roi {
         }
     }
 
+    /// The largest middle part of a picture that has the shape of another; sizes are width and
+    /// height.
+    pub(crate) fn middle_of(picture: [u32; 2], shape: [u32; 2]) -> Self {
+        let [w, h] = picture.map(u64::from);
+        let [across, down] = shape.map(u64::from);
+        let width = w.min((h * across).div_ceil(down)) as usize;
+        let height = h.min((w * down).div_ceil(across)) as usize;
+        Self {
+            x: (w as usize - width) / 2,
+            y: (h as usize - height) / 2,
+            width,
+            height,
+        }
+    }
+
     /// Grown by `by` pixels on every side, kept inside a picture of `width` x `height`.
     pub fn grown(self, by: usize, width: usize, height: usize) -> Self {
         let x0 = self.x.saturating_sub(by);
@@ -433,6 +448,18 @@ impl<P> std::fmt::Debug for Image<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_middle_of_a_picture_has_the_other_one_s_shape() {
+        for (picture, kept) in [
+            ([1280, 960], [0, 0, 1280, 960]),
+            ([1920, 960], [320, 0, 1280, 960]),
+            ([600, 1000], [0, 275, 600, 450]),
+        ] {
+            let part = Roi::middle_of(picture, [640, 480]);
+            assert_eq!([part.x, part.y, part.width, part.height], kept);
+        }
+    }
 
     #[test]
     fn rows_lie_from_the_top() {

@@ -1,6 +1,7 @@
 //! The pinhole camera.
 
 use crate::geom::{Homography, Point2, Point3, Pose, Ray, UnitQuaternion, Vector2, Vector3};
+use crate::image::Roi;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
@@ -141,6 +142,21 @@ impl Camera {
             principal_px: self.principal_px.coords.component_mul(&k).into(),
             ..*self
         }
+    }
+
+    /// The camera of a part of its picture.
+    pub(crate) fn cropped(&self, part: Roi) -> Self {
+        Self {
+            image: [part.width as u32, part.height as u32],
+            principal_px: self.principal_px - Vector2::new(part.x as f64, part.y as f64),
+            ..*self
+        }
+    }
+
+    /// The camera of the middle of its picture in the shape of another picture, at that one's size.
+    pub(crate) fn covering(&self, image: [u32; 2]) -> Self {
+        self.cropped(Roi::middle_of(self.image, image))
+            .resized(image)
     }
 }
 

@@ -1,12 +1,12 @@
 //! Labelled photos of the place that scenes are set in.
 
 use crate::asset;
-use crate::camera::{self, Camera, LabelledPhoto, PhotoCamera};
+use crate::camera::{self, LabelledPhoto, PhotoCamera};
 use crate::dataset::paths::folder_of;
 use crate::dataset::photo_memory::PhotoMemory;
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::geom::{Point2, Point3, Vector2};
+use crate::geom::{Point2, Point3};
 use crate::image::{Image, Roi};
 use crate::io::{self, Format, FromFile};
 use crate::light::{MeasuredPlate, PlateMeasures};
@@ -155,9 +155,9 @@ impl BackgroundPhoto {
         memory: &Arc<PhotoMemory>,
     ) -> Result<Self> {
         let photo = photo_path(labelled)?;
-        let shown = cropped(seen.camera, middle_part(labelled.label.image_size(), image));
+        let shown = Roi::middle_of(labelled.label.image_size(), image);
         camera::check_camera_distance(&seen.camera)
-            .and_then(|()| camera::check_lens(&shown, seen.k1))
+            .and_then(|()| camera::check_lens(&seen.camera.cropped(shown), seen.k1))
             .map_err(|e| e.in_file(&labelled.source))?;
         let mut background = Self::cropped_to(image, labelled, seen, photo, memory);
         background.notes.extend(background.shape_note());
@@ -173,13 +173,12 @@ impl BackgroundPhoto {
         memory: &Arc<PhotoMemory>,
     ) -> Self {
         let taken = labelled.label.image_size();
-        let kept = middle_part(taken, image);
-        let camera = cropped(seen.camera, kept).resized(image);
+        let kept = Roi::middle_of(taken, image);
         Self {
             background: Background {
                 name: labelled.name.clone(),
                 size: seen.size,
-                camera: CameraSource::Known(camera),
+                camera: CameraSource::Known(seen.camera.covering(image)),
                 k1: seen.k1,
                 shown_share: kept.width.max(kept.height) as f64 / f64::from(taken[0].max(taken[1])),
                 albedo: labelled.label.surface.albedo,
@@ -204,6 +203,24 @@ impl BackgroundPhoto {
         files.check(&self.photo, photo)?;
         let mut front = self.front.iter().zip(front);
         front.try_for_each(|(mask, crc32)| files.check(mask, crc32))
+    }
+
+    /// Fails if a scene's rectangle was labelled in a photo of another shape; the picture itself is
+    /// the middle of the photo.
+    pub(crate) fn check_labelled(&self, camera: &CameraSource) -> Result<()> {
+        let CameraSource::Rectangle { photo, .. } = *camera else {
+            return Ok(());
+        };
+        let sizes = [self.taken, self.image];
+        if sizes
+            .iter()
+            .any(|&size| camera::have_same_shape(photo, size))
+        {
+            return Ok(());
+        }
+        let [w, h] = self.taken;
+        let what = format!("{photo:?}, expected the shape of the plate's photo, {w} x {h}");
+        Err(Error::value("camera.rectangle.photo", what))
     }
 
     /// The share of the photo that pictures show.
@@ -467,20 +484,6 @@ fn photo_path(labelled: &LabelledPhoto) -> Result<PathBuf> {
         .map_err(|e| e.within("image").in_file(&labelled.source))
 }
 
-/// The largest middle part of a photo that has the shape of the picture.
-fn middle_part(photo: [u32; 2], image: [u32; 2]) -> Roi {
-    let [w, h] = photo.map(u64::from);
-    let [iw, ih] = image.map(u64::from);
-    let width = w.min((h * iw).div_ceil(ih)) as usize;
-    let height = h.min((w * ih).div_ceil(iw)) as usize;
-    Roi {
-        x: (w as usize - width) / 2,
-        y: (h as usize - height) / 2,
-        width,
-        height,
-    }
-}
-
 /// Whether a pixel is in a frame of size `seen` about the middle of a picture of size `size`, or
 /// close to it.
 fn is_within(px: Point2<f64>, size: [f64; 2], seen: [f64; 2]) -> bool {
@@ -489,15 +492,6 @@ fn is_within(px: Point2<f64>, size: [f64; 2], seen: [f64; 2]) -> bool {
 
 fn is_within_side(at: f64, size: f64, seen: f64) -> bool {
     (at - size / 2.0).abs() < (0.5 + CUT_OFF_SHARE) * seen
-}
-
-/// The camera of a part of its picture.
-fn cropped(camera: Camera, kept: Roi) -> Camera {
-    Camera {
-        image: [kept.width as u32, kept.height as u32],
-        principal_px: camera.principal_px - Vector2::new(kept.x as f64, kept.y as f64),
-        ..camera
-    }
 }
 
 #[cfg(test)]
@@ -514,7 +508,7 @@ mod tests {
         let shade = |x: usize, y: usize| LinearRgb::grey((name.len() * (x + width * y)) as f32);
         let photo = folder.join(name).with_extension("exr");
         io::write(&photo, &Image::from_fn(width, height, shade)).unwrap();
-        let kept = middle_part(TAKEN.map(|side| side as u32), image);
+        let kept = Roi::middle_of(TAKEN.map(|side| side as u32), image);
         BackgroundPhoto {
             background: Background {
                 name: name.into(),
@@ -545,6 +539,31 @@ mod tests {
 
     fn plate(place: &BackgroundPhoto, zoom: f64) -> Arc<Image<LinearRgb>> {
         place.plate_for_zoom(zoom).unwrap().image
+    }
+
+    #[test]
+    fn corners_are_of_the_whole_photo_or_of_the_picture() {
+        let folder = tempfile::tempdir().unwrap();
+        let memory = Arc::new(PhotoMemory::of_bytes(1 << 20));
+        let square = BackgroundPhoto {
+            image: [4, 4],
+            ..place(folder.path(), "a", &memory)
+        };
+        let checked = |photo| {
+            square.check_labelled(&CameraSource::Rectangle {
+                corners_px: [[0.0; 2]; 4],
+                photo,
+                focal_px: None,
+            })
+        };
+        for photo in [[16, 12], [1600, 1200], [400, 400]] {
+            checked(photo).unwrap();
+        }
+        let refusal = checked([400, 200]).unwrap_err().to_string();
+        assert_eq!(
+            refusal,
+            "camera.rectangle.photo: [400, 200], expected the shape of the plate's photo, 16 x 12"
+        );
     }
 
     #[test]
@@ -630,17 +649,5 @@ mod tests {
         let labelled = BTreeSet::from([OsStr::new("a")]);
         let unlabelled = unlabelled_photos(folder.path(), &labelled);
         assert_eq!(unlabelled, ["B.JPG", "c.png"]);
-    }
-
-    #[test]
-    fn the_middle_of_a_photo_is_kept_in_the_picture_s_shape() {
-        for (photo, kept) in [
-            ([1280, 960], [0, 0, 1280, 960]),
-            ([1920, 960], [320, 0, 1280, 960]),
-            ([600, 1000], [0, 275, 600, 450]),
-        ] {
-            let part = middle_part(photo, [640, 480]);
-            assert_eq!([part.x, part.y, part.width, part.height], kept);
-        }
     }
 }

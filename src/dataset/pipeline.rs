@@ -448,7 +448,7 @@ impl Pipeline {
     /// # Errors
     /// As [`take`](Self::take).
     pub fn label(&self, scene: Scene) -> Result<Labels> {
-        self.check_image(&scene)?;
+        self.check_plate(&scene)?;
         let plate = scene.plate.clone();
         let (scene, shot) = self.resolve(scene.unlit())?;
         let shot = self.behind_front(&plate, &scene, shot)?;
@@ -483,7 +483,7 @@ impl Pipeline {
 
     fn resolve_within(&self, scene: Scene, allowance: &Allowance) -> Result<(Scene, Shot)> {
         let place = self.known_place(&scene.plate)?;
-        self.check_image(&scene)?;
+        self.check_plate(&scene)?;
         let mut scene = self.rest(locate(scene)?, allowance)?;
         let panorama = self.panorama(&scene)?;
         let mut plate = None;
@@ -552,6 +552,13 @@ impl Pipeline {
             None if !name.is_empty() => Err(self.unknown_plate(name)),
             place => Ok(place),
         }
+    }
+
+    /// Fails on a scene that does not suit its plate.
+    fn check_plate(&self, scene: &Scene) -> Result<()> {
+        self.check_image(scene)?;
+        let place = self.place(&scene.plate);
+        place.map_or(Ok(()), |place| place.check_labelled(&scene.camera))
     }
 
     /// Fails on a scene over a plate that was opened for pictures of another size.

@@ -36,7 +36,8 @@ impl Scene {
         check_exposure(self.exposure)
     }
 
-    fn check_view(&self) -> Result<()> {
+    /// Checks the picture, the surface and the camera.
+    pub(super) fn check_view(&self) -> Result<()> {
         check_image(self.image)?;
         check_surface(&self.surface)?;
         check_camera(&self.camera)?;

@@ -4,14 +4,15 @@ use crate::camera::{Camera, Label, SolveOptions, solve};
 use crate::error::Result;
 use crate::scene::{CameraSource, Scene};
 
-/// Solves a scene's camera if it is still a labelled rectangle, and scales it to the scene's
-/// picture size.
+/// Solves a scene's camera if it is still a labelled rectangle.
+///
+/// The scene's picture shows the largest middle part of the photo that has its shape.
 ///
 /// A scene whose camera is known is unchanged: `locate(locate(s)) == locate(s)`.
 ///
 /// # Errors
 /// [`Error::Camera`](crate::Error::Camera) for corners that no camera can have seen, or that none
-/// fits.
+/// fits; [`Error::Value`](crate::Error::Value) for a value of the view that cannot be right.
 pub fn locate(scene: Scene) -> Result<Scene> {
     let CameraSource::Rectangle {
         corners_px,
@@ -21,11 +22,12 @@ pub fn locate(scene: Scene) -> Result<Scene> {
     else {
         return Ok(scene);
     };
+    scene.check_view()?;
     let mut label = Label::new(photo, corners_px, scene.surface.size);
     label.camera.focal_px = focal_px;
     // The corners were clicked in the plate.
     label.camera.k1 = Some(scene.lens.k1_of_plate()).filter(|&k1| k1 != 0.0);
-    let camera = solve_camera(&label, &scene.plate)?.resized(scene.image);
+    let camera = solve_camera(&label, &scene.plate)?.covering(scene.image);
     Ok(Scene {
         camera: CameraSource::Known(camera),
         ..scene
@@ -73,6 +75,7 @@ mod tests {
             panic!("still unknown")
         };
         assert_eq!(camera.image, [640, 480]);
+    use crate::geom::{Point2, Vector2};
         assert!((camera.focal_px.x - 1374.852 / 2.0).abs() < 10.0);
         assert_eq!(locate(once.clone()).unwrap(), once);
     }
@@ -102,3 +105,28 @@ mod tests {
         );
     }
 }
+    #[test]
+    fn a_picture_of_another_shape_shows_the_middle_of_the_photo() {
+        let known = |image| match locate(Scene { image, ..scene() }).unwrap().camera {
+            CameraSource::Known(camera) => camera,
+            CameraSource::Rectangle { .. } => panic!("still unknown"),
+        };
+        let (whole, square) = (known([640, 480]), known([480, 480]));
+        assert_eq!(square.image, [480, 480]);
+        assert!((square.focal_px.x - square.focal_px.y).abs() < 1e-9);
+        assert!((square.focal_px - whole.focal_px).norm() < 1e-9);
+        assert!((square.principal_px - Point2::new(240.0, 240.0)).norm() < 10.0);
+        let shift = whole.principal_px - square.principal_px;
+        assert!((shift - Vector2::new(80.0, 0.0)).norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_picture_without_pixels_is_an_error() {
+        let empty = Scene {
+            image: [0, 480],
+            ..scene()
+        };
+        let refusal = locate(empty).unwrap_err().to_string();
+        assert_eq!(refusal, "image: [0, 480], expected two numbers above 0");
+    }
+
