@@ -29,6 +29,7 @@ use crate::geom::{Point2, Vector3};
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 use edge::{EdgeSearch, MOST_REACH_PX};
+use std::collections::BTreeMap;
 
 /// The family of markers that is always found.
 pub(crate) const FAMILY: &str = "DICT_4X4_50";
@@ -108,6 +109,9 @@ pub fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
 /// The label with the corners of its markers, found in its photo, as points of known place; those
 /// that it had before are dropped.
 ///
+/// A number that the photo shows several times is left out, with a message in the log: only one of
+/// its markers can be where the map says.
+///
 /// Where the corners fit the map only when every marker is turned by the same angle, they are
 /// turned, with a message in the log: another program's artwork was printed, or the map has other
 /// axes.
@@ -156,6 +160,26 @@ fn find_family(map: &MarkerMap, photo: &Image<LinearRgb>) -> Result<(Vec<Marker>
     }
 }
 
+fn expect_some(found: &[Marker], what: &str) -> Result<()> {
+    match found {
+        [] => Err(Error::value("markers", what)),
+        _ => Ok(()),
+    }
+}
+
+/// The markers whose number was found once; a warning for each of the others.
+fn without_repeated(mut found: Vec<Marker>) -> Vec<Marker> {
+    let mut counts = BTreeMap::new();
+    for marker in &found {
+        *counts.entry(marker.id).or_insert(0) += 1;
+    }
+    for (id, count) in counts.iter().filter(|(_, count)| **count > 1) {
+        log::warn!("markers: number {id} was found {count} times, expected once; it is left out");
+    }
+    found.retain(|marker| counts[&marker.id] == 1);
+    found
+}
+
 /// Markers that were found in the photo of a label with a marker map.
 struct MarkerLayout<'a> {
     label: &'a Label,
@@ -166,15 +190,14 @@ struct MarkerLayout<'a> {
 }
 
 impl<'a> MarkerLayout<'a> {
-    /// Those of the label's map that the photo shows, at least one.
+    /// Those of the label's map that the photo shows once, at least one.
     fn find(label: &'a Label, photo: &Image<LinearRgb>) -> Result<Self> {
         let map = marker_map(label)?;
         let (mut found, min_sigma_px) = find_family(map, photo)?;
         found.retain(|marker| map.map.contains_key(&marker.id));
-        if found.is_empty() {
-            let what = "none of them was found in the photo";
-            return Err(Error::value("markers", what));
-        }
+        expect_some(&found, "none of them was found in the photo")?;
+        let found = without_repeated(found);
+        expect_some(&found, "each was found several times in the photo")?;
         Ok(Self {
             label,
             map,
@@ -397,6 +420,53 @@ mod tests {
                 .to_string();
             assert!(refusal.contains("markers.size_m"), "{refusal}");
         }
+    }
+
+    /// A label whose map has these markers in a row.
+    fn label_of(image: [u32; 2], ids: &[u32]) -> Label {
+        let mut label = Label::new(image, [[0.0; 2]; 4], [0.6, 0.2]);
+        label.surface.corners_px = None;
+        let places = ids.iter().map(|&id| (id, [0.1 * f64::from(id), 0.0, 0.0]));
+        label.markers = Some(MarkerMap {
+            family: FAMILY.into(),
+            artwork: Default::default(),
+            size_m: 0.05,
+            map: places.collect(),
+        });
+        label
+    }
+
+    /// Printed markers in a row on a grey table.
+    fn row_of(ids: &[u32]) -> Image<LinearRgb> {
+        let sheets: Vec<_> = ids.iter().map(|&id| printed(id, 10)).collect();
+        Image::from_fn(100 * ids.len(), 100, |x, y| {
+            let (sheet, [x, y]) = (&sheets[x / 100], [x % 100, y]);
+            let is_sheet = (10..90).contains(&x) && (10..90).contains(&y);
+            match is_sheet {
+                true => sheet[(x - 10, y - 10)],
+                false => LinearRgb::grey(0.3),
+            }
+        })
+    }
+
+    #[test]
+    fn a_number_that_is_there_twice_is_left_out() {
+        let photo = row_of(&[4, 1, 2, 1]);
+        let label = label_of([400, 100], &[1, 2, 3, 4]);
+        let label = with_markers(label, &photo).unwrap();
+        let notes: Vec<_> = label.points.iter().flat_map(|p| &p.note).collect();
+        assert_eq!(notes[..4], ["marker 2"; 4]);
+        assert_eq!(notes[4..], ["marker 4"; 4]);
+    }
+
+    #[test]
+    fn markers_that_are_all_there_twice_are_an_error() {
+        let photo = row_of(&[1, 2, 2, 1]);
+        let refusal = with_markers(label_of([400, 100], &[1, 2]), &photo).unwrap_err();
+        assert_eq!(
+            refusal.to_string(),
+            "markers: each was found several times in the photo"
+        );
     }
 
     #[test]
