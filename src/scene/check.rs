@@ -44,7 +44,10 @@ impl Scene {
         self.view.check()?;
         self.lens.check()?;
         match &self.camera {
-            CameraSource::Known(camera) => self.lens.check_fold(camera),
+            CameraSource::Known(camera) => {
+                check_picture_size(camera, self.image)?;
+                self.lens.check_fold(camera)
+            }
             CameraSource::Rectangle { .. } => Ok(()),
         }
     }
@@ -227,6 +230,13 @@ fn check_known_camera(camera: &Camera) -> Result<()> {
     check_pose(&camera.camera_from_world, "camera.known.camera_from_world")
 }
 
+/// Checks that a known camera takes the scene's picture.
+pub(super) fn check_picture_size(camera: &Camera, image: [u32; 2]) -> Result<()> {
+    let expected = format_args!("the scene's image {image:?}");
+    let is_same = camera.image == image;
+    expect(is_same, "camera.known.image", camera.image, expected)
+}
+
 fn check_object(object: &Object, at: &str) -> Result<()> {
     let (asset, is_named) = (&object.asset, !object.asset.is_empty());
     expect(is_named, &field(at, "asset"), asset, "the name of an asset")?;
@@ -366,6 +376,12 @@ mod tests {
             reported,
             "image: [60000, 40000], expected at most 16384 a side and 67108864 in all"
         );
+        let reported = complaint(|s| s.camera = CameraSource::Known(tilted_camera()));
+        let [w, h] = tilted_camera().image;
+        assert_eq!(
+            reported,
+            format!("camera.known.image: [{w}, {h}], expected the scene's image [64, 48]")
+        );
         let reported = complaint(|s| s.objects = vec![s.objects[0].clone(); 1_001]);
         assert_eq!(reported, "objects: 1001, expected at most 1000");
         let reported = complaint(|s| s.surface.restitution = 1.5);
@@ -402,6 +418,7 @@ mod tests {
     fn a_lens_that_folds_the_pictures_of_a_known_camera_is_told() {
         let reported = complaint(|s| {
             s.camera = CameraSource::Known(tilted_camera());
+            s.image = tilted_camera().image;
             s.lens.k1 = -1.5;
         });
         assert!(

@@ -8,6 +8,7 @@ use crate::geom::{Point2, Pose, Quad};
 use crate::image::Image;
 use crate::matte::Flow;
 use crate::pixel::{LinearRgb, ObjectId};
+use crate::scene::check::check_picture_size;
 use crate::scene::{
     AreaLight, Blur, CameraSource, Card, EnvironmentMap, Exposure, LightGrid, LightMap, LightTint,
     Noise, Object, Placement, Refraction, Scene, Shot,
@@ -203,11 +204,7 @@ impl Scene {
             let what = "still a rectangle in a photo; locate it first";
             return Err(Error::value("camera", what));
         };
-        if camera.image != self.image {
-            let (image, expected) = (camera.image, self.image);
-            let what = format!("{image:?}, expected the scene's image {expected:?}");
-            return Err(Error::value("camera.known.image", what));
-        }
+        check_picture_size(&camera, self.image)?;
         Ok(camera)
     }
 
