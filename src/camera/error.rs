@@ -142,9 +142,29 @@ pub enum SolveError {
     /// No pose has the camera above the surface with the whole rectangle in front of it.
     #[error("surface.corners_px: no camera above the surface sees these corners")]
     NoPose,
+    /// No camera can have seen a label that has points instead of corners.
+    #[error(
+        "{at}: no camera above the surface sees these points, expected x along the width and y up: are they mirrored?"
+    )]
+    PointsUnseen {
+        /// Where they are from: `points` or `markers.map`.
+        at: &'static str,
+    },
 }
 
 impl SolveError {
+    /// Whether it names a rectangle's corners.
+    pub(super) fn is_of_corners(&self) -> bool {
+        matches!(
+            self,
+            Self::Coincident { .. }
+                | Self::NotConvex
+                | Self::Collinear { .. }
+                | Self::Order(_)
+                | Self::NoPose
+        )
+    }
+
     /// Whether a single value is one that nothing can have, rather than the values together.
     fn is_impossible_value(&self) -> bool {
         matches!(
@@ -244,6 +264,7 @@ mod tests {
         let unfit = [
             (SolveError::NotConvex, "surface.corners_px"),
             (SolveError::NoPose, "surface.corners_px"),
+            (SolveError::PointsUnseen { at: "points" }, "points"),
             (SolveError::NoScale, "surface"),
             (SolveError::PointsNeedSides("both are missing"), "surface"),
             (SolveError::DifferentPictures { photo: 1 }, "photos[1]"),

@@ -4,7 +4,7 @@ use super::chi::CHI2_99;
 use super::error::SolveError;
 use super::focal::PriorSource;
 use super::hedge::is_off_center;
-use super::label::{Framing, Label};
+use super::label::{Framing, Label, LabelPoint};
 use super::options::{CornerOrder, SolveOptions};
 use super::pinhole::diagonal_px;
 use super::problem::Problem;
@@ -48,6 +48,20 @@ const GROSS_FOCAL_RATIO: f64 = 1.8;
 /// # Ok::<(), camera::SolveError>(())
 /// ```
 pub fn solve(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
+    solve_compared(label, options).map_err(|why| about_points(why, label))
+}
+
+/// The error of a label whose corners were predicted from points is about the points.
+fn about_points(why: SolveError, label: &Label) -> SolveError {
+    if label.surface.corners_px.is_some() || !why.is_of_corners() {
+        return why;
+    }
+    let are_markers = label.points.iter().all(LabelPoint::is_marker_corner);
+    let at = if are_markers { "markers.map" } else { "points" };
+    SolveError::PointsUnseen { at }
+}
+
+fn solve_compared(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
     if options.max_iterations.is_some() {
         return solve_as_labelled(label, options).map(|solved| solved.solution);
     }
@@ -361,10 +375,36 @@ fn compare_without_height(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::rectangle::corner_points;
     use crate::camera::simulate::Scenario;
 
     fn misfit(label: &Label) -> Option<SolveError> {
         solve(label, &SolveOptions::default()).unwrap().misfit()
+    }
+
+    /// Points at the corners of a rectangle, with x to the left.
+    fn mirrored_points(note: &str) -> Label {
+        let scenario = Scenario::default();
+        let mut label = scenario.tilted(35.0).view(1, 0).label;
+        let corners_px = label.surface.corners_px.take().unwrap();
+        let places = corner_points(scenario.size).into_iter().zip(corners_px);
+        let points = places.map(|(place, px)| LabelPoint {
+            xyz_m: [-place.x, place.y, place.z],
+            px,
+            sigma_px: None,
+            note: Some(note.into()),
+        });
+        label.points = points.collect();
+        label
+    }
+
+    #[test]
+    fn mirrored_points_are_told_where_they_are_stated() {
+        for (note, at) in [("rim", "points"), ("marker 3", "markers.map")] {
+            let refusal = solve(&mirrored_points(note), &SolveOptions::default()).unwrap_err();
+            assert_eq!(refusal, SolveError::PointsUnseen { at });
+            assert!(refusal.to_string().ends_with("are they mirrored?"));
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The pipeline stage that solves a scene's camera.
 
-use crate::camera::{Camera, Label, SolveOptions, solve};
-use crate::error::Result;
+use crate::camera::{Camera, Label, Solution, SolveError, SolveOptions, solve};
+use crate::error::{Error, Result};
 use crate::scene::{CameraSource, Scene};
 
 /// Solves a scene's camera if it is still a labelled rectangle.
@@ -35,16 +35,47 @@ pub fn locate(scene: Scene) -> Result<Scene> {
 }
 
 fn solve_camera(label: &Label, plate: &str) -> Result<Camera> {
-    let solution = solve(label, &SolveOptions::default())?.fitting()?;
+    let solved = solve(label, &SolveOptions::default()).and_then(Solution::fitting);
+    let solution = solved.map_err(in_scene)?;
     for warning in &solution.warnings {
         log::info!("{plate}: {warning}");
     }
     Ok(solution.camera)
 }
 
+/// What a label and what a scene call the same.
+const SCENE_NAMES: [[&str; 2]; 6] = [
+    ["surface.corners_px", "camera.rectangle.corners_px"],
+    [
+        "swap width_m and height_m",
+        "swap the sides in surface.size",
+    ],
+    [" too small a corner_sigma_px,", ""],
+    ["without EXIF data or ", "without "],
+    ["camera.focal_px", "camera.rectangle.focal_px"],
+    ["camera.k1", "lens.k1"],
+];
+
+/// The error of a scene's camera, in the scene's words.
+fn in_scene(why: SolveError) -> Error {
+    let named = |text: String| {
+        let names = SCENE_NAMES.iter();
+        names.fold(text, |text, [label, scene]| text.replace(label, scene))
+    };
+    match why.into() {
+        Error::Camera { at, what } => Error::Camera {
+            at: named(at),
+            what: named(what),
+        },
+        Error::Value { at, what } => Error::value(named(at), named(what)),
+        other => other,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geom::{Point2, Vector2};
     use crate::scene::Surface;
 
     fn scene() -> Scene {
@@ -75,36 +106,10 @@ mod tests {
             panic!("still unknown")
         };
         assert_eq!(camera.image, [640, 480]);
-    use crate::geom::{Point2, Vector2};
         assert!((camera.focal_px.x - 1374.852 / 2.0).abs() < 10.0);
         assert_eq!(locate(once.clone()).unwrap(), once);
     }
 
-    #[test]
-    fn impossible_corners_are_an_error() {
-        let CameraSource::Rectangle {
-            photo, focal_px, ..
-        } = scene().camera
-        else {
-            unreachable!()
-        };
-        let corners_px = [[0.0, 0.0]; 4];
-        let flat = Scene {
-            camera: CameraSource::Rectangle {
-                corners_px,
-                photo,
-                focal_px,
-            },
-            ..scene()
-        };
-        assert!(
-            locate(flat)
-                .unwrap_err()
-                .to_string()
-                .contains("the first and the second corner are 0.0 px apart")
-        );
-    }
-}
     #[test]
     fn a_picture_of_another_shape_shows_the_middle_of_the_photo() {
         let known = |image| match locate(Scene { image, ..scene() }).unwrap().camera {
@@ -130,3 +135,37 @@ mod tests {
         assert_eq!(refusal, "image: [0, 480], expected two numbers above 0");
     }
 
+    #[test]
+    fn impossible_corners_are_an_error() {
+        let CameraSource::Rectangle {
+            photo, focal_px, ..
+        } = scene().camera
+        else {
+            unreachable!()
+        };
+        let corners_px = [[0.0, 0.0]; 4];
+        let flat = Scene {
+            camera: CameraSource::Rectangle {
+                corners_px,
+                photo,
+                focal_px,
+            },
+            ..scene()
+        };
+        let refusal = locate(flat).unwrap_err().to_string();
+        assert_eq!(
+            refusal,
+            "camera.rectangle.corners_px: the first and the second corner are 0.0 px apart, expected at least 4.0"
+        );
+    }
+
+    #[test]
+    fn sides_to_swap_are_those_of_the_scene() {
+        let surface = Surface::new([0.37, 0.56]);
+        let refusal = locate(Scene { surface, ..scene() })
+            .unwrap_err()
+            .to_string();
+        let advice = ": swap the sides in surface.size (chi squared ";
+        assert!(refusal.contains(advice), "{refusal}");
+    }
+}
