@@ -2,7 +2,7 @@
 
 use crate::asset::{Asset, Library, Photo, Pixels, Role};
 use crate::color::Albedo;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::Point2;
 use crate::scene::hull::prism_outline;
 use crate::scene::{Appearance, CameraSource, Object, Wall};
@@ -64,23 +64,30 @@ fn collider_outline(photo: &Photo) -> Vec<[f64; 2]> {
     prism_outline(&photo.outline_uv, photo.size())
 }
 
+/// The photo of an asset that an object names as its back.
+fn back_of(asset: &Asset<Photo>, i: usize) -> Result<&Photo> {
+    asset.photos.get(i).ok_or_else(|| {
+        let what = format!("{i}, expected a photo of \"{}\" in the library", asset.name);
+        Error::value("back", what)
+    })
+}
+
 impl Appearance {
     /// Appearance of an object, from a library; none if the library lacks the asset or the photo.
     ///
     /// # Errors
-    /// Those of [`Photo::pixels`].
+    /// Those of [`Photo::pixels`]; [`Error::Value`] for a back that the asset lacks.
     pub fn from_library(library: &Library, object: &Object) -> Result<Option<Self>> {
         let Some(asset) = library.find(&object.asset) else {
             return Ok(None);
         };
-        let photos = [Some(object.photo), object.back];
-        let [front, back] = photos.map(|i| i.map(|i| asset.photos.get(i)));
-        let (Some(Some(front)), None | Some(Some(_))) = (front, back) else {
+        let Some(front) = asset.photos.get(object.photo) else {
             return Ok(None);
         };
+        let back = object.back.map(|i| back_of(asset, i)).transpose()?;
         let outline_uv = front.outline_uv.clone();
         let front = front.pixels()?;
-        let back = back.flatten().map(Photo::pixels).transpose()?;
+        let back = back.map(Photo::pixels).transpose()?;
         let class = match object.role {
             Role::Object => library.class_number(asset),
             Role::Distractor => None,
@@ -104,5 +111,26 @@ impl Appearance {
             flows: [front.flow, flow],
             surfaces: [front.surface, surface.unwrap_or_default()],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_back_that_the_asset_lacks_is_told() {
+        let asset = Asset {
+            name: "b1".into(),
+            role: Role::Object,
+            class: String::new(),
+            thickness: 0.005,
+            mass: 0.03,
+            photos: vec![],
+        };
+        assert_eq!(
+            back_of(&asset, 9).unwrap_err().to_string(),
+            "back: 9, expected a photo of \"b1\" in the library"
+        );
     }
 }

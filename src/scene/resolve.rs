@@ -272,7 +272,8 @@ fn resting_card(
         let at = format!("objects[{i}].placement");
         return Err(Error::value(at, "still falling; settle it first"));
     };
-    let look = look(object)?.ok_or_else(|| unknown_asset(i, object))?;
+    let look = look(object).map_err(|e| e.within(&format!("objects[{i}]")))?;
+    let look = look.ok_or_else(|| unknown_asset(i, object))?;
     // A scene has few objects, as checked.
     Ok(look.into_card(ObjectId(i as u32 + 1), object, pose))
 }
@@ -407,6 +408,13 @@ mod tests {
             reported,
             "objects[1].asset: \"b9\", photo 0, expected one in the library"
         );
+    }
+
+    #[test]
+    fn what_is_wrong_with_an_object_s_look_is_told_at_the_object() {
+        let refuse = |_: &Object| Err(Error::value("back", "9, expected 0"));
+        let refusal = scene().resolve(refuse, None, None).unwrap_err();
+        assert_eq!(refusal.to_string(), "objects[0].back: 9, expected 0");
     }
 
     #[test]
