@@ -84,9 +84,10 @@ impl Error {
     }
 
     /// The same error, its field path from one level further out: `count` within `scene` is
-    /// `scene.count`.
+    /// `scene.count`, and the whole `document` is `scene`.
     pub fn within(self, outer: &str) -> Self {
         match self {
+            Self::Value { at, what } if at == "document" => Self::value(outer, what),
             Self::Value { at, what } => Self::Value {
                 at: format!("{outer}.{at}"),
                 what,
@@ -223,6 +224,13 @@ mod tests {
             Error::file("x", "Exif: Bad (3)").to_string(),
             "x: Exif: Bad (3)"
         );
+    }
+
+    #[test]
+    fn a_field_is_named_from_the_outermost_document() {
+        let within = |at: &str| Error::value(at, "0").within("scene").to_string();
+        assert_eq!(within("count"), "scene.count: 0");
+        assert_eq!(within("document"), "scene: 0");
     }
 
     #[test]

@@ -397,6 +397,7 @@ mod tests {
             assert!(told(settings).starts_with(&expected), "{}", told(settings));
         }
         let misspelt = told("[rendr]\nsubsamples = 2\n");
+        assert!(misspelt.starts_with("settings: "), "{misspelt}");
         assert!(misspelt.contains("did you mean \"render\"?"), "{misspelt}");
         assert_eq!(told("[pictures]\njpeg_quality = 5\n"), "");
     }
