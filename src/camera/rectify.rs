@@ -56,13 +56,16 @@ fn shown(lens: &RadialDistortion, straight: MappedPoint) -> Option<MappedPoint> 
 /// Width and height of a map, pixels: integers.
 fn map_size(size: [f64; 2], px_per_metre: f64) -> Result<[f64; 2]> {
     let [width, height] = size.map(|metres| (metres * px_per_metre).round());
-    if width >= 1.0 && height >= 1.0 && width * height <= MAX_MAP_PIXELS {
+    let (given, [w, h]) = (number(px_per_metre), [width, height].map(number));
+    let what = if px_per_metre.is_nan() || px_per_metre <= 0.0 {
+        format!("{given}, expected a positive number")
+    } else if width.min(height) < 1.0 {
+        format!("{given} makes a map of {w} x {h} pixels, expected at least 1 a side")
+    } else if width * height > MAX_MAP_PIXELS {
+        format!("{given} makes a map of {w} x {h} pixels, expected at most {MAX_MAP_PIXELS}")
+    } else {
         return Ok([width, height]);
-    }
-    let [w, h] = [width, height].map(number);
-    let what = format!(
-        "{px_per_metre} makes a map of {w} x {h} pixels, expected at most {MAX_MAP_PIXELS}"
-    );
+    };
     Err(Error::value("px_per_metre", what))
 }
 
@@ -400,11 +403,26 @@ mod tests {
     #[test]
     fn a_map_without_pixels_is_an_error() {
         let photo = Pyramid::new(waves(40, 30));
-        for px_per_metre in [0.0, f64::NAN, -3.0, 1e9] {
-            assert!(
-                rectify(&photo, &camera(), 0.0, [0.6, 0.4], px_per_metre).is_err(),
-                "{px_per_metre}"
-            );
+        let refusals = [
+            (0.0, "0, expected a positive number"),
+            (-3.0, "-3, expected a positive number"),
+            (f64::NAN, "NaN, expected a positive number"),
+            (
+                1e-300,
+                "1e-300 makes a map of 0 x 0 pixels, expected at least 1 a side",
+            ),
+            (
+                1.0,
+                "1 makes a map of 1 x 0 pixels, expected at least 1 a side",
+            ),
+            (
+                1e9,
+                "1e9 makes a map of 6e8 x 4e8 pixels, expected at most 67108864",
+            ),
+        ];
+        for (px_per_metre, what) in refusals {
+            let refusal = rectify(&photo, &camera(), 0.0, [0.6, 0.4], px_per_metre).unwrap_err();
+            assert_eq!(refusal.to_string(), format!("px_per_metre: {what}"));
         }
     }
 }

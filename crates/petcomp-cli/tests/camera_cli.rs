@@ -395,6 +395,14 @@ fn a_photo_that_is_not_the_label_s_is_noticed() {
 }
 
 #[test]
+fn a_picture_that_is_projected_back_has_no_scale_of_its_own() {
+    let desk = Desk::with_recipe();
+    let rectify = "camera rectify a.png a.label.json -o b.png --back c.png --px-per-metre 9";
+    let said = desk.refused(&words(rectify));
+    assert!(said.contains("cannot be used with '--back"), "{said}");
+}
+
+#[test]
 fn corners_outside_of_the_picture_can_be_given() {
     let desk = Desk::with_recipe();
     desk.photo("a", IMAGE);

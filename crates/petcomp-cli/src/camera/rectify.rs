@@ -18,7 +18,7 @@ pub(crate) struct RectifyArgs {
     output: PathBuf,
     /// Pixels per metre of the top view; by default those of the photo at the centre of the
     /// rectangle
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", conflicts_with = "back")]
     px_per_metre: Option<f64>,
     /// Project this image onto the rectangle instead, as the photo would show it
     #[arg(long, value_name = "PICTURE")]
