@@ -267,7 +267,7 @@ struct ProjectedCard<'a> {
 }
 
 impl<'a> ProjectedCard<'a> {
-    /// None for a card that is edge-on or outside the picture; `offsets` are the sub-samples along
+    /// None for a card that is edge-on, behind the eye or outside the picture; `offsets` are the sub-samples along
     /// each side of a pixel.
     fn new(
         card: &'a Card,
@@ -278,7 +278,8 @@ impl<'a> ProjectedCard<'a> {
     ) -> Option<Self> {
         let projected = ProjectedPlane::new(plane, view)?;
         let (rows, columns) = rows_and_columns(plane, [0.0; 2], view);
-        if rows.is_empty() || columns.is_empty() {
+        let is_behind = !view.has_in_front(&plane.corners());
+        if is_behind || rows.is_empty() || columns.is_empty() {
             return None;
         }
         work::add(Kind::Bakes, 1);

@@ -20,7 +20,8 @@ pub(super) fn detail_level(texels_per_pixel: f64, offsets: &[f64]) -> f64 {
         .max(0.0)
 }
 
-/// Texels of the full texture per side of a pixel that shows `target`.
+/// Texels of the full texture per side of a pixel that shows `target`, or where that is not in
+/// front of the eye, the nearest corner that is; 0 if none is.
 pub(super) fn texels_per_pixel(
     texture: &Texture,
     plane: &ScenePlane,
@@ -28,9 +29,26 @@ pub(super) fn texels_per_pixel(
     view: &CameraView,
     target: &Vector3<f64>,
 ) -> f64 {
+    let Some(target) = seen_target(plane, view, target) else {
+        return 0.0;
+    };
     let (width, height) = texture.size();
     let texels = (width * height) as f64;
-    projected.cell_metres(view, target) * (texels / (plane.size[0] * plane.size[1])).sqrt()
+    projected.cell_metres(view, &target) * (texels / (plane.size[0] * plane.size[1])).sqrt()
+}
+
+fn seen_target(
+    plane: &ScenePlane,
+    view: &CameraView,
+    target: &Vector3<f64>,
+) -> Option<Vector3<f64>> {
+    let is_seen = |point: &Vector3<f64>| view.has_in_front(std::slice::from_ref(point));
+    if is_seen(target) {
+        return Some(*target);
+    }
+    let distance = |corner: &Vector3<f64>| (corner - view.eye).norm();
+    let corners = plane.corners().into_iter().filter(is_seen);
+    corners.min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// How much sharper a level can be with many sub-samples per side.

@@ -614,6 +614,40 @@ fn awkward() -> Vec<(&'static str, Shot)> {
     ]
 }
 
+/// A card upright beside a camera that is 1 m above the surface, its middle at `height`.
+fn upright_beside_the_camera(height: f64) -> Shot {
+    let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI / 2.0);
+    let texture = Image::filled(512, 256, grey(1.0));
+    Shot::new(above(64, 48, 60.0)).with_card(card(
+        1,
+        [0.0, 0.02, height],
+        upright,
+        [0.205, 0.106],
+        texture,
+    ))
+}
+
+/// How many pixels show something, as they do in the default way of sampling.
+fn covered_pixels(shot: &Shot, way: fn(&Shot, &RenderOptions) -> DeepImage) -> usize {
+    let deep = way(shot, &RenderOptions::default());
+    let pixels = (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y)));
+    pixels.filter(|&(x, y)| !deep.at(x, y).is_empty()).count()
+}
+
+#[test]
+fn a_card_behind_the_camera_is_not_seen() {
+    let shot = upright_beside_the_camera(1.06);
+    assert_eq!(covered_pixels(&shot, render_coverage), 0);
+}
+
+#[test]
+fn a_card_whose_middle_is_behind_the_camera_is_as_sharp_as_its_nearest_corner() {
+    let shot = upright_beside_the_camera(1.02);
+    let [seen, expected] =
+        [render_coverage, render_reference].map(|way| covered_pixels(&shot, way));
+    assert!(seen.abs_diff(expected) <= 64, "{seen} {expected}");
+}
+
 #[test]
 fn awkward_shots_give_defined_pictures() {
     for (name, shot) in awkward() {
