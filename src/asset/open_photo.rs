@@ -53,9 +53,10 @@ impl<'a> OpenPhoto<'a> {
     ) -> Result<Self> {
         let rectified = read_rectified(entry).map_err(|e| with_name(e, &entry.file))?;
         let empty = screens.get(&entry.screen)?;
+        let empty = empty.map(|empty| rectified.same_view(empty)).transpose();
         Ok(Self {
             file: entry.file.clone(),
-            empty: empty.map(|empty| rectified.same_view(empty)).transpose()?,
+            empty: empty.map_err(|e| with_name(e, &entry.file))?,
             rectified,
             options: CutOutOptions {
                 screen: entry.screen.color().or(options.screen),

@@ -107,15 +107,16 @@ impl RectifiedPhoto {
         })
     }
 
-    /// Another photo from the same place in the same way.
+    /// The empty screen from the same place in the same way.
     pub(super) fn same_view<'a>(
         &self,
-        other: Cow<'a, Image<LinearRgb>>,
+        empty: Cow<'a, Image<LinearRgb>>,
     ) -> Result<Cow<'a, Image<LinearRgb>>> {
-        match &self.view {
-            Some(view) => view.rectify(other.into_owned()).map(Cow::Owned),
-            None => Ok(other),
-        }
+        let Some(view) = &self.view else {
+            return Ok(empty);
+        };
+        check_shape(size_px(&empty), view.pose.camera.image)?;
+        view.rectify(empty.into_owned()).map(Cow::Owned)
     }
 
     /// The scale at a pixel, where something in the photo shows it.
@@ -135,6 +136,22 @@ impl RectifiedPhoto {
             (pose.swap_error > REVIEWED_SWAP_ERROR).then(|| swap_warning(pose.swap_error))
         }
     }
+}
+
+/// Rejects an empty screen that is no resized photo of this size: stretched onto it, or cropped, it
+/// is another part of the screen.
+fn check_shape([w, h]: [u32; 2], [width, height]: [u32; 2]) -> Result<()> {
+    let across = u64::from(w) * u64::from(height);
+    let down = u64::from(h) * u64::from(width);
+    // Less than a pixel is rounded.
+    if across.abs_diff(down) < u64::from(width.max(height)) {
+        return Ok(());
+    }
+    let what = format!(
+        "the empty screen is {w} x {h} pixels, expected {width} x {height} like the photo, or another size of that \
+         shape"
+    );
+    Err(Error::Photo { what })
 }
 
 fn clicked_corners(corners_px: [[f64; 2]; 4]) -> ScreenCorners {
@@ -243,7 +260,7 @@ mod tests {
     use super::super::{PhotoEntry, Scale, add_photo};
     use super::*;
     use crate::camera::{Camera, printed, project_picture};
-    use crate::filter::Pyramid;
+    use crate::filter::{Pyramid, resize};
     use crate::geom::{Point3, Pose, UnitQuaternion, Vector2, Vector3};
     use crate::image::Roi;
     use crate::io;
@@ -566,6 +583,33 @@ mod tests {
             }
         }
         assert!((1..24).contains(&refused), "{refused}");
+    }
+
+    /// Transmittance inside the object is compared with the screen at the same place, not with one
+    /// that is stretched onto it.
+    #[test]
+    fn an_empty_screen_of_another_shape_is_refused() {
+        let camera = camera(0.2, 1100.0);
+        let photo = photo(&camera, false);
+        let header = Header::default();
+        let rectified =
+            RectifiedPhoto::by_corners(photo.clone(), SCREEN, None, 0.0, &header).unwrap();
+        let same_view = |width, height| {
+            let empty = resize(&photo, width, height);
+            rectified.same_view(Cow::Owned(empty))
+        };
+        for (width, height) in [(1000, 750), (500, 375), (333, 250), (1501, 1126)] {
+            let seen = same_view(width, height).unwrap();
+            assert_eq!(seen.size(), rectified.photo.size());
+        }
+        for (width, height) in [(750, 1000), (1000, 749), (1000, 344), (344, 750)] {
+            let reported = same_view(width, height).unwrap_err().to_string();
+            let expected = format!(
+                "the empty screen is {width} x {height} pixels, expected 1000 x 750 like the photo, or another size \
+                 of that shape"
+            );
+            assert!(reported.ends_with(&expected), "{reported}");
+        }
     }
 
     #[test]
