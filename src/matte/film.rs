@@ -412,7 +412,10 @@ fn uncertainty_of(factors: &Image<Factor>, inside: &Image<Coverage>, most: f32) 
 }
 
 impl FilmOptions {
-    pub(super) fn check(&self) -> Result<()> {
+    /// # Errors
+    /// [`Error::Value`](crate::Error::Value) for the first option that cannot be right.
+    #[doc(hidden)]
+    pub fn check(&self) -> Result<()> {
         self.flat.map_or(Ok(()), check_flat)?;
         check_positive("clipped", self.clipped)?;
         check_positive("thickness_spread", self.thickness_spread)?;

@@ -50,7 +50,10 @@ impl Default for TriangulateOptions {
 }
 
 impl TriangulateOptions {
-    fn check(&self) -> Result<()> {
+    /// # Errors
+    /// [`Error::Value`](crate::Error::Value) for the first option that cannot be right.
+    #[doc(hidden)]
+    pub fn check(&self) -> Result<()> {
         check_length("max_shift_px", self.max_shift_px)?;
         check_share("least_agreement", self.least_agreement)?;
         check_positive("max_sigma", self.max_sigma)

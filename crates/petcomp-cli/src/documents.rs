@@ -7,9 +7,17 @@ use petcomp::{Error, Quality, Result, Scene};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
-/// Options from a TOML file, or the defaults without one.
-pub(crate) fn read_options<T: Default + DeserializeOwned>(file: Option<&Path>) -> Result<T> {
-    file.map_or_else(|| Ok(T::default()), io::read_toml)
+/// Options from a TOML file, checked, or the defaults without one.
+pub(crate) fn read_options<T: Default + DeserializeOwned>(
+    file: Option<&Path>,
+    check: impl FnOnce(&T) -> Result<()>,
+) -> Result<T> {
+    let Some(file) = file else {
+        return Ok(T::default());
+    };
+    let options = io::read_toml(file)?;
+    check(&options).map_err(|e| e.in_file(file))?;
+    Ok(options)
 }
 
 /// Reads a scene and checks it: photos are opened at the size of its pictures.

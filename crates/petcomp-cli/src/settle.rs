@@ -1,11 +1,11 @@
 //! `petcomp settle`: dropped objects come to rest.
 
-use crate::documents::{check_picture_target, check_scene_target};
+use crate::documents::{check_picture_target, check_scene_target, read_options};
 use crate::global::GlobalArgs;
 use petcomp::dataset::DatasetConfig;
 use petcomp::settle::{SettleOptions, Settled, preview, settle_traced, trace_csv};
 use petcomp::{Quality, Scene, io};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct SettleArgs {
@@ -102,7 +102,7 @@ impl SettleArgs {
     /// The options of the given file, or the scene's own.
     fn given_options(&self, scene: &Scene) -> petcomp::Result<SettleOptions> {
         match &self.options {
-            Some(path) => read_options(path),
+            Some(path) => read_options(Some(path), SettleOptions::check),
             None => self.scene_options(scene),
         }
     }
@@ -112,10 +112,4 @@ impl SettleArgs {
         let config = DatasetConfig::from_settings(&scene.settings, &[]);
         Ok(config.map_err(|e| e.in_file(&self.scene))?.scene.settle)
     }
-}
-
-fn read_options(path: &Path) -> petcomp::Result<SettleOptions> {
-    let options: SettleOptions = io::read_toml(path)?;
-    options.check().map_err(|e| e.in_file(path))?;
-    Ok(options)
 }

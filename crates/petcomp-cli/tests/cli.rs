@@ -2186,3 +2186,51 @@ fn a_capture_that_cannot_be_measured_says_why() {
         "{black}"
     );
 }
+
+/// Not on the photo, which is innocent.
+#[test]
+fn a_wrong_option_is_named_where_it_is_given() {
+    let desk = Desk::new();
+    desk.write_picture("a.png", &red_on_green(45..75, 25..55));
+    desk.write_picture("b.png", &red_on_green(45..75, 25..55));
+    desk.write_picture("small.png", &Image::filled(12, 8, GREEN));
+    desk.write("cut.toml", "soften_px = -1\n");
+    desk.write("levels.toml", "levels = 99\n");
+    for (command, place) in [
+        (
+            "cut a.png -o o.exr --options cut.toml",
+            "cut.toml: soften_px",
+        ),
+        (
+            "segment a.png -o o --options levels.toml",
+            "levels.toml: levels",
+        ),
+        ("film a.png -o o.exr --set film.clipped=0", "film.clipped"),
+        (
+            "triangulate a.png b.png -o o.exr --set film.max_sigma=0",
+            "film.max_sigma",
+        ),
+        (
+            "key a.png -o o.exr --screen 0,1,0 --set key.clip_black=5",
+            "key.clip_black",
+        ),
+        (
+            "key a.png -o o.exr --screen 0,1,0 --profile robust --set key.clip_black=5",
+            "key.clip_black",
+        ),
+        (
+            "film a.png -o o.exr --plate small.png",
+            "small.png: 12 x 8 pixels",
+        ),
+        (
+            "film a.png -o o.exr --mask small.png",
+            "small.png: 12 x 8 pixels",
+        ),
+    ] {
+        let told = desk.refused(&words(&format!("matte {command}")));
+        assert!(
+            told.starts_with(&format!("error: {place}")),
+            "{command}: {told}"
+        );
+    }
+}

@@ -123,8 +123,10 @@ impl CutOutOptions {
         FILM_REACH_PX + (SOFT_EDGE_SIGMAS * self.soften_px).ceil() as usize
     }
 
-    /// Fails on the first option that cannot be right, of whichever stage.
-    pub(crate) fn check(&self) -> Result<()> {
+    /// # Errors
+    /// [`Error::Value`] for the first option that cannot be right, of whichever stage.
+    #[doc(hidden)]
+    pub fn check(&self) -> Result<()> {
         self.segment.check().map_err(|e| e.within("segment"))?;
         self.plate.check().map_err(|e| e.within("plate"))?;
         self.film.check().map_err(|e| e.within("film"))?;

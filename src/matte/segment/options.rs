@@ -59,7 +59,8 @@ impl Default for SegmentOptions {
 impl SegmentOptions {
     /// # Errors
     /// [`Error::Value`] for the first option that cannot be right.
-    pub(in crate::matte) fn check(&self) -> Result<()> {
+    #[doc(hidden)]
+    pub fn check(&self) -> Result<()> {
         if let Some(levels) = self.levels.filter(|levels| !(2..=8).contains(levels)) {
             return Err(Error::value("levels", format!("{levels}, expected 2 to 8")));
         }

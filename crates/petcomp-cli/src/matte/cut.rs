@@ -26,7 +26,7 @@ pub(crate) struct CutArgs {
 pub(crate) fn run(args: &CutArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let inputs = std::iter::once(&args.photo).chain(&args.options);
     io::check_distinct(inputs, [&args.output])?;
-    let options: CutOutOptions = read_options(args.options.as_deref())?;
+    let options = read_options(args.options.as_deref(), CutOutOptions::check)?;
     let photo = io::read::<LinearRgb>(&args.photo)?;
     let cut = cut_out(&photo, &options).map_err(|e| e.in_file(&args.photo))?;
     let written = WriteOptions {

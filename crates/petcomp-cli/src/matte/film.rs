@@ -6,8 +6,8 @@ use crate::global::GlobalArgs;
 use anyhow::Result;
 use petcomp::io::{self, Canvas, Override, from_overrides};
 use petcomp::matte::{
-    FilmMatte, PlateOptions, ScreenPlate, SegmentOptions, Triangulated, film, film_planes, segment,
-    triangulate,
+    FilmMatte, FilmOptions, PlateOptions, ScreenPlate, SegmentOptions, TriangulateOptions,
+    Triangulated, film, film_planes, segment, triangulate,
 };
 use petcomp::{Coverage, Film, Image, LinearRgb};
 use std::path::{Path, PathBuf};
@@ -77,7 +77,8 @@ impl FilmArgs {
         plate: &ScreenPlate,
         inside: &Image<Coverage>,
     ) -> Result<FilmMatte> {
-        let options = from_overrides("film", &self.options.settings)?;
+        let options: FilmOptions = from_overrides("film", &self.options.settings)?;
+        options.check().map_err(|e| e.within("film"))?;
         let found = film(photo, plate, inside, &options).map_err(|e| e.in_file(&self.photo))?;
         report_diagnostics(self.photo.display(), &found.diagnostics);
         Ok(found)
@@ -122,7 +123,8 @@ impl TriangulateArgs {
         inside: &Image<Coverage>,
     ) -> Result<Triangulated> {
         let shots: Vec<_> = photos.iter().zip(plates).collect();
-        let options = from_overrides("film", &self.options.settings)?;
+        let options: TriangulateOptions = from_overrides("film", &self.options.settings)?;
+        options.check().map_err(|e| e.within("film"))?;
         let found = triangulate(&shots, inside, &options)?;
         report_diagnostics(self.photos[0].display(), &found.diagnostics);
         Ok(found)
@@ -161,9 +163,9 @@ impl FilmOptionArgs {
 
     /// The given mask, or that of the detected object.
     fn object_mask(&self, path: &Path, photo: &Image<LinearRgb>) -> Result<Image<Coverage>> {
-        if let Some(mask) = &self.mask {
-            let mask: Image<Coverage> = io::read(mask)?;
-            check_same_size("--mask", mask.size(), path, photo.size())?;
+        if let Some(file) = &self.mask {
+            let mask: Image<Coverage> = io::read(file)?;
+            check_same_size(file.display(), mask.size(), path, photo.size())?;
             return Ok(mask);
         }
         let found = segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(path))?;
@@ -181,8 +183,10 @@ impl FilmOptionArgs {
     ) -> Result<ScreenPlate> {
         let options = PlateOptions::default();
         let plate = match self.plates.get(i) {
-            Some(empty) => {
-                ScreenPlate::from_photo_outside(&io::read(empty)?, photo, inside, &options)
+            Some(file) => {
+                let empty = io::read(file)?;
+                check_same_size(file.display(), empty.size(), path, photo.size())?;
+                ScreenPlate::from_photo_outside(&empty, photo, inside, &options)
             }
             None => ScreenPlate::fit_outside(photo, inside, &options),
         };

@@ -236,9 +236,15 @@ pub(crate) fn run(args: &KeyArgs, global: &GlobalArgs) -> Result<()> {
 }
 
 impl KeyArgs {
+    fn options(&self) -> Result<KeyOptions> {
+        let options = self.profile_options()?;
+        options.check()?;
+        Ok(options)
+    }
+
     /// # Errors
     /// If `--profile` names a different keyer from the settings.
-    fn options(&self) -> Result<KeyOptions> {
+    fn profile_options(&self) -> Result<KeyOptions> {
         let Some(profile) = self.profile else {
             return Ok(io::from_overrides("key", &self.settings)?);
         };

@@ -21,7 +21,7 @@ pub(crate) struct SegmentArgs {
 }
 
 pub(crate) fn run(args: &SegmentArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let options: SegmentOptions = read_options(args.options.as_deref())?;
+    let options = read_options(args.options.as_deref(), SegmentOptions::check)?;
     let photo: Image<LinearRgb> = io::read(&args.photo)?;
     let found = segment(&photo, &options).map_err(|e| e.in_file(&args.photo))?;
     let mut pictures = search_pictures(&found);
