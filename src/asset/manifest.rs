@@ -584,16 +584,28 @@ const CUT_OUT_SIDE: Bounds = Bounds::metres(1e-4, 20.0, "objects are 5 mm to 5 m
 /// A name that is safe as the name of a folder beside the manifest: letters and digits of any
 /// language.
 pub(super) fn check_name(name: &str) -> Result<()> {
-    if name.eq_ignore_ascii_case(MANIFEST) {
-        let what = format!("\"{name}\", which is the name of the manifest");
+    if let Some(file) = file_beside(name) {
+        let what = format!("\"{name}\", which is the name of the {file}");
         return Err(Error::value("name", what));
     }
     if is_name(name) {
         return Ok(());
     }
     let start = printable_start(name);
-    let what = format!("\"{start}\", expected letters, digits, _ and -");
+    let what = format!("\"{start}\", expected letters, digits, _, - and . (not first)");
     Err(Error::value("name", what))
+}
+
+/// What else has this name in the folder, in any case, as some file systems see it.
+fn file_beside(name: &str) -> Option<&'static str> {
+    let name = name.to_ascii_lowercase();
+    if name == MANIFEST {
+        return Some("manifest");
+    }
+    let page = name.strip_prefix("contact_sheet")?.strip_suffix(".png")?;
+    let is_number = |page: &str| page.bytes().all(|digit| digit.is_ascii_digit());
+    let is_page = page.is_empty() || page.strip_prefix('_').is_some_and(is_number);
+    is_page.then_some("contact sheet")
 }
 
 fn is_name(name: &str) -> bool {
@@ -646,6 +658,7 @@ fn check_unique<'a>(at: &str, names: impl Iterator<Item = &'a str>) -> Result<()
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::{CONTACT_SHEET, contact_sheet_page};
     use super::*;
 
     pub(in super::super) fn photo(file: &str) -> PhotoRecord {
@@ -839,12 +852,44 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn an_asset_is_not_named_like_a_file_beside_it() {
+        let first = Path::new(CONTACT_SHEET);
+        for page in [0, 1, 11] {
+            let file = contact_sheet_page(first, page);
+            let name = file.to_str().unwrap();
+            for name in [name.to_owned(), name.to_uppercase()] {
+                let told = check_name(&name).unwrap_err().to_string();
+                assert!(
+                    told.ends_with("which is the name of the contact sheet"),
+                    "{told}"
+                );
+            }
+        }
+        let told = check_name("Assets.toml").unwrap_err().to_string();
+        assert!(
+            told.ends_with("which is the name of the manifest"),
+            "{told}"
+        );
+        for name in [
+            "contact_sheet",
+            "contact_sheet_a.png",
+            "my_contact_sheet.png",
+        ] {
+            assert!(check_name(name).is_ok(), "{name}");
+        }
+    }
+
+    #[test]
     fn names_of_any_language_are_names_and_paths_are_none() {
         for name in ["Flasche_gr\u{fc}n", "\u{74f6}-1", "a.b"] {
             assert!(check_name(name).is_ok(), "{name}");
         }
         for name in ["", ".a", "a/b", "a b", "a\n", &"a".repeat(121)] {
-            assert!(check_name(name).is_err(), "{name}");
+            let told = check_name(name).unwrap_err().to_string();
+            assert!(
+                told.ends_with("expected letters, digits, _, - and . (not first)"),
+                "{told}"
+            );
         }
         assert!(check_class("see-through bottle").is_ok());
         for class in ["", " ", " cup", "cup ", "a\nb", "\u{1b}[31m"] {
