@@ -20,7 +20,8 @@
 //! | half and float (EXR, TIFF, HDR) | treated as scene-linear Rec. 709 | EXR premultiplied, TIFF as it states | as it is |
 //!
 //! Premultiplication happens here, in linear light. A fourth sample that a TIFF does not declare as
-//! alpha (`ExtraSamples` 0) is ignored with a warning. The orientation recorded by a camera is
+//! alpha (`ExtraSamples` 0) is ignored with a warning, and without that tag is straight alpha with a
+//! warning. The orientation recorded by a camera is
 //! applied. An EXR is cropped or padded with transparent black (a film passes all light there) from
 //! its data window to its display window ([`Window`] can keep the former), and converted if it
 //! names other primaries. An ICC colour profile with primaries and curves, such as Display P3 or

@@ -70,7 +70,7 @@ impl Picture {
             .flatten();
         warn_not_finite(&raster, source, wanted);
         warn_unusual_channels(&raster, source, wanted);
-        warn_left_out(&raster, source, wanted);
+        warn_undeclared_samples(&raster, source, wanted);
         warn_narrow_range(source, limits, wanted);
         Ok(Self {
             path: source.path.clone(),
@@ -234,20 +234,27 @@ fn warn_unusual_channels(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     }
 }
 
-/// Reports a TIFF with samples after its colours, the first of which is not declared as alpha: most
-/// programs ignore them, some treat the first one as alpha.
-fn warn_left_out(raster: &Raster, source: &SourceFile, wanted: Wanted) {
-    let picked = Wanted::Color.pick(&raster.names);
-    let is_without_alpha = picked.is_ok_and(|picked| picked.len() == 3);
-    if source.format != Format::Tiff || !wanted.is_color() || !is_without_alpha {
+/// Reports a TIFF with samples after its colours, the first of which is not declared as alpha: if
+/// they are declared as something else, most programs ignore them, some treat the first one as
+/// alpha; if no tag mentions them, it is alpha in most.
+fn warn_undeclared_samples(raster: &Raster, source: &SourceFile, wanted: Wanted) {
+    if source.format != Format::Tiff || !wanted.is_color() {
         return;
     }
-    let left_out = catch_panic(|| Ok(tiff::has_unspecified_sample(&source.bytes)));
-    if left_out.unwrap_or(false) {
-        let path = source.path.display();
-        log::warn!(
-            "{path}: has extra samples, the first of which is not declared as alpha (ExtraSamples 1 or 2); ignored"
-        );
+    let picked = Wanted::Color.pick(&raster.names);
+    let (is_undeclared, what): (fn(&[u8]) -> bool, _) = match picked.map_or(0, |p| p.len()) {
+        3 => (
+            tiff::has_unspecified_sample,
+            "has extra samples, the first of which is not declared as alpha (ExtraSamples 1 or 2); ignored",
+        ),
+        4 => (
+            tiff::has_unstated_alpha,
+            "has a fourth sample without ExtraSamples, treated as straight alpha",
+        ),
+        _ => return,
+    };
+    if catch_panic(|| Ok(is_undeclared(&source.bytes))).unwrap_or(false) {
+        log::warn!("{}: {what}", source.path.display());
     }
 }
 

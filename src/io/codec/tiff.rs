@@ -318,6 +318,15 @@ pub(crate) fn has_unspecified_sample(bytes: &[u8]) -> bool {
     extra.first().is_some_and(|&kind| !is_alpha(&[kind]))
 }
 
+/// Whether the fourth sample is alpha by its position only, since no tag states its meaning.
+pub(crate) fn has_unstated_alpha(bytes: &[u8]) -> bool {
+    let Ok(mut decoder) = Decoder::new(Cursor::new(bytes)) else {
+        return false;
+    };
+    let is_four = matches!(decoder.colortype(), Ok(ColorType::RGBA(_)));
+    is_four && extra_samples(&mut decoder).is_ok_and(|extra| extra.is_empty())
+}
+
 /// Whether colours are premultiplied, also for kinds of TIFF that the decoder cannot read.
 #[cfg(feature = "oiio")]
 pub(crate) fn has_associated_alpha(bytes: &[u8]) -> bool {
@@ -790,6 +799,7 @@ fn ascii_notes(metadata: &[(String, String)]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tiff::encoder::colortype::RGBA8;
 
     #[test]
     fn integers_of_every_kind_have_the_same_full_scale() {
@@ -953,6 +963,28 @@ mod tests {
             let read = decode(&file, &Limits::default()).unwrap();
             assert_eq!(read.names.join(" "), names);
             assert!(read.names.len() == 4 || read.samples == Samples::U8(vec![1, 2, 3, 4, 5, 6]));
+        }
+    }
+
+    /// As OpenImageIO and OpenCV read it.
+    #[test]
+    fn a_fourth_sample_without_a_word_is_straight_alpha() {
+        for (alpha, is_unstated) in [(None, true), (Some(ExtraSamples::UnassociatedAlpha), false)] {
+            let mut file = Cursor::new(Vec::new());
+            let mut encoder = TiffEncoder::new(&mut file).unwrap();
+            let mut image = encoder.new_image::<RGBA8>(1, 1).unwrap();
+            if let Some(alpha) = alpha {
+                image.extra_samples(&[alpha]).unwrap();
+            }
+            image.write_data(&[1, 2, 3, 4]).unwrap();
+            let file = file.into_inner();
+            assert_eq!(has_unstated_alpha(&file), is_unstated);
+            let read = decode(&file, &Limits::default()).unwrap();
+            assert_eq!(
+                (read.names.join(" "), read.premultiplied),
+                ("R G B A".into(), false)
+            );
+            assert_eq!(read.samples, Samples::U8(vec![1, 2, 3, 4]));
         }
     }
 
