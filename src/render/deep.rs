@@ -267,8 +267,8 @@ struct ProjectedCard<'a> {
 }
 
 impl<'a> ProjectedCard<'a> {
-    /// None for a card that is edge-on, behind the eye or outside the picture; `offsets` are the sub-samples along
-    /// each side of a pixel.
+    /// None for a card that is edge-on, behind the eye or outside the picture; `offsets` are the
+    /// sub-samples along each side of a pixel.
     fn new(
         card: &'a Card,
         plane: &ScenePlane,
