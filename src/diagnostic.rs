@@ -116,7 +116,6 @@ codes! {
     SizeMismatch "asset.size_mismatch" "The given size and the outline have different aspect ratios"
     ScreenSizeMismatch "asset.screen_size_mismatch" "The screen does not match the given size"
     ScreenSidesAmbiguous "asset.screen_sides_ambiguous" "Width and height of the screen may be swapped"
-    ScaleUncertain "asset.scale_uncertain" "The screen or marker determines the size with a large error"
     Concave "asset.concave" "The object fills little of its convex hull, which labels use as its outline (`labels.outline`)"
     Uncoded "asset.uncoded" "A warning written by a petcomp version without codes"
     // Matte.

@@ -10,7 +10,7 @@ use super::flow_file;
 use super::inputs::inputs_crc32;
 use super::list::check_not_written_over;
 use super::manifest::{Manifest, PhotoRecord};
-use super::measure::{MeasuredSize, middle_px};
+use super::measure::MeasuredSize;
 use super::open_photo::OpenPhoto;
 use super::pixels::check_pixels;
 use super::rectified::RectifiedPhoto;
@@ -262,7 +262,7 @@ fn new_record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Resul
     scale.check_length(measured.object_m[0], &entry.source())?;
     let warnings = [
         measured.size_mismatch,
-        photo.diagnostic(middle_px(cut)),
+        photo.diagnostic(),
         concave_warning(&cut.outline),
     ];
     Ok(PhotoRecord {

@@ -88,7 +88,7 @@ fn outline_error_px(cut: &CutOut, tight: [f64; 2]) -> f64 {
 }
 
 /// The middle of the object's hull in pixels of the photo.
-pub(super) fn middle_px(cut: &CutOut) -> Point2<f64> {
+fn middle_px(cut: &CutOut) -> Point2<f64> {
     let count = cut.hull.len().max(1) as f64;
     let corners = cut.hull.iter().map(|p| p.coords / count);
     let middle = corners.fold(Vector2::zeros(), |sum, p| sum + p);

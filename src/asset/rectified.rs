@@ -28,8 +28,6 @@ const MAX_OTHER_SHARE: f64 = 0.01;
 /// Not the screen is what differs from it by this share of its brightest channel: more than its
 /// light is uneven around a marker, less than clear plastic dims it.
 const MIN_OTHER_DIFFERENCE: f32 = 0.3;
-/// A size needs a review where the standard error of its scale is larger than this share.
-const REVIEWED_SCALE_SIGMA: f64 = 0.05;
 /// Sides that may be exchanged need a review where that makes lengths differ by this share.
 const REVIEWED_SWAP_ERROR: f64 = 0.01;
 
@@ -129,16 +127,13 @@ impl RectifiedPhoto {
         })
     }
 
-    /// The warning about a size that is measured by this at a pixel.
-    pub(super) fn diagnostic(&self, at: Point2<f64>) -> Option<Diagnostic> {
-        let view = self.view.as_ref()?;
-        let (pose, sigma) = (&view.pose, view.sigma(at));
+    /// The warning about a size that is measured by this.
+    pub(super) fn diagnostic(&self) -> Option<Diagnostic> {
+        let pose = &self.view.as_ref()?.pose;
         if pose.is_poor_fit {
             Some(poor_fit_warning(pose.size))
-        } else if pose.swap_error > REVIEWED_SWAP_ERROR {
-            Some(swap_warning(pose.swap_error))
         } else {
-            (sigma > REVIEWED_SCALE_SIGMA).then(|| scale_warning(sigma))
+            (pose.swap_error > REVIEWED_SWAP_ERROR).then(|| swap_warning(pose.swap_error))
         }
     }
 }
@@ -177,14 +172,6 @@ fn swap_warning(error: f64) -> Diagnostic {
         "the longer side of the screen cannot be identified: lengths may be off by {percent:.0} %"
     );
     Diagnostic::warning(Code::ScreenSidesAmbiguous, message)
-}
-
-fn scale_warning(sigma: f64) -> Diagnostic {
-    let percent = 100.0 * sigma;
-    let message = format!(
-        "the screen or marker is too small or too far from the object: lengths are known to {percent:.0} %"
-    );
-    Diagnostic::warning(Code::ScaleUncertain, message)
 }
 
 fn largest_marker(markers: &[Marker]) -> Option<&Marker> {
@@ -365,28 +352,6 @@ mod tests {
     }
 
     #[test]
-    fn a_size_by_a_small_marker_far_away_is_reviewed() {
-        let camera = camera(0.0, 1000.0);
-        for (side, away, expected) in [
-            (0.072, 0.1, None),
-            (0.02, 0.0, None),
-            (0.02, 0.2, Some(Code::ScaleUncertain)),
-        ] {
-            let marker = reference(&camera, [side; 2], 0.3);
-            let pose = ScreenPose::solve(&marker, camera.image, &Header::default()).unwrap();
-            let view = TopView::of_photo(pose, 0.0).unwrap();
-            // The photo shows 1 x 0.75 m around the marker.
-            let at = Point2::new(0.5 + away, 0.375) * view.px_per_metre;
-            let seen = RectifiedPhoto {
-                photo: Image::new(0, 0),
-                view: Some(view),
-            };
-            let reported = seen.diagnostic(at);
-            assert_eq!(reported.map(|d| d.code), expected, "{side} {away}");
-        }
-    }
-
-    #[test]
     fn a_screen_of_other_proportions_is_doubted() {
         let camera = camera(0.3, 1000.0);
         let doubt = |size| {
@@ -399,7 +364,7 @@ mod tests {
                 photo: Image::new(0, 0),
                 view: Some(TopView::of_screen(ground, 0.0)),
             }
-            .diagnostic(Point2::origin())
+            .diagnostic()
         };
         assert_eq!(doubt(SCREEN), None);
         assert!(
@@ -447,7 +412,7 @@ mod tests {
             view: Some(TopView::of_screen(ground, 0.0)),
         };
         assert!(
-            seen.diagnostic(Point2::origin())
+            seen.diagnostic()
                 .unwrap()
                 .message
                 .starts_with("the longer side of the screen cannot be identified")
