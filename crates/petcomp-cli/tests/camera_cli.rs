@@ -399,7 +399,10 @@ fn a_picture_that_is_projected_back_has_no_scale_of_its_own() {
     let desk = Desk::with_recipe();
     let rectify = "camera rectify a.png a.label.json -o b.png --back c.png --px-per-metre 9";
     let said = desk.refused(&words(rectify));
-    assert!(said.contains("cannot be used with '--back"), "{said}");
+    assert!(
+        said.contains("'--back <PICTURE>' cannot be used with '--px-per-metre"),
+        "{said}"
+    );
 }
 
 #[test]

@@ -2194,6 +2194,7 @@ fn a_wrong_option_is_named_where_it_is_given() {
     desk.write_picture("a.png", &red_on_green(45..75, 25..55));
     desk.write_picture("b.png", &red_on_green(45..75, 25..55));
     desk.write_picture("small.png", &Image::filled(12, 8, GREEN));
+    desk.write_picture("white.png", &Image::filled(12, 8, LinearRgb::WHITE));
     desk.write("cut.toml", "soften_px = -1\n");
     desk.write("levels.toml", "levels = 99\n");
     for (command, place) in [
@@ -2223,8 +2224,8 @@ fn a_wrong_option_is_named_where_it_is_given() {
             "small.png: 12 x 8 pixels",
         ),
         (
-            "film a.png -o o.exr --mask small.png",
-            "small.png: 12 x 8 pixels",
+            "film a.png -o o.exr --mask white.png",
+            "white.png: 12 x 8 pixels",
         ),
     ] {
         let told = desk.refused(&words(&format!("matte {command}")));

@@ -960,6 +960,7 @@ mod tests {
             image.write_data(&samples).unwrap();
             let file = file.into_inner();
             assert_eq!(has_unspecified_sample(&file), is_unspecified);
+            assert!(!has_unstated_alpha(&file));
             let read = decode(&file, &Limits::default()).unwrap();
             assert_eq!(read.names.join(" "), names);
             assert!(read.names.len() == 4 || read.samples == Samples::U8(vec![1, 2, 3, 4, 5, 6]));
@@ -969,23 +970,18 @@ mod tests {
     /// As OpenImageIO and OpenCV read it.
     #[test]
     fn a_fourth_sample_without_a_word_is_straight_alpha() {
-        for (alpha, is_unstated) in [(None, true), (Some(ExtraSamples::UnassociatedAlpha), false)] {
-            let mut file = Cursor::new(Vec::new());
-            let mut encoder = TiffEncoder::new(&mut file).unwrap();
-            let mut image = encoder.new_image::<RGBA8>(1, 1).unwrap();
-            if let Some(alpha) = alpha {
-                image.extra_samples(&[alpha]).unwrap();
-            }
-            image.write_data(&[1, 2, 3, 4]).unwrap();
-            let file = file.into_inner();
-            assert_eq!(has_unstated_alpha(&file), is_unstated);
-            let read = decode(&file, &Limits::default()).unwrap();
-            assert_eq!(
-                (read.names.join(" "), read.premultiplied),
-                ("R G B A".into(), false)
-            );
-            assert_eq!(read.samples, Samples::U8(vec![1, 2, 3, 4]));
-        }
+        let mut file = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut file).unwrap();
+        let image = encoder.new_image::<RGBA8>(1, 1).unwrap();
+        image.write_data(&[1, 2, 3, 4]).unwrap();
+        let file = file.into_inner();
+        assert!(has_unstated_alpha(&file));
+        let read = decode(&file, &Limits::default()).unwrap();
+        assert_eq!(
+            (read.names.join(" "), read.premultiplied),
+            ("R G B A".into(), false)
+        );
+        assert_eq!(read.samples, Samples::U8(vec![1, 2, 3, 4]));
     }
 
     #[test]
