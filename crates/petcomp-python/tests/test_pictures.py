@@ -226,9 +226,9 @@ def test_masks_behind_others_are_hidden_there():
     shares = [found["visible_fraction"] for found in sample.labels["objects"]]
     assert np.allclose(shares, [0, 4 / 6, 1])
     for found in sample.labels["objects"]:
-        x0, y0, x1, y1 = found["visible_box"]
+        box = [found["visible_box"][edge] for edge in ("x0", "y0", "x1", "y1")]
         seen = np.argwhere(sample.ids == found["id"])
-        assert seen.size == 0 or [x0, y0, x1, y1] == [*seen.min(0)[::-1], *(seen.max(0) + 1)[::-1]]
+        assert seen.size == 0 or box == [*seen.min(0)[::-1], *(seen.max(0) + 1)[::-1]]
 
 
 def test_a_card_above_covers_the_one_below():
