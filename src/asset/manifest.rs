@@ -632,7 +632,8 @@ pub(super) fn check_class(name: &str) -> Result<()> {
     Err(Error::value("class", what))
 }
 
-fn is_class_name(name: &str) -> bool {
+/// Whether a name is one that `check_class` accepts.
+pub fn is_class_name(name: &str) -> bool {
     let is_short = !name.is_empty() && name.len() <= MAX_NAME_BYTES;
     is_short && name.trim() == name && !name.chars().any(char::is_control)
 }

@@ -66,7 +66,7 @@ pub use list::List;
 pub use list::{check_cut_out_files, check_not_written_over, with_actual_spelling};
 pub use manifest::Asset;
 #[doc(hidden)]
-pub use manifest::{CaptureRecord, Manifest, PhotoRecord};
+pub use manifest::{CaptureRecord, Manifest, PhotoRecord, is_class_name};
 #[doc(hidden)]
 pub use moments::{Moments, Piece};
 #[doc(hidden)]

@@ -20,16 +20,16 @@
 //! | half and float (EXR, TIFF, HDR) | treated as scene-linear Rec. 709 | EXR premultiplied, TIFF as it states | as it is |
 //!
 //! Premultiplication happens here, in linear light. A fourth sample that a TIFF does not declare as
-//! alpha (`ExtraSamples` 0) is ignored with a warning, and without that tag is straight alpha with a
-//! warning. The orientation recorded by a camera is
-//! applied. An EXR is cropped or padded with transparent black (a film passes all light there) from
-//! its data window to its display window ([`Window`] can keep the former), and converted if it
-//! names other primaries. An ICC colour profile with primaries and curves, such as Display P3 or
-//! Adobe RGB, is applied to display codes, as are code points of Rec. 709, Rec. 2020 and Display P3
-//! with the curve of sRGB or none, and Adobe RGB as recorded by a camera (EXIF) in a JPEG or TIFF
-//! without profile; others are named in a warning and the codes treated as sRGB. Inks (CMYK) are
-//! multiplied; CIELab is rejected. Samples that are infinite or NaN are counted in a warning, and
-//! become codes of 0 or full scale when integers are written.
+//! alpha (`ExtraSamples` 0) is ignored with a warning, and without that tag is straight alpha with
+//! a warning. The orientation recorded by a camera is applied. An EXR is cropped or padded with
+//! transparent black (a film passes all light there) from its data window to its display window
+//! ([`Window`] can keep the former), and converted if it names other primaries. An ICC colour
+//! profile with primaries and curves, such as Display P3 or Adobe RGB, is applied to display codes,
+//! as are code points of Rec. 709, Rec. 2020 and Display P3 with the curve of sRGB or none, and
+//! Adobe RGB as recorded by a camera (EXIF) in a JPEG or TIFF without profile; others are named in
+//! a warning and the codes treated as sRGB. Inks (CMYK) are multiplied; CIELab is rejected. Samples
+//! that are infinite or NaN are counted in a warning, and become codes of 0 or full scale when
+//! integers are written.
 //!
 //! # Guarantees for untrusted files
 //!

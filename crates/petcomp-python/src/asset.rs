@@ -53,6 +53,12 @@ fn built_json(built: &Built) -> Result<String> {
     }))
 }
 
+/// Whether every format of labels can hold a class's name, as in photo lists.
+#[pyfunction]
+pub(crate) fn is_class_name(name: &str) -> bool {
+    asset::is_class_name(name)
+}
+
 /// The manifest of an asset folder.
 #[pyfunction]
 pub(crate) fn list_assets(py: Python<'_>, folder: PathBuf) -> PyResult<String> {

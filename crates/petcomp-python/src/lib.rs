@@ -28,7 +28,7 @@ mod work;
 mod _petcomp {
     #[pymodule_export]
     use crate::{
-        asset::{build_assets, list_assets},
+        asset::{build_assets, is_class_name, list_assets},
         camera::{Camera, solve_camera},
         evaluate::{evaluate_boxes, evaluate_files},
         generate::{generate_from, generate_with},

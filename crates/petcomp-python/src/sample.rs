@@ -172,14 +172,7 @@ impl Facts {
 
     /// Of a picture that was made in another way: nothing but their order tells which is in front.
     fn ids_of_masks(&self) -> Image<u32> {
-        let [width, height] = self.size;
-        let mut ids = Image::new(width, height);
-        for object in &self.labels.objects {
-            for (x, y) in object.visible_mask.pixels() {
-                ids[(x as usize, y as usize)] = object.id.0;
-            }
-        }
-        ids
+        front_ids(&self.labels.objects, self.size)
     }
 
     /// None for a picture that was made in another way.
@@ -363,7 +356,7 @@ fn labels_of(
         })
         .collect();
     let mut objects = objects?;
-    hide_behind_later(&mut objects, (width, height));
+    hide_behind_later(&mut objects, [width, height]);
     Ok(Labels {
         image: [width as u32, height as u32],
         objects,
@@ -372,21 +365,26 @@ fn labels_of(
 }
 
 /// Leaves of each object what none after it covers.
-fn hide_behind_later(objects: &mut [ObjectLabel], (width, height): (usize, usize)) {
-    let mut is_covered = Image::<u8>::new(width, height);
-    for object in objects.iter_mut().rev() {
-        let mut visible = Image::<u8>::new(width, height);
-        for (x, y) in object.amodal_mask.pixels() {
-            let at = (x as usize, y as usize);
-            visible[at] = 1 - is_covered[at];
-            is_covered[at] = 1;
-        }
-        let mask = runs_of(visible.view(), |code| code != 0);
+fn hide_behind_later(objects: &mut [ObjectLabel], size: [usize; 2]) {
+    let front = front_ids(objects, size);
+    for object in objects {
+        let mask = runs_of(front.view(), |id| id == object.id.0);
         let whole = object.amodal_mask.area().max(1);
         object.visible_fraction = mask.area() as f64 / whole as f64;
         object.visible_box = mask.bounds();
         object.visible_mask = mask;
     }
+}
+
+/// Which of some objects, each in front of those before it, each pixel shows; 0 for none.
+fn front_ids(objects: &[ObjectLabel], [width, height]: [usize; 2]) -> Image<u32> {
+    let mut ids = Image::new(width, height);
+    for object in objects {
+        for (x, y) in object.amodal_mask.pixels() {
+            ids[(x as usize, y as usize)] = object.id.0;
+        }
+    }
+    ids
 }
 
 fn object_of(id: u32, mask: &GivenMatte, class: u32) -> ObjectLabel {

@@ -44,9 +44,9 @@ const MEDIAN_REACH: usize = 2;
 /// Along the normal through each point, from the outside inwards: the first local maximum of the
 /// difference from the outside (of square roots, all channels) that stands out of the noise; the
 /// outline is where the difference has half that value. A difference that still rises clearly at the
-/// inner end is followed farther inwards. Displacements pass a median of five along
-/// the outline. A blurred step of light has half its height at its true place, whatever the blur;
-/// one of square roots farther to its darker side, the more it is blurred.
+/// inner end is followed farther inwards. Displacements pass a median of five along the outline. A
+/// blurred step of light has half its height at its true place, whatever the blur; one of square
+/// roots farther to its darker side, the more it is blurred.
 pub(super) fn snapped(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -> Outline {
     let rings = outline
         .rings

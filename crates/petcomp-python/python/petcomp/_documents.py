@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import math
 import os
-import unicodedata
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from ._petcomp import is_class_name
 from .errors import ArgumentTypeError, InvalidValueError
 
 __all__ = [
@@ -28,8 +28,8 @@ __all__ = [
 ]
 
 _MOST_LEVELS = 60
-# Of a class.
-_MOST_NAME_BYTES = 120
+#: Characters of a wrong name.
+_MOST_SHOWN = 120
 #: An array that only claims to be large, as by broadcasting, must not be written out.
 _MOST_NUMBERS = 10_000_000
 
@@ -144,16 +144,10 @@ def label_names(value: Any) -> list[str]:
     """Check a list of class names that are to be written."""
     names = class_names(value)
     for name in names:
-        if not _is_class_name(name):
+        if not is_class_name(name):
             what = "expected a name on one line without leading or trailing spaces"
-            raise InvalidValueError(f"classes: {name[:_MOST_NAME_BYTES]!r}, {what}")
+            raise InvalidValueError(f"classes: {name[:_MOST_SHOWN]!r}, {what}")
     return names
-
-
-def _is_class_name(name: str) -> bool:
-    """Whether every format of labels can hold a name, as in photo lists."""
-    is_short = 0 < len(name.encode(errors="replace")) <= _MOST_NAME_BYTES
-    return is_short and name == name.strip() and not any(unicodedata.category(c) == "Cc" for c in name)
 
 
 def path_of(name: str, value: Any) -> str:

@@ -24,6 +24,7 @@ __all__ = [
     "evaluate_files",
     "generate_from",
     "generate_with",
+    "is_class_name",
     "key",
     "list_assets",
     "read_picture",
@@ -128,6 +129,7 @@ def generate_with(
     target: _Target,
     progress: Callable[[int, int, int], object] | None,
 ) -> str: ...
+def is_class_name(name: str) -> bool: ...
 def key(
     image: npt.NDArray[Any],
     screen: Sequence[float] | npt.NDArray[Any],
