@@ -4,41 +4,53 @@ use super::lens::RadialDistortion;
 use super::pinhole::Camera;
 use crate::bounds::number;
 use crate::error::{Error, Result};
-use crate::filter::{Pyramid, sample_bilinear};
+use crate::filter::{Pyramid, sample_bilinear, sample_cubic};
 use crate::geom::{Homography, Point2, Vector2, Vector3};
 use crate::image::Image;
-use crate::pixel::Mix;
+use crate::pixel::{LinearRgb, Mix};
 use nalgebra::{Matrix2, Matrix3};
 
 /// No pixel is the mean of more samples along an axis than this; beyond, they are taken from
 /// coarser levels.
 const MAX_SAMPLES: f64 = 32.0;
+/// Longest axis of a footprint of one sample, pixels of the source.
+const MAX_SINGLE_SAMPLE: f64 = 1.5;
 /// Larger pictures are treated as typing errors: this many pixels take 800 MB.
 const MAX_MAP_PIXELS: f64 = 67_108_864.0;
 
 /// The rectangle of `size` metres seen from straight above, `px_per_metre` pixels to the metre, its
 /// top left corner first.
 ///
-/// Takes a photo in any pixels that may be averaged (scene-linear), of the camera's size and bent by
-/// OpenCV's `k1`; what the photo does not show is empty.
+/// Takes a scene-linear photo of the camera's size, bent by OpenCV's `k1`; what the photo does not
+/// show is black. Interpolated cubically, so that a map as fine as the photo keeps its detail.
 ///
 /// # Errors
 /// [`Error::Value`] for a map without pixels or of more than 64 million.
-pub fn rectify<P: Mix>(
-    photo: &Pyramid<P>,
+pub fn rectify(
+    photo: &Pyramid<LinearRgb>,
     camera: &Camera,
     k1: f64,
     size: [f64; 2],
     px_per_metre: f64,
-) -> Result<Image<P>> {
+) -> Result<Image<LinearRgb>> {
     let map = map_size(size, px_per_metre)?;
     let straight_from_map =
         Homography(camera.pixel_from_surface().0 * surface_from_map(size, map).0);
     let lens = RadialDistortion::new(camera, k1);
     let [width, height] = map.map(|side| side as usize);
-    Ok(warp_by(photo, width, height, |px| {
-        shown(&lens, mapped(&straight_from_map, px)?)
-    }))
+    let source_from_map = |px| shown(&lens, mapped(&straight_from_map, px)?);
+    Ok(warp_by(
+        photo,
+        sample_light,
+        [width, height],
+        source_from_map,
+    ))
+}
+
+/// The cubic value of a photo, where it would be less than black beside a steep edge, black.
+#[inline]
+fn sample_light(photo: &Image<LinearRgb>, x: f64, y: f64) -> LinearRgb {
+    sample_cubic(photo, x, y).map(|v| v.max(0.0))
 }
 
 /// What a pinhole camera sees, as the lens shows it; none beyond its fold.
@@ -89,7 +101,7 @@ pub fn project_picture<P: Mix>(
     let center = inverse * photo_from_picture * middle;
     let lens = RadialDistortion::new(camera, k1);
     let picture_from_straight = Homography(inverse * center.z.signum());
-    warp_by(picture, width, height, |px| {
+    warp_by(picture, sample_bilinear, [width, height], |px| {
         let MappedPoint { at, slope } = mapped(&picture_from_straight, lens.undistort(px))?;
         let slope = slope * lens.undistort_slope(px);
         Some(MappedPoint { at, slope })
@@ -126,20 +138,22 @@ pub fn warp<P: Mix>(
     width: usize,
     height: usize,
 ) -> Image<P> {
-    warp_by(source, width, height, |px| mapped(source_from_target, px))
+    warp_by(source, sample_bilinear, [width, height], |px| {
+        mapped(source_from_target, px)
+    })
 }
 
-/// The same through any map.
+/// The same through any map, with samples of any kind.
 fn warp_by<P: Mix>(
     source: &Pyramid<P>,
-    width: usize,
-    height: usize,
+    sample: impl Fn(&Image<P>, f64, f64) -> P + Sync,
+    [width, height]: [usize; 2],
     source_from_target: impl Fn(Point2<f64>) -> Option<MappedPoint> + Sync,
 ) -> Image<P> {
     Image::from_fn(width, height, |x, y| {
         let center = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
         source_from_target(center).map_or_else(P::default, |point| {
-            footprint_mean(source, point.at, &point.slope)
+            footprint_mean(source, &sample, point.at, &point.slope)
         })
     })
 }
@@ -163,8 +177,17 @@ fn mapped(map: &Homography, point: Point2<f64>) -> Option<MappedPoint> {
     Some(MappedPoint { at, slope })
 }
 
-/// The mean over what a pixel covers. In one piece: most of the time of a warp is spent here.
-fn footprint_mean<P: Mix>(source: &Pyramid<P>, at: Vector2<f64>, slope: &Matrix2<f64>) -> P {
+/// The mean over what a pixel covers: one sample, if that is hardly larger than a pixel of the
+/// source. In one piece: most of the time of a warp is spent here.
+fn footprint_mean<P: Mix>(
+    source: &Pyramid<P>,
+    sample: &impl Fn(&Image<P>, f64, f64) -> P,
+    at: Vector2<f64>,
+    slope: &Matrix2<f64>,
+) -> P {
+    if slope.norm_squared() < MAX_SINGLE_SAMPLE.powi(2) {
+        return sample(source.base(), at.x, at.y);
+    }
     let axes = footprint_axes(slope);
     let [long, short] = axes.map(|axis| axis.norm());
     let level = level_below((0.5 * short).max(long / MAX_SAMPLES)).min(source.levels() - 1);
@@ -177,7 +200,7 @@ fn footprint_mean<P: Mix>(source: &Pyramid<P>, at: Vector2<f64>, slope: &Matrix2
             let [along, across] = [(i, counts[0]), (j, counts[1])]
                 .map(|(k, count)| (f64::from(k) + 0.5) / count - 0.5);
             let place = (at + axes[0] * along + axes[1] * across) / scale;
-            sum = sum.add_scaled(weight, sample_bilinear(picture, place.x, place.y));
+            sum = sum.add_scaled(weight, sample(picture, place.x, place.y));
         }
     }
     sum
@@ -245,6 +268,10 @@ mod tests {
         Image::from_fn(width, height, |x, y| Coverage(wave(x, y) as f32))
     }
 
+    fn grey(picture: &Image<Coverage>) -> Pyramid<LinearRgb> {
+        Pyramid::new(picture.map(|value| LinearRgb::grey(value.0)))
+    }
+
     const LENSES: [f64; 3] = [-0.2, 0.0, 0.15];
 
     #[test]
@@ -253,11 +280,11 @@ mod tests {
         let picture = waves(240, 160);
         for k1 in LENSES {
             let photo = project_picture(&Pyramid::new(picture.clone()), &camera, k1, size);
-            let back = rectify(&Pyramid::new(photo), &camera, k1, size, 400.0).unwrap();
+            let back = rectify(&grey(&photo), &camera, k1, size, 400.0).unwrap();
             assert_eq!(back.size(), picture.size());
             for y in 10..150 {
                 for x in 10..230 {
-                    let (a, b) = (back[(x, y)].0, picture[(x, y)].0);
+                    let (a, b) = (back[(x, y)].g, picture[(x, y)].0);
                     assert!((a - b).abs() < 0.03, "{k1} {x} {y}: {a} {b}");
                 }
             }
@@ -272,9 +299,9 @@ mod tests {
         })
     }
 
-    fn center_of_mass(picture: &Image<Coverage>) -> Point2<f64> {
+    fn center_of_mass(picture: &Image<LinearRgb>) -> Point2<f64> {
         let (width, mut sum) = (picture.width(), Vector3::zeros());
-        for (i, Coverage(mass)) in picture.pixels().iter().enumerate() {
+        for (i, LinearRgb { g: mass, .. }) in picture.pixels().iter().enumerate() {
             let (x, y) = (i % width, i / width);
             sum += Vector3::new(x as f64 + 0.5, y as f64 + 0.5, 1.0) * f64::from(*mass);
         }
@@ -290,7 +317,7 @@ mod tests {
                 // OpenCV's distortion.
                 let off = (straight - camera.principal_px) / 320.0;
                 let px = camera.principal_px + off * (1.0 + k1 * off.norm_squared()) * 320.0;
-                let photo = Pyramid::new(spot(px, camera.image));
+                let photo = grey(&spot(px, camera.image));
                 let map = rectify(&photo, &camera, k1, [0.6, 0.4], 400.0).unwrap();
                 let found = center_of_mass(&map);
                 let expected = Point2::new((x + 0.3) * 400.0, (0.2 - y) * 400.0);
@@ -298,6 +325,35 @@ mod tests {
                 assert!((found - expected).norm() < 0.5, "{k1}: {found} {expected}");
             }
         }
+    }
+
+    /// Stripes of the surface, 5 to 8 pixels of the photo wide.
+    fn stripes(at: Point2<f64>) -> f64 {
+        0.5 + 0.4 * libm::sin(300.0 * at.x + 200.0 * at.y)
+    }
+
+    #[test]
+    fn a_map_as_fine_as_the_photo_keeps_its_detail() {
+        let (camera, scale) = (camera(), 500.0);
+        let [width, height] = camera.image.map(|side| side as usize);
+        let surface_from_pixel = camera.pixel_from_surface().inverse().unwrap();
+        let mean = |x: usize, y: usize| {
+            let part = |k: usize| (k as f64 + 0.5) / 4.0;
+            let places = (0..16).map(|k| [x as f64 + part(k % 4), y as f64 + part(k / 4)]);
+            let sum: f64 = places
+                .map(|px| stripes(surface_from_pixel.map(px.into())))
+                .sum();
+            Coverage((sum / 16.0) as f32)
+        };
+        let photo = grey(&Image::from_fn(width, height, mean));
+        let map = rectify(&photo, &camera, 0.0, [0.3, 0.2], scale).unwrap();
+        let off = |(i, found): (usize, &LinearRgb)| {
+            let (x, y) = ((i % 150) as f64 + 0.5, (i / 150) as f64 + 0.5);
+            let at = Point2::new(x / scale - 0.15, 0.1 - y / scale);
+            (f64::from(found.g) - stripes(at)).powi(2)
+        };
+        let rms = (map.pixels().iter().enumerate().map(off).sum::<f64>() / 15000.0).sqrt();
+        assert!(rms < 0.03, "{rms}");
     }
 
     #[test]
@@ -402,7 +458,7 @@ mod tests {
 
     #[test]
     fn a_map_without_pixels_is_an_error() {
-        let photo = Pyramid::new(waves(40, 30));
+        let photo = grey(&waves(40, 30));
         let refusals = [
             (0.0, "0, expected a positive number"),
             (-3.0, "-3, expected a positive number"),

@@ -28,5 +28,6 @@ pub use pyramid::{expand, halve, reduce};
 #[doc(hidden)]
 pub use resize::resize;
 pub(crate) use sample::{
-    sample_bilinear, sample_bilinear_clamped, sample_blurred, sample_cubic_clamped, sample_nearest,
+    sample_bilinear, sample_bilinear_clamped, sample_blurred, sample_cubic, sample_cubic_clamped,
+    sample_nearest,
 };

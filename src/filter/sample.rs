@@ -35,6 +35,18 @@ pub(crate) fn sample_bilinear_clamped<P: Mix>(image: &Image<P>, x: f64, y: f64) 
     bilinear(|i, j| image.nearest(i, j), x, y)
 }
 
+/// The cubic value at `(x, y)` in pixels, as [`sample_cubic_clamped`]; 0 outside the picture.
+#[inline]
+pub(crate) fn sample_cubic<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
+    let inside =
+        (0.0..image.width() as f64).contains(&x) && (0.0..image.height() as f64).contains(&y);
+    if inside {
+        sample_cubic_clamped(image, x, y)
+    } else {
+        P::default()
+    }
+}
+
 /// The cubic value at `(x, y)` in pixels, which keeps what a bilinear one blurs, going on outside
 /// the picture as the nearest pixel inside; 0 in an empty picture and at a position that is not
 /// finite. Beside steep edges it is beyond its neighbours.
