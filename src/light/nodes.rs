@@ -6,12 +6,16 @@ use crate::light::quadrature::gauss_legendre;
 use crate::scene::{AreaLight, LightShape};
 use std::f64::consts::{PI, TAU};
 
+/// Longest equal pieces of a light, in distances of the receiver from its plane. Of longer ones,
+/// the nearest alone would give nearly all of the light.
+const LONGEST_EQUAL_PIECE: f64 = 1.5;
+
 /// A point of a light's face and the area it represents.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
     /// Where.
     pub point: Point3<f64>,
-    /// Square metres; a light's nodes add up to its area.
+    /// Square metres; [`nodes`] add up to a light's area.
     pub area: f64,
 }
 
@@ -175,8 +179,56 @@ fn ring_radius(shares: usize, n: usize) -> f64 {
     (shares as f64 / (2.0 * count * (1.0 - middle))).sqrt()
 }
 
+/// Nodes at the middles of equal steps of the sine of the angle under which `point` sees them, along
+/// either side; none if equal pieces are short enough.
+///
+/// Most light comes from where a large light is near, so there the nodes are.
+fn pieces_near(light: &AreaLight, counts: [usize; 2], point: Point3<f64>) -> Option<Vec<Node>> {
+    let (frame, [a, b]) = (frame(light), half_sides(light));
+    let way = point - frame.center;
+    let distance = frame.normal.dot(&way);
+    let longest = (2.0 * a / counts[0] as f64).max(2.0 * b / counts[1] as f64);
+    if distance <= 0.0 || longest <= LONGEST_EQUAL_PIECE * distance {
+        return None;
+    }
+    let foot = [frame.x.dot(&way), frame.y.dot(&way)];
+    let mut nodes = Vec::with_capacity(counts[0] * counts[1]);
+    for (x, width) in sine_steps(a, foot[0], distance, counts[0]) {
+        let half = match light.shape {
+            LightShape::Rectangle => b,
+            LightShape::Ellipse => b * (1.0 - (x / a).powi(2)).max(0.0).sqrt(),
+        };
+        let chord = sine_steps(half, foot[1], distance, counts[1]);
+        nodes.extend(chord.map(|(y, length)| Node {
+            point: frame.point(x, y),
+            area: width * length,
+        }));
+    }
+    Some(nodes)
+}
+
+/// Places in `-half..half` at the middles of equal steps of the sine of the angle under which they
+/// are seen, and the lengths that they stand for; at a distance from the line, over `foot`.
+fn sine_steps(
+    half: f64,
+    foot: f64,
+    distance: f64,
+    count: usize,
+) -> impl Iterator<Item = (f64, f64)> {
+    let sine = |at: f64| (at - foot) / (at - foot).hypot(distance);
+    let first = sine(-half);
+    let step = (sine(half) - first) / count as f64;
+    (0..count).map(move |i| {
+        let sine = first + (i as f64 + 0.5) * step;
+        let cosine = (1.0 - sine * sine).sqrt();
+        let place = foot + distance * sine / cosine;
+        (place, step * distance / cosine.powi(3))
+    })
+}
+
 /// Sample points of the part of a light that is above the plane through `point` with unit `normal`:
-/// those of [`pieces`] where the plane does not cut the light, else as many on what it leaves.
+/// those of [`pieces`], or of a light that is large and near [`pieces_near`], where the plane does
+/// not cut the light, else as many on what it leaves.
 ///
 /// # Method
 /// What is left of a rectangle is strips across the side that the plane turns away from fastest,
@@ -194,7 +246,8 @@ pub(crate) fn nodes_above(
     let counts = counts.map(|n| n.max(1));
     let horizon = LightHorizon::new(&frame, [a, b], point, normal);
     let Some(left) = horizon.visible_part(light.shape, counts) else {
-        return pieces(light, counts);
+        let near = pieces_near(light, counts, point);
+        return near.unwrap_or_else(|| pieces(light, counts));
     };
     left.into_iter()
         .map(|([x, y], area)| Node {
@@ -419,6 +472,36 @@ mod tests {
             nodes_above(&light, [3; 2], Point3::origin(), &Vector3::z()),
             pieces(&light, [3; 2])
         );
+    }
+
+    #[test]
+    fn a_large_light_nearby_is_sampled_where_its_light_comes_from() {
+        for shape in [LightShape::Rectangle, LightShape::Ellipse] {
+            for (size, height, counts) in
+                [(30.0, 1.0, [3; 2]), (1.0, 0.1, [3; 2]), (8.0, 1.0, [2; 2])]
+            {
+                let light = AreaLight {
+                    shape,
+                    ..AreaLight::new([0.3 * height, 0.0, height], [size; 2], 10.0)
+                };
+                let nodes = nodes_above(&light, counts, Point3::origin(), &Vector3::z());
+                let sum = irradiance(&nodes, &light, Point3::origin(), Vector3::z());
+                let exact = unit_irradiance(&light, Point3::origin(), Vector3::z());
+                // Equal pieces give 33 times as much where the light is largest.
+                assert!(
+                    (0.6..1.65).contains(&(sum / exact)),
+                    "{shape:?} {size} {height}: {sum} against {exact}"
+                );
+                let brightest = nodes
+                    .iter()
+                    .map(|&node| irradiance(&[node], &light, Point3::origin(), Vector3::z()))
+                    .fold(0.0, f64::max);
+                assert!(
+                    brightest < 0.35 * sum,
+                    "{shape:?} {size} {height}: {brightest}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -78,6 +78,12 @@ impl Float4 {
         Self(self.0.map(|v| v.max(0.0).min(1.0)))
     }
 
+    /// Every element, or this if it is less.
+    #[inline(always)]
+    pub(super) fn at_least(self, least: f32) -> Self {
+        Self(self.0.map(|v| v.max(least)))
+    }
+
     /// The same with another fourth element.
     #[inline(always)]
     pub(super) fn with_fourth(self, fourth: f32) -> Self {

@@ -26,6 +26,9 @@ use std::f32::consts::PI;
 use std::ops::Range;
 use std::sync::Arc;
 
+/// Weight of a sub-sample of the surface that nothing is seen of: it counts where all are hidden.
+const MIN_SHARE_WEIGHT: f32 = 1e-20;
+
 /// A card in the picture.
 #[derive(Clone, Debug)]
 pub(super) struct Layer {
@@ -697,8 +700,8 @@ impl LayerStack {
         }
     }
 
-    /// The mean share of a pixel, weighted by the transmittance to each sub-sample; 1 beyond the
-    /// end of the surface.
+    /// The mean share of a pixel, weighted by the transmittance to each sub-sample, or by nothing if
+    /// nothing is seen of the surface; 1 beyond its end.
     fn mean_share(
         &self,
         map: &IrradianceMap,
@@ -709,6 +712,7 @@ impl LayerStack {
         let (mut sum, mut weight) = (Float4::ZERO, Float4::ZERO);
         for (sub, t) in through.enumerate() {
             let share = self.subsample_share(map, at, spans, sub);
+            let t = t.at_least(MIN_SHARE_WEIGHT);
             sum = sum.add_scaled(1.0, t.times(share));
             weight = weight.add_scaled(1.0, t);
         }
@@ -771,21 +775,10 @@ fn common_span(spans: &[(f64, f64)]) -> (f64, f64) {
     (low, high)
 }
 
-/// The weighted mean of a share, per channel; 1 for no weight, and exactly 1 if the share is 1
-/// everywhere.
+/// The weighted mean of a share, per channel; exactly 1 if the share is 1 everywhere.
 fn weighted_mean(sum: &Float4, weight: &Float4) -> LinearRgb {
-    let [r, g, b] = [0, 1, 2].map(|c| channel_mean_share(sum.0[c], weight.0[c]));
+    let [r, g, b] = [0, 1, 2].map(|c| (sum.0[c] / weight.0[c]).min(1.0));
     LinearRgb::new(r, g, b)
-}
-
-/// One channel of it; 1 if there is no weight.
-#[inline(always)]
-fn channel_mean_share(sum: f32, weight: f32) -> f32 {
-    if weight > 0.0 {
-        (sum / weight).min(1.0)
-    } else {
-        1.0
-    }
 }
 
 /// A layer along one row of sub-samples; `x` counts pixels from the block's left edge.

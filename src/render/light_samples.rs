@@ -429,7 +429,7 @@ mod tests {
         // A bottle, and one of 2 cm, under a light of the same relative size.
         let [whole, tenth] = [1.0, 0.1]
             .map(|scale| factor(disk(8.0 * scale, 0.8 * scale), Quality::Draft, 0.11 * scale));
-        assert!((whole - 1.0).abs() > 0.2, "{whole}");
+        assert!((whole - 1.0).abs() > 0.05, "{whole}");
         assert!((tenth / whole - 1.0).abs() < 1e-5, "{tenth} {whole}");
     }
 }

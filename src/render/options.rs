@@ -30,7 +30,8 @@ pub struct RenderOptions {
     /// Directions sampled for the environment, 1 to 4096. Default: 32.
     pub ambient_samples: usize,
     /// Spacing of the irradiance samples, 0.25 to 16 pixels. Default: 1.5. In pictures longer than
-    /// 960 pixels it grows with them: their shadows are no sharper, they only span more pixels.
+    /// 960 pixels it grows with them: their shadows are no sharper, they only span more pixels. In
+    /// those shorter than 320 pixels it shrinks, down to 0.75 pixels.
     pub cell_px: f64,
     /// Whether objects whose refraction was measured displace what is seen through them. Default:
     /// true.
@@ -83,6 +84,13 @@ const CELL_PX: Bounds = Bounds::new(0.25, 16.0, "pixels; smaller cells resolve n
 /// error at cells of 1.5 and 3 pixels (0.00167, 0.00166), and 8 % more at 4.5.
 const MAX_CELL_IMAGE_PX: f64 = 960.0;
 
+/// Shortest pictures whose cells are used as given: in smaller ones a cell is as large as what it
+/// shows, and shadows under cards darken what is beside them.
+const MIN_CELL_IMAGE_PX: f64 = 320.0;
+/// Cells of small pictures shrink to this at most. Of 20 objects at 160 x 120, those of 0.75 pixels
+/// have 0.73 of the error of 1.5 pixels, in 1.7 of the time; finer ones cost more than they give.
+const MIN_SHRUNK_CELL_PX: f64 = 0.75;
+
 impl RenderOptions {
     /// Fails on the first useless number: zero, or so large that a picture takes hours.
     ///
@@ -98,8 +106,10 @@ impl RenderOptions {
     /// The options for a picture of some width and height.
     pub(super) fn for_image(self, image: [u32; 2]) -> Self {
         let longer = f64::from(image[0].max(image[1]));
+        let finest = self.cell_px.min(MIN_SHRUNK_CELL_PX);
+        let shrunk = self.cell_px * (longer / MIN_CELL_IMAGE_PX).min(1.0);
         Self {
-            cell_px: self.cell_px * (longer / MAX_CELL_IMAGE_PX).max(1.0),
+            cell_px: shrunk.max(finest) * (longer / MAX_CELL_IMAGE_PX).max(1.0),
             ..self
         }
     }
@@ -142,10 +152,19 @@ mod tests {
     }
 
     #[test]
-    fn cells_grow_with_large_pictures_alone() {
+    fn cells_follow_the_size_of_very_large_and_small_pictures() {
         let cell = |image| RenderOptions::default().for_image(image).cell_px;
-        let cells = [[1, 1], [640, 480], [960, 960], [1080, 1920], [3840, 2160]].map(cell);
-        assert_eq!(cells, [1.5, 1.5, 1.5, 3.0, 6.0]);
+        let cells = [
+            [120, 160],
+            [320, 240],
+            [960, 960],
+            [1080, 1920],
+            [3840, 2160],
+        ]
+        .map(cell);
+        assert_eq!(cells, [0.75, 1.5, 1.5, 3.0, 6.0]);
+        let reference = RenderOptions::from(Quality::Reference);
+        assert_eq!(reference.for_image([16, 12]), reference);
     }
 
     #[test]
