@@ -111,8 +111,8 @@ impl<V: Shared> LruCache<V> {
         value
     }
 
-    /// Drops values beyond its limit. Large memory is freed outside the lock: other threads wait
-    /// for it, and a forked process would wait for ever.
+    /// Drops values beyond its limit. Large memory is freed outside the lock, for which other
+    /// threads wait.
     fn drop_oldest(&self, mut entries: MutexGuard<'_, Vec<Cached<V>>>) {
         let oldest = take_oldest(&mut entries, own_share(self.most_bytes));
         drop(entries);

@@ -70,15 +70,13 @@ impl Falls {
     }
 }
 
-/// Everything in a scene that decides how it falls, and the process: a fork has none of the threads
-/// that compute its parent's falls, and would wait for them forever.
+/// Everything in a scene that decides how it falls.
 fn what_falls(scene: &Scene, options: &SettleOptions) -> String {
     let mut scene = scene.clone().unlit();
     for object in &mut scene.objects {
         object.grade = Grade::default();
     }
-    let (process, surface) = (std::process::id(), scene.surface);
-    let falling = (process, scene.camera, surface, scene.objects, options);
+    let falling = (scene.camera, scene.surface, scene.objects, options);
     serde_json::to_string(&falling).expect("numbers and names are JSON")
 }
 

@@ -81,12 +81,13 @@ pub(crate) fn generate_from(
     target: Target,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<String> {
-    let opened = pipeline.get().opened()?;
+    let opened = pipeline.get().opened(py)?;
     let steps = Steps::default();
     let own = steps.clone();
     let mut beside = |py: Python<'_>| steps.deliver(py, progress.as_ref());
     work::run_beside(py, Stop::new(), &mut beside, move |stop| {
-        own.generate_from(&opened.pipeline.stopped_by(stop), target, stop)
+        let pipeline = dataset::Pipeline::clone(&opened.pipeline);
+        own.generate_from(&pipeline.stopped_by(stop), target, stop)
     })
 }
 

@@ -12,7 +12,7 @@ use petcomp::{Quality, Result, Scene};
 use pyo3::prelude::*;
 use std::ffi::OsString;
 use std::path::PathBuf;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 /// An opened recipe, from which samples are generated.
 #[pyclass(frozen, module = "petcomp._petcomp")]
@@ -24,8 +24,10 @@ pub(crate) struct Pipeline {
 /// What jobs share.
 #[derive(Clone)]
 pub(crate) struct Opened {
-    pub(crate) pipeline: dataset::Pipeline,
+    pub(crate) pipeline: Arc<dataset::Pipeline>,
     policy: Policy,
+    /// The process that it is used in.
+    process: u32,
 }
 
 /// The recipe of a file, or of a document, whose environment maps are named from the folder `path`.
@@ -57,7 +59,17 @@ impl Opened {
             obstructed: labels.obstructed,
             extent: labels.extent(),
         };
-        Ok(Self { pipeline, policy })
+        Ok(Self {
+            pipeline: Arc::new(pipeline),
+            policy,
+            process: std::process::id(),
+        })
+    }
+
+    /// Whether this process was forked while jobs used it: what they had locked or begun would be
+    /// waited for forever, since a fork has none of their threads.
+    fn was_forked_in_use(&self) -> bool {
+        self.process != std::process::id() && Arc::strong_count(&self.pipeline) > 1
     }
 
     /// Runs a job of this pipeline, whose falls Ctrl-C ends.
@@ -68,16 +80,25 @@ impl Opened {
     ) -> PyResult<T> {
         let pipeline = self.pipeline.clone();
         work::run_beside(py, Stop::new(), &mut |_| Ok(()), move |stop| {
-            job(&pipeline.stopped_by(stop))
+            job(&dataset::Pipeline::clone(&pipeline).stopped_by(stop))
         })
     }
 }
 
 impl Pipeline {
-    pub(crate) fn opened(&self) -> PyResult<Opened> {
-        locked(&self.opened)
-            .clone()
-            .ok_or_else(|| closed("the pipeline"))
+    /// What was opened; in a process that cannot use that, the same opened again.
+    pub(crate) fn opened(&self, py: Python<'_>) -> PyResult<Opened> {
+        let config = {
+            let mut opened = locked(&self.opened);
+            let opened = opened.as_mut().ok_or_else(|| closed("the pipeline"))?;
+            if !opened.was_forked_in_use() {
+                opened.process = std::process::id();
+                return Ok(opened.clone());
+            }
+            opened.pipeline.config().clone()
+        };
+        let opened = work::run(py, move || Opened::new(config))?;
+        Ok(locked(&self.opened).insert(opened).clone())
     }
 }
 
@@ -110,22 +131,22 @@ impl Pipeline {
         locked(&self.opened).is_none()
     }
 
-    fn class_names(&self) -> PyResult<Vec<String>> {
-        Ok(self.opened()?.policy.classes)
+    fn class_names(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        Ok(self.opened(py)?.policy.classes)
     }
 
-    fn config_json(&self) -> PyResult<String> {
-        text(self.opened()?.pipeline.config()).map_err(to_python)
+    fn config_json(&self, py: Python<'_>) -> PyResult<String> {
+        text(self.opened(py)?.pipeline.config()).map_err(to_python)
     }
 
     /// The folder that paths of environment maps are relative to.
-    fn folder(&self) -> PyResult<OsString> {
-        let folder = self.opened()?.pipeline.config().folder.clone();
+    fn folder(&self, py: Python<'_>) -> PyResult<OsString> {
+        let folder = self.opened(py)?.pipeline.config().folder.clone();
         Ok(folder.into_os_string())
     }
 
     fn sample(&self, py: Python<'_>, seed: u64, k: u64) -> PyResult<Sample> {
-        let opened = self.opened()?;
+        let opened = self.opened(py)?;
         let sample = opened.run(py, move |pipeline| pipeline.sample(seed, k))?;
         let pictures = opened.pipeline.config().pictures.clone();
         let file = PictureFile { pictures, seed, k };
@@ -134,18 +155,18 @@ impl Pipeline {
 
     /// Resolves the unknowns of a scene, renders it and labels it.
     fn take(&self, py: Python<'_>, scene: &str) -> PyResult<Sample> {
-        let (opened, scene) = (self.opened()?, scene_of(scene).map_err(to_python)?);
+        let (opened, scene) = (self.opened(py)?, scene_of(scene).map_err(to_python)?);
         let sample = opened.run(py, move |pipeline| pipeline.take(scene))?;
         Ok(Sample::new(sample, opened.policy))
     }
 
     fn draw(&self, py: Python<'_>, seed: u64, k: u64) -> PyResult<String> {
-        let opened = self.opened()?;
+        let opened = self.opened(py)?;
         opened.run(py, move |pipeline| text(&pipeline.draw(seed, k)?))
     }
 
     fn resolve(&self, py: Python<'_>, scene: &str) -> PyResult<String> {
-        let (opened, scene): (_, Scene) = (self.opened()?, scene_of(scene).map_err(to_python)?);
+        let (opened, scene): (_, Scene) = (self.opened(py)?, scene_of(scene).map_err(to_python)?);
         opened.run(py, move |pipeline| text(&pipeline.resolve(scene)?.0))
     }
 }
