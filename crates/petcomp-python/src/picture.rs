@@ -31,10 +31,18 @@ pub(crate) fn key<'py>(
         core: core.map(|m| matte_of("core", &m)).transpose()?,
         options: parse("options", options).map_err(to_python)?,
     };
-    let keyed = work::run(py, move || inputs.keyed(photo))?;
+    let keyed = work::run(py, move || inputs.keyed(photo).map_err(of_screen))?;
     let changed = deviations_json(&keyed.deviations);
     let matte = to_array(py, keyed.matte)?;
     Ok((matte, to_array(py, keyed.cutout)?, changed))
+}
+
+/// The same error, whose plate is the argument `screen`.
+fn of_screen(error: Error) -> Error {
+    match error {
+        Error::Value { at, what } if at == "plate" => Error::value("screen", what),
+        other => other,
+    }
 }
 
 /// What a keyer is given beside the photo.

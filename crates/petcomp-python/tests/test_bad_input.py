@@ -65,8 +65,10 @@ def test_sizes_that_do_not_fit_are_named():
         key(PHOTO, garbage=np.zeros((5, 8), bool))
     with pytest.raises(ValueError, match="core: 2 at column 0, row 0, expected 0 to 1"):
         key(PHOTO, core=np.full((6, 8), 2, np.float32))
-    with pytest.raises(ValueError, match="plate"):
+    with pytest.raises(ValueError, match="^screen: 8 x 5 pixels, expected the photo's 8 x 6"):
         key(PHOTO, screen=np.zeros((5, 8, 3), np.float32))
+    with pytest.raises(ValueError, match="^screen: no pixel's "):
+        key(PHOTO, screen=PHOTO, profile="robust")
     with pytest.raises(TypeError, match="screen: expected three numbers"):
         key(PHOTO, screen="green")
     with pytest.raises(TypeError, match="screen: dtype float64"):
@@ -302,6 +304,8 @@ def test_what_a_function_would_not_hear_is_refused(tmp_path):
     ):
         with pytest.raises(errors.InvalidValueError, match=says):
             petcomp.generate(lambda k: sample, 1, tmp_path / "set", classes=["a"], **arguments)
+    with pytest.raises(errors.InvalidValueError, match="^layers: the sample has depth for 0 x 0 pixels"):
+        petcomp.generate(lambda k: sample, 1, tmp_path / "flat", classes=["a"], labels={"formats": ["layers"]})
     both = {"formats": ["voc", "webdataset"]}
     assert petcomp.generate(lambda k: sample, 1, tmp_path / "both", classes=["a"], labels=both).labelled == 1
 
