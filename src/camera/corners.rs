@@ -7,7 +7,7 @@ use crate::geom::{Point2, Vector2, mean_point};
 
 /// Corners closer than this many pixels are one corner; also closer than [`COINCIDENT_SIGMAS`]
 /// times their noise.
-const COINCIDENT_PX: f64 = 2.0;
+pub(super) const COINCIDENT_PX: f64 = 2.0;
 const COINCIDENT_SIGMAS: f64 = 4.0;
 /// A corner nearer than this many sigmas to the line of two others makes a triangle.
 const COLLINEAR_SIGMAS: f64 = 3.0;

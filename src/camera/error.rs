@@ -142,6 +142,16 @@ pub enum SolveError {
     /// No pose has the camera above the surface with the whole rectangle in front of it.
     #[error("surface.corners_px: no camera above the surface sees these corners")]
     NoPose,
+    /// Two points that stand for corners have the same place.
+    #[error("points[{second}].{place}: that of points[{first}], expected another")]
+    PointsCoincident {
+        /// One of them, from 0.
+        first: usize,
+        /// The other.
+        second: usize,
+        /// `px` or `xyz_m`.
+        place: &'static str,
+    },
     /// No camera can have seen a label that has points instead of corners.
     #[error(
         "{at}: no camera above the surface sees these points, expected x along the width and y up: are they mirrored?"
@@ -265,6 +275,14 @@ mod tests {
             (SolveError::NotConvex, "surface.corners_px"),
             (SolveError::NoPose, "surface.corners_px"),
             (SolveError::PointsUnseen { at: "points" }, "points"),
+            (
+                SolveError::PointsCoincident {
+                    first: 0,
+                    second: 2,
+                    place: "px",
+                },
+                "points[2].px",
+            ),
             (SolveError::NoScale, "surface"),
             (SolveError::PointsNeedSides("both are missing"), "surface"),
             (SolveError::DifferentPictures { photo: 1 }, "photos[1]"),

@@ -1,6 +1,7 @@
 //! From a label to a camera, with a warning for everything unusual.
 
 use super::chi::CHI2_99;
+use super::corners::COINCIDENT_PX;
 use super::error::SolveError;
 use super::focal::PriorSource;
 use super::hedge::is_off_center;
@@ -13,6 +14,7 @@ use super::search::{SearchResult, degrees_apart};
 use super::solution::Solution;
 use super::uncertainty::{FocalShare, Uncertainty};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::geom::Vector2;
 
 /// Picture and prior contradict each other beyond this many standard deviations.
 const CONFLICT_SIGMAS: f64 = 3.0;
@@ -53,12 +55,44 @@ pub fn solve(label: &Label, options: &SolveOptions) -> Result<Solution, SolveErr
 
 /// The error of a label whose corners were predicted from points is about the points.
 fn about_points(why: SolveError, label: &Label) -> SolveError {
-    if label.surface.corners_px.is_some() || !why.is_of_corners() {
+    let is_of_corners = why.is_of_corners();
+    if label.surface.corners_px.is_some() || !is_of_corners && why != SolveError::NoCorners {
         return why;
     }
     let are_markers = label.points.iter().all(LabelPoint::is_marker_corner);
-    let at = if are_markers { "markers.map" } else { "points" };
-    SolveError::PointsUnseen { at }
+    match coincident(&label.points) {
+        Some(pair) if !are_markers => pair,
+        _ if is_of_corners => SolveError::PointsUnseen {
+            at: if are_markers { "markers.map" } else { "points" },
+        },
+        _ => why,
+    }
+}
+
+/// The first two of four or more points that have the same place.
+fn coincident(points: &[LabelPoint]) -> Option<SolveError> {
+    let seconds = if points.len() < 4 { 0 } else { points.len() };
+    let mut pairs = (0..seconds).flat_map(|second| (0..second).map(move |first| (first, second)));
+    pairs.find_map(|(first, second)| {
+        let place = common_place(&points[first], &points[second])?;
+        Some(SolveError::PointsCoincident {
+            first,
+            second,
+            place,
+        })
+    })
+}
+
+/// The field in which two points agree where they must not.
+fn common_place(a: &LabelPoint, b: &LabelPoint) -> Option<&'static str> {
+    let distance_px = (Vector2::from(a.px) - Vector2::from(b.px)).norm();
+    if a.xyz_m == b.xyz_m {
+        Some("xyz_m")
+    } else if distance_px < COINCIDENT_PX {
+        Some("px")
+    } else {
+        None
+    }
 }
 
 fn solve_compared(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
@@ -405,6 +439,24 @@ mod tests {
             assert_eq!(refusal, SolveError::PointsUnseen { at });
             assert!(refusal.to_string().ends_with("are they mirrored?"));
         }
+    }
+
+    #[test]
+    fn of_points_with_the_same_place_the_second_is_named() {
+        let mut label = mirrored_points("rim");
+        let flip = |point: &mut LabelPoint| point.xyz_m[0] = -point.xyz_m[0];
+        label.points.iter_mut().for_each(flip);
+        solve(&label, &SolveOptions::default()).unwrap();
+        let refusal = |change: fn(&mut [LabelPoint])| {
+            let mut label = label.clone();
+            change(&mut label.points);
+            let refusal = solve(&label, &SolveOptions::default()).unwrap_err();
+            refusal.to_string()
+        };
+        let told = refusal(|points| points[2].px = points[0].px);
+        assert_eq!(told, "points[2].px: that of points[0], expected another");
+        let told = refusal(|points| points[3].xyz_m = points[1].xyz_m);
+        assert_eq!(told, "points[3].xyz_m: that of points[1], expected another");
     }
 
     #[test]
