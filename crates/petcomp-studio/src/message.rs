@@ -26,17 +26,17 @@ pub(crate) struct Json<T>(pub(crate) T);
 pub(crate) struct Query<T>(pub(crate) T);
 
 impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Json<T> {
-    type Rejection = Response;
+    type Rejection = Refusal;
 
-    async fn from_request(request: Request, state: &S) -> Result<Self, Response> {
+    async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
         if !is_json(request.headers()) {
             let what = format!("expected a body of {JSON}");
-            return Err(Refusal::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, what).into_response());
+            return Err(Refusal::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, what));
         }
         let body = tokio::time::timeout(PATIENCE, Bytes::from_request(request, state)).await;
-        let body = body.map_err(|_| stalled().into_response())?;
-        let body = body.map_err(IntoResponse::into_response)?;
-        let value = serde_json::from_slice(&body).map_err(|e| unreadable(&e).into_response())?;
+        let body = body.map_err(|_| stalled())?;
+        let body = body.map_err(|e| Refusal::new(e.status(), e.body_text()))?;
+        let value = serde_json::from_slice(&body).map_err(|e| unreadable(&e))?;
         Ok(Self(value))
     }
 }

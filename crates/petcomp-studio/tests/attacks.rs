@@ -164,6 +164,22 @@ fn a_body_of_a_hundred_megabytes_is_refused() {
 }
 
 #[test]
+fn requests_of_a_wrong_method_or_length_are_refused_in_json() {
+    let dir = folder_with(&[]);
+    let studio = studio_of(&dir);
+    let (root, host) = (studio.root(), studio.host());
+    let request =
+        format!("PUT {root}api/overview HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n");
+    let wrong_method = studio.send(request.as_bytes());
+    // One byte more than is read.
+    let too_long = studio.post("api/corners/solve", &"a".repeat((16 << 20) + 1));
+    for (answer, expected) in [(wrong_method, "405"), (too_long, "413")] {
+        assert_eq!(status(&answer), expected, "{answer}");
+        assert!(answer.contains("\r\n\r\n{\"error\":\""), "{answer}");
+    }
+}
+
+#[test]
 fn a_body_that_does_not_come_is_not_waited_for() {
     let dir = folder_with(&[]);
     let studio = studio_of(&dir);

@@ -108,6 +108,7 @@ fn app(studio: Arc<Studio>, token: Token, port: u16) -> Router {
     pages::routes(&below, &all_pages())
         .nest(&format!("{below}/api"), rooms())
         .fallback(pages::not_found)
+        .method_not_allowed_fallback(pages::wrong_method)
         .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
         .layer(axum::middleware::from_fn_with_state(guard, guard::check))
         .with_state(studio)

@@ -3,8 +3,8 @@
 use crate::refusal::Refusal;
 use crate::studio::Studio;
 use axum::Router;
-use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
+use axum::http::{Method, StatusCode};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use std::sync::Arc;
@@ -76,4 +76,9 @@ fn answer(page: Page) -> Response {
 
 pub(super) async fn not_found() -> Refusal {
     Refusal::new(StatusCode::NOT_FOUND, "no such page")
+}
+
+pub(super) async fn wrong_method(method: Method) -> Refusal {
+    let what = format!("{method}: not allowed for this address");
+    Refusal::new(StatusCode::METHOD_NOT_ALLOWED, what)
 }
