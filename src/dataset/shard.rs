@@ -109,6 +109,18 @@ impl Shard {
         }
     }
 
+    /// The shard that a variable of the environment gives, if it is possible.
+    fn of_variable(name: &str, value: u64, index: u64, of: u64) -> Result<Self> {
+        let shard = Self { index, of };
+        match shard.expectation() {
+            None => Ok(shard),
+            Some(expected) => {
+                let what = format!("{value} is shard {shard}, expected {expected}");
+                Err(Error::value(name, what))
+            }
+        }
+    }
+
     /// What is expected instead of an impossible shard; none if it is possible.
     fn expectation(self) -> Option<String> {
         let Self { index, of } = self;
@@ -192,7 +204,7 @@ fn parse_choice(text: &str) -> Option<Result<ShardChoice>> {
     };
     let of = of.parse().ok()?;
     if index == "auto" {
-        return Some(Ok(ShardChoice::Auto { of: Some(of) }));
+        return (of > 0).then_some(Ok(ShardChoice::Auto { of: Some(of) }));
     }
     Some(Shard::new(index.parse().ok()?, of).map(ShardChoice::Given))
 }
@@ -210,15 +222,17 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
     }
 
     fn kubernetes_shard(&self, of: Option<u64>) -> Result<Shard> {
-        let Some(index) = self.number("JOB_COMPLETION_INDEX")? else {
-            let what = "auto, but none of SLURM_ARRAY_TASK_ID, AWS_BATCH_JOB_ARRAY_INDEX and JOB_COMPLETION_INDEX is set";
+        let name = "JOB_COMPLETION_INDEX";
+        let Some(index) = self.number(name)? else {
+            let what = "auto, but none of SLURM_ARRAY_TASK_ID, AWS_BATCH_JOB_ARRAY_INDEX and JOB_COMPLETION_INDEX is set; \
+                        otherwise use I/N";
             return Err(Error::value("shard", what));
         };
         let of = of.ok_or_else(|| {
             let what = "Kubernetes does not give the number of shards: use auto/N";
             Error::value("shard", what)
         })?;
-        Shard::new(index.saturating_add(1), of)
+        Shard::of_variable(name, index, index.saturating_add(1), of)
     }
 
     fn aws_batch_shard(&self, index: u64, of: Option<u64>) -> Result<Shard> {
@@ -227,7 +241,8 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
             let what = "AWS_BATCH_JOB_ARRAY_SIZE is not set: use auto/N";
             Error::value("shard", what)
         })?;
-        Shard::new(index.saturating_add(1), of)
+        let name = "AWS_BATCH_JOB_ARRAY_INDEX";
+        Shard::of_variable(name, index, index.saturating_add(1), of)
     }
 
     /// The shard of a task of a Slurm array.
@@ -247,8 +262,8 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
             let what = "SLURM_ARRAY_TASK_COUNT is not set: use auto/N";
             Error::value("shard", what)
         })?;
-        let past = tasks_before(id, first)?;
-        Shard::new((past / step).saturating_add(1), of)
+        let index = (tasks_before(id, first)? / step).saturating_add(1);
+        Shard::of_variable("SLURM_ARRAY_TASK_ID", id, index, of)
     }
 
     /// Number of tasks; fails for an array with gaps.
@@ -270,7 +285,7 @@ fn parse_number(name: &str, text: &str) -> Result<u64> {
 /// The shard of a task by its number alone, whichever tasks its array has.
 fn shard_of_task(id: u64, first: Option<u64>, of: u64) -> Result<Shard> {
     if id > 0 && first != Some(0) {
-        return Shard::new(id, of);
+        return Shard::of_variable("SLURM_ARRAY_TASK_ID", id, id, of);
     }
     let what = format!("an array from 0, expected 1-{of} for auto/{of}; otherwise use I/{of}");
     Err(Error::value("SLURM_ARRAY_TASK_MIN", what))
@@ -370,7 +385,7 @@ mod tests {
         let refused = |text| within(text, &[]).unwrap_err();
         assert_eq!(refused("0/8"), "shard: 0/8, expected 1/8 to 8/8");
         assert_eq!(refused("9/8"), "shard: 9/8, expected at most 8/8");
-        for wrong in ["3", "3/", "a/b", "auto/x", ""] {
+        for wrong in ["3", "3/", "a/b", "auto/x", "auto/0", ""] {
             let expected = "expected I/N, auto or auto/N";
             assert!(refused(wrong).contains(expected), "{wrong}");
         }
@@ -432,11 +447,14 @@ mod tests {
         let pod = [("JOB_COMPLETION_INDEX", "0")];
         assert_eq!(within("auto/8", &pod).unwrap(), "1/8");
         assert!(within("auto", &pod).unwrap_err().contains("use auto/N"));
-        assert!(within("auto/4", &[("JOB_COMPLETION_INDEX", "4")]).is_err());
+        let told = within("auto/4", &[("JOB_COMPLETION_INDEX", "4")]).unwrap_err();
+        let expected = "JOB_COMPLETION_INDEX: 4 is shard 5/4, expected at most 4/4";
+        assert_eq!(told, expected);
         assert!(within("auto", &[]).unwrap_err().contains("none of"));
         let most = u64::MAX.to_string();
         for variable in ["JOB_COMPLETION_INDEX", "SLURM_ARRAY_TASK_ID"] {
             let refused = within("auto/4", &[(variable, &most)]).unwrap_err();
+            assert!(refused.starts_with(variable), "{refused}");
             assert!(refused.contains("expected at most 4/4"), "{refused}");
         }
     }
