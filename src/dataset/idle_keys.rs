@@ -1,9 +1,10 @@
 //! Keys of a recipe that have no effect.
 
+use crate::asset::Asset;
 use crate::dataset::{
     Coco, CocoMask, Format, LabelConfig, Layers, Mot, Pipeline, Voc, WebDataset, Yolo, YoloTask,
 };
-use crate::scene::{Background, EnvironmentRanges, LensRanges, Recipe, Wall};
+use crate::scene::{Background, EnvironmentRanges, LensRanges, Recipe, Take, Wall};
 
 /// Maximum number of names in a message.
 const MAX_SHOWN_NAMES: usize = 5;
@@ -16,6 +17,7 @@ impl Pipeline {
         let places = recipe.narrowed().viewpoints.slice_of(self.places());
         let backgrounds = places.iter().map(|place| &place.background);
         let mut idle = idle_labels(&self.config().labels);
+        idle.extend(idle_takes(recipe, self.places(), &self.library().assets));
         idle.extend(idle_light_direction(recipe, backgrounds));
         idle.extend(idle_partners(recipe));
         idle
@@ -68,6 +70,28 @@ fn has_polygons(labels: &LabelConfig) -> bool {
         Format::Coco => labels.coco.masks == CocoMask::Polygon,
         Format::Voc | Format::Mot | Format::Layers | Format::WebDataset => false,
     })
+}
+
+/// Numbers of labelled photos, or of photos of each asset, that are larger than what is there.
+fn idle_takes<B, P>(recipe: &Recipe, places: &[B], assets: &[Asset<P>]) -> Vec<String> {
+    let told = |key: &str, take, there, found: &str| match take {
+        Take::First(n) if n > there => Some(format!("scene.{key}: {n}, but {found} {there}")),
+        _ => None,
+    };
+    let viewpoints = told(
+        "viewpoints",
+        recipe.viewpoints,
+        places.len(),
+        "the number of labelled photos is",
+    );
+    let most = assets.iter().map(|asset| asset.photos.len()).max();
+    let photos = told(
+        "photos",
+        recipe.photos,
+        most.unwrap_or(0),
+        "no asset has more than",
+    );
+    viewpoints.into_iter().chain(photos).collect()
 }
 
 /// Settings of a depth of field or an environment map that is not used.
@@ -161,6 +185,7 @@ fn some_of(names: &[&str]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::asset::Role;
     use crate::camera::tilted_camera;
     use crate::scene::{CameraSource, LightDirectionSource, WallRanges};
 
@@ -215,6 +240,29 @@ mod tests {
         );
         let complete = "lens = { f_number = 2.8, focus_m = 0.5 }\nenvironment = { files = ['a.exr'], strength = 2 }";
         assert_eq!(told(complete), [""; 0]);
+        assert_eq!(told(""), [""; 0]);
+    }
+
+    #[test]
+    fn more_photos_than_there_are_is_named() {
+        let asset = |photos| Asset {
+            name: "a".into(),
+            role: Role::Object,
+            class: "bottle".into(),
+            thickness: 0.01,
+            mass: 0.1,
+            photos,
+        };
+        let assets = [asset(vec![(); 2]), asset(vec![(); 3])];
+        let told = |recipe: &str| idle_takes(&toml::from_str(recipe).unwrap(), &[(); 4], &assets);
+        assert_eq!(
+            told("viewpoints = 5\nphotos = 4"),
+            [
+                "scene.viewpoints: 5, but the number of labelled photos is 4",
+                "scene.photos: 4, but no asset has more than 3",
+            ]
+        );
+        assert_eq!(told("viewpoints = 4\nphotos = 3"), [""; 0]);
         assert_eq!(told(""), [""; 0]);
     }
 
