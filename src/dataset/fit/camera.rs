@@ -13,7 +13,7 @@ impl Fitting<'_> {
         let scene = &self.config.scene;
         let before = (knob.get)(scene);
         let Some(difference) = difference else {
-            let why = "nothing could be measured".into();
+            let why = "too few pictures could be measured".into();
             return unfitted(knob.key, range_text(before), why);
         };
         let mut key = unfitted(knob.key, range_text(before), describe(knob, difference));

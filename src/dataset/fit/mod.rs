@@ -162,6 +162,7 @@ impl Fitting<'_> {
     ) -> Result<Fit> {
         let real = self.real_pictures(folder)?;
         check_labels(folder, &real)?;
+        warn_of_few(folder, real.set.pictures.len());
         self.steps.expect(self.expected_steps());
         let before = self.rendered()?;
         let negatives = self.config.scene.negatives;
@@ -260,6 +261,16 @@ fn check_labels(folder: &Path, real: &MeasuredSet) -> Result<()> {
     }
     let what = "no label, expected images with YOLO labels";
     Err(Error::file(folder, what))
+}
+
+/// Fewer real pictures than these are an accident of their moment.
+const FEW_PICTURES: usize = 5;
+
+fn warn_of_few(folder: &Path, count: usize) {
+    if count < FEW_PICTURES {
+        let folder = folder.display();
+        log::warn!("{folder}: {count} labelled images, expected at least {FEW_PICTURES}");
+    }
 }
 
 /// A range as TOML.

@@ -7,7 +7,7 @@ pub(super) const ROUNDS: u64 = 200;
 /// Share of the rounds that must agree on the sign of a statistic for it to be significant: its
 /// 97.5 % interval is on one side of zero. A key depends on two of them, mean and variance, and
 /// stays unchanged in more than 9 of 10 cases if there is no difference.
-const SAME_SIGN: f64 = 0.9875;
+pub(super) const SAME_SIGN: f64 = 0.9875;
 
 /// A value and how often it occurs, in any unit.
 pub(super) type Weighted = (f64, f64);
