@@ -24,8 +24,8 @@ enum Boxes {
     Coco(CocoTruth),
     Yolo {
         truth: YoloTruth,
-        /// Below the `data.yaml` that names the classes, if there is one.
-        place: PathBuf,
+        /// Names of its classes, if there is a `data.yaml`.
+        names: Result<Vec<String>>,
     },
 }
 
@@ -53,11 +53,12 @@ impl EvalTruth {
         }
         if is_list(path) && !path.is_dir() {
             check_alone(images, size)?;
-            return Self::of_images(path, path.into(), images_in(path)?);
+            return Self::of_images(path, path, images_in(path)?);
         }
         if is_choice(path)? {
             check_alone(images, size)?;
-            return Self::of_images(path, path.join("data.yaml"), YoloSet::read(path)?.val);
+            let yaml = path.join("data.yaml");
+            return Self::of_images(path, &yaml, YoloSet::read(path)?.val);
         }
         if path.is_file() {
             let what = "a file, expected a folder of YOLO labels, a list of images (.txt) or a COCO document (.json)";
@@ -65,7 +66,7 @@ impl EvalTruth {
         }
         let keypoints = YoloSet::keypoint_numbers_of(path)?;
         let truth = read_pose_truth(path, images, size, keypoints)?;
-        Ok(Self::of_yolo(truth, path.into()))
+        Ok(Self::of_yolo(truth, path))
     }
 
     fn of_coco(path: &Path, images: Option<&Path>) -> Result<Self> {
@@ -76,8 +77,8 @@ impl EvalTruth {
         })
     }
 
-    fn of_images(path: &Path, place: PathBuf, images: Vec<PathBuf>) -> Result<Self> {
-        let keypoints = YoloSet::keypoint_numbers_of(&place)?;
+    fn of_images(path: &Path, place: &Path, images: Vec<PathBuf>) -> Result<Self> {
+        let keypoints = YoloSet::keypoint_numbers_of(place)?;
         if images.is_empty() {
             let what = "no validation images, expected at least one";
             return Err(Error::file(path, what));
@@ -92,10 +93,12 @@ impl EvalTruth {
         Ok(Self::of_yolo(truth, place))
     }
 
-    fn of_yolo(truth: YoloTruth, place: PathBuf) -> Self {
+    /// Of labels below the `data.yaml` that names the classes, if there is one.
+    fn of_yolo(truth: YoloTruth, place: &Path) -> Self {
+        let names = YoloSet::class_names_of(place);
         Self {
             pictures: truth.pictures.clone(),
-            boxes: Boxes::Yolo { truth, place },
+            boxes: Boxes::Yolo { truth, names },
         }
     }
 
@@ -115,7 +118,7 @@ impl EvalTruth {
                 read_coco_results(predictions, &mut truth)?;
                 Ok(truth.sheets)
             }
-            Boxes::Yolo { truth, place } => {
+            Boxes::Yolo { truth, names } => {
                 if predictions.is_file() {
                     let what =
                         "a file, expected a folder of YOLO labels, since the truth has YOLO labels";
@@ -123,7 +126,8 @@ impl EvalTruth {
                 }
                 let mut truth = truth.clone();
                 read_yolo_detections(predictions, &mut truth)?;
-                warn_of_unnamed(predictions, &truth.sheets, place);
+                let named = names.as_ref().map_or(0, Vec::len);
+                warn_of_unnamed(predictions, &truth.sheets, named);
                 Ok(truth.sheets)
             }
         }
@@ -141,10 +145,15 @@ impl EvalTruth {
     fn class_names(&self) -> Vec<String> {
         match &self.boxes {
             Boxes::Coco(truth) => truth.classes.clone(),
-            Boxes::Yolo { place, .. } => YoloSet::class_names_of(place).unwrap_or_else(|error| {
+            Boxes::Yolo {
+                names: Ok(names), ..
+            } => names.clone(),
+            Boxes::Yolo {
+                names: Err(error), ..
+            } => {
                 log::warn!("{error}; classes are shown by number");
                 Vec::new()
-            }),
+            }
         }
     }
 }
@@ -182,8 +191,7 @@ fn by_name(mut images: Vec<PathBuf>) -> Vec<PathBuf> {
 
 /// Warns of detections of classes that the truth's data.yaml does not name: often both number them
 /// differently.
-fn warn_of_unnamed(predictions: &Path, sheets: &[EvalImage], place: &Path) {
-    let named = YoloSet::class_names_of(place).map_or(0, |names| names.len());
+fn warn_of_unnamed(predictions: &Path, sheets: &[EvalImage], named: usize) {
     let classes = sheets.iter().flat_map(|sheet| &sheet.found);
     let unnamed = classes
         .map(|found| found.class as usize)

@@ -28,10 +28,17 @@ pub struct Tags {
 /// no image belongs to a sheet.
 pub fn read_tags(path: &Path, sheets: &[EvalImage]) -> Result<Tags> {
     let bytes = io::read_bytes(path)?;
-    parse(&bytes, sheets).map_err(|e| e.in_file(path))
+    let (tags, ignored) = parse(&bytes, sheets).map_err(|e| e.in_file(path))?;
+    if let Some(first) = ignored.first() {
+        let (path, count) = (path.display(), ignored.len());
+        log::warn!("{path}: {count} lines are ignored, the first: {first}");
+    }
+    Ok(tags)
 }
 
-fn parse(bytes: &[u8], sheets: &[EvalImage]) -> Result<Tags> {
+/// The tags, and why lines of images that are not in the truth are ignored: a table may cover a
+/// whole dataset. If no image is in the truth, it belongs to another one.
+fn parse(bytes: &[u8], sheets: &[EvalImage]) -> Result<(Tags, Vec<Error>)> {
     let text = without_blank_lines(&text_of(bytes)?);
     let mut reader = csv_reader(&text);
     let mut tags = Tags::with_titles(reader.headers().map_err(|e| csv_error(&e))?)?;
@@ -48,8 +55,10 @@ fn parse(bytes: &[u8], sheets: &[EvalImage]) -> Result<Tags> {
             None => unknown.push(here(images.missing(&row[0]))),
         }
     }
-    pass_over(unknown, tags.levels.is_empty())?;
-    Ok(tags)
+    match tags.levels.is_empty() && !unknown.is_empty() {
+        true => Err(unknown.swap_remove(0)),
+        false => Ok((tags, unknown)),
+    }
 }
 
 /// Empties lines of spaces, which the CSV reader would not skip; line numbers are preserved.
@@ -59,20 +68,6 @@ fn without_blank_lines(text: &str) -> String {
         .map(|line| if line.trim().is_empty() { "" } else { line })
         .flat_map(|line| [line, "\n"])
         .collect()
-}
-
-/// Skips lines of images that are not in the truth, since a table may cover a whole dataset. If no
-/// image is in the truth, it belongs to another dataset.
-fn pass_over(unknown: Vec<Error>, are_all: bool) -> Result<()> {
-    let count = unknown.len();
-    let Some(first) = unknown.into_iter().next() else {
-        return Ok(());
-    };
-    if are_all {
-        return Err(first);
-    }
-    log::warn!("tags: {count} lines are ignored, the first: {first}");
-    Ok(())
 }
 
 /// The images of the truth.
@@ -194,7 +189,8 @@ mod tests {
     fn tags_of(text: &str, images: &[&str]) -> std::result::Result<Tags, String> {
         let sheets = images.iter().map(|image| EvalImage::new(*image, vec![]));
         let sheets: Vec<EvalImage> = sheets.collect();
-        parse(text.as_bytes(), &sheets).map_err(|e| e.to_string())
+        let parsed = parse(text.as_bytes(), &sheets).map_err(|e| e.to_string());
+        parsed.map(|(tags, _)| tags)
     }
 
     #[test]

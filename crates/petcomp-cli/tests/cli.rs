@@ -370,6 +370,23 @@ fn a_missing_image_is_found_once() {
 }
 
 #[test]
+fn ignored_lines_of_tags_are_told_with_their_file() {
+    let desk = Desk::new();
+    write_slab(&desk.path("set/images/a.png"));
+    desk.write("set/labels/a.txt", "0 0.5 0.5 0.4 0.4\n");
+    desk.write(
+        "set/data.yaml",
+        "train: images\nval: images\nnames: [cap]\n",
+    );
+    desk.write("found/a.txt", "0 0.5 0.5 0.4 0.4 0.9\n");
+    desk.write("tags.csv", "image,light\nz,dim\na,bright\n");
+    let eval = desk.run(&words("eval found set/labels --tags tags.csv -o report"));
+    let told = text(&eval.stderr);
+    let expected = "tags.csv: 1 lines are ignored, the first: line 2: no image \"z\"";
+    assert!(told.contains(expected), "{told}");
+}
+
+#[test]
 fn detections_of_classes_without_a_name_are_told() {
     let desk = Desk::new();
     write_slab(&desk.path("set/images/a.png"));
