@@ -1330,6 +1330,34 @@ fn film_is_written_into_files_called_exr_alone() {
 }
 
 #[test]
+fn a_mask_that_is_no_coverage_is_named() {
+    let desk = Desk::new();
+    let photos = ["a.exr", "b.exr"];
+    let [green, beyond] = [[0.1, 0.6, 0.15], [1.5; 3]].map(LinearRgb::from);
+    for (name, color) in [("a.exr", green), ("b.exr", green), ("mask.exr", beyond)] {
+        desk.write_picture(name, &Image::filled(8, 8, color));
+    }
+    for (way, count) in [("film", 1), ("triangulate", 2)] {
+        let plates = ["--plate", "a.exr", "--plate", "b.exr"];
+        let more = ["--mask", "mask.exr", "-o", "film.exr"];
+        let told = desk.refused(
+            &[
+                &["matte", way],
+                &photos[..count],
+                &plates[..2 * count],
+                &more,
+            ]
+            .concat(),
+        );
+        assert!(
+            told.contains("mask.exr: 1.5, expected 0 to 1"),
+            "{way}: {told}"
+        );
+        assert!(!told.contains("a.exr"), "{way}: {told}");
+    }
+}
+
+#[test]
 fn every_photo_of_a_film_has_a_plate_or_none() {
     let desk = Desk::new();
     let plate = ["-o", "film.exr", "--plate", "p.png"];

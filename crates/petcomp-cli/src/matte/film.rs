@@ -9,7 +9,7 @@ use petcomp::matte::{
     FilmMatte, FilmOptions, PlateOptions, ScreenPlate, SegmentOptions, TriangulateOptions,
     Triangulated, film, film_planes, segment, triangulate,
 };
-use petcomp::{Coverage, Film, Image, LinearRgb};
+use petcomp::{Coverage, Error, Film, Image, LinearRgb};
 use std::path::{Path, PathBuf};
 
 /// Inputs and outputs of both commands.
@@ -79,7 +79,8 @@ impl FilmArgs {
     ) -> Result<FilmMatte> {
         let options: FilmOptions = from_overrides("film", &self.options.settings)?;
         options.check().map_err(|e| e.within("film"))?;
-        let found = film(photo, plate, inside, &options).map_err(|e| e.in_file(&self.photo))?;
+        let found = film(photo, plate, inside, &options);
+        let found = found.map_err(|e| self.options.of_mask(e).in_file(&self.photo))?;
         report_diagnostics(self.photo.display(), &found.diagnostics);
         Ok(found)
     }
@@ -125,7 +126,7 @@ impl TriangulateArgs {
         let shots: Vec<_> = photos.iter().zip(plates).collect();
         let options: TriangulateOptions = from_overrides("film", &self.options.settings)?;
         options.check().map_err(|e| e.within("film"))?;
-        let found = triangulate(&shots, inside, &options)?;
+        let found = triangulate(&shots, inside, &options).map_err(|e| self.options.of_mask(e))?;
         report_diagnostics(self.photos[0].display(), &found.diagnostics);
         Ok(found)
     }
@@ -171,6 +172,14 @@ impl FilmOptionArgs {
         let found = segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(path))?;
         report_diagnostics(path.display(), &found.diagnostics);
         Ok(found.tight)
+    }
+
+    /// An error about the mask names its file.
+    fn of_mask(&self, error: Error) -> Error {
+        match (error, &self.mask) {
+            (Error::Value { at, what }, Some(file)) if at == "mask" => Error::file(file, what),
+            (other, _) => other,
+        }
     }
 
     /// From the photo of the empty screen or, without one, fitted around the object.
