@@ -47,7 +47,7 @@ pub fn rectify(
     ))
 }
 
-/// The cubic value of a photo, where it would be less than black beside a steep edge, black.
+/// The cubic value of a photo; black where it would be negative, beside a steep edge.
 #[inline]
 fn sample_light(photo: &Image<LinearRgb>, x: f64, y: f64) -> LinearRgb {
     sample_cubic(photo, x, y).map(|v| v.max(0.0))
