@@ -319,6 +319,22 @@ def test_the_program_is_inside():
     assert done.returncode == 0, done.stderr
 
 
+PROGRAM = [sys.executable, "-m", "petcomp"]
+
+
+def test_closed_streams_leave_the_files_of_the_program_alone(recipe, tmp_path):
+    def files_of(folder, script):
+        words = [*PROGRAM, "-vv", "-j", "2", "dataset", "generate", recipe, "-n", "30", "-o", tmp_path / folder]
+        subprocess.run(["sh", "-c", script, "sh", *words], capture_output=True, check=True)
+        paths = (path for path in (tmp_path / folder).rglob("*") if path.is_file() and path.name != ".runs.jsonl")
+        return {path.relative_to(tmp_path / folder): path.read_bytes() for path in paths}
+
+    want = files_of("open", '"$@"')
+    assert len(want) > 90
+    for closed in (">&- 2>&-", "<&- >&- 2>&-"):
+        assert files_of(closed, f'"$@" {closed}') == want
+
+
 def test_threads_are_set():
     petcomp.set_threads(1)
     try:
