@@ -16,7 +16,7 @@ import time
 import numpy as np
 import petcomp
 import pytest
-from conftest import ROOT
+from conftest import ROOT, SAMPLES
 
 
 def picture_of(recipe, k):
@@ -333,6 +333,46 @@ def test_closed_streams_leave_the_files_of_the_program_alone(recipe, tmp_path):
     assert len(want) > 90
     for closed in (">&- 2>&-", "<&- >&- 2>&-"):
         assert files_of(closed, f'"$@" {closed}') == want
+
+
+def interrupted(*words):
+    """The program with Ctrl-C after two seconds: status, messages, and how long it lasted from then on."""
+
+    # Programs in the background of a script are deaf to it.
+    def hear():
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    words = [*PROGRAM, "-j", "1", *map(str, words)]
+    program = subprocess.Popen(
+        words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=hear
+    )
+    try:
+        time.sleep(2)
+        struck = time.monotonic()
+        program.send_signal(signal.SIGINT)
+        _, said = program.communicate(timeout=30)
+    finally:
+        program.kill()
+    return program.returncode, said, time.monotonic() - struck
+
+
+def test_ctrl_c_ends_the_program(recipe, tmp_path):
+    for name, confidence in (("truth", ""), ("found", " 0.5")):
+        (tmp_path / name).mkdir()
+        for k in range(200):
+            rows = (f"0 {0.05 * i + 0.02:.2f} 0.5 0.04 0.5{confidence}\n" for i in range(20))
+            (tmp_path / name / f"{k}.txt").write_text("".join(rows))
+    status, said, lasted = interrupted(
+        "eval", tmp_path / "found", tmp_path / "truth", "--size", "640x480", "--rounds", "100000"
+    )
+    assert (status, "Traceback" in said) == (-signal.SIGINT, False) and lasted < 2, said
+    # Commands whose work the next run continues say so.
+    for words in (
+        ["dataset", "generate", recipe, "-n", "100000", "-o", tmp_path / "set", "--yes"],
+        ["asset", "build", SAMPLES / "bottles", "-o", tmp_path / "assets"],
+    ):
+        status, said, _ = interrupted(*words)
+        assert (status, "Traceback" in said) == (130, False) and "interrupted" in said, said
 
 
 def test_threads_are_set():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 
 from . import _petcomp
@@ -13,6 +14,9 @@ __all__ = ["main"]
 def main() -> None:
     """Run the command line and exit with its status."""
     _open_streams()
+    # Python's handler would act only when the program has ended, and with a traceback.
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     sys.exit(_petcomp.run_program(["petcomp", *sys.argv[1:]]))
 
 
