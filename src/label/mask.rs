@@ -79,6 +79,15 @@ impl RleMask {
             .map(move |i| ((i / h) as u32, (i % h) as u32))
     }
 
+    /// Whether any pixel is inside this mask and another of the same picture.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let mut others = other.inside().peekable();
+        self.inside().any(|(start, n)| {
+            while others.next_if(|(at, m)| at + m <= start).is_some() {}
+            others.peek().is_some_and(|(at, _)| *at < start + n)
+        })
+    }
+
     /// Start and length of each run of pixels inside.
     fn inside(&self) -> impl Iterator<Item = (u64, u64)> {
         let mut at = 0;
@@ -204,6 +213,19 @@ mod tests {
             let corners = dots.iter().flat_map(|&(x, y)| [(x, y), (x + 1, y + 1)]);
             let around = BBox::around(corners.map(|(x, y)| Point2::new(x.into(), y.into())));
             prop_assert_eq!(mask.bounds(), around);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn masks_overlap_where_they_share_a_pixel(
+            bits in prop::collection::vec((0..4_u8, 0..4_u8), 30),
+        ) {
+            let mask = |of: fn(&(u8, u8)) -> u8| {
+                RleMask::from_fn([5, 6], |x, y| of(&bits[(6 * x + y) as usize]) == 0)
+            };
+            let (a, b) = (mask(|bits| bits.0), mask(|bits| bits.1));
+            prop_assert_eq!(a.overlaps(&b), bits.contains(&(0, 0)));
         }
     }
 

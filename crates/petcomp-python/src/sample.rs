@@ -364,15 +364,20 @@ fn labels_of(
     })
 }
 
-/// Leaves of each object what none after it covers.
-fn hide_behind_later(objects: &mut [ObjectLabel], size: [usize; 2]) {
+/// Leaves of each object what none after it covers, and notes which of those cover it.
+fn hide_behind_later(mut objects: &mut [ObjectLabel], size: [usize; 2]) {
     let front = front_ids(objects, size);
-    for object in objects {
+    while let [object, later @ ..] = objects {
         let mask = runs_of(front.view(), |id| id == object.id.0);
         let whole = object.amodal_mask.area().max(1);
         object.visible_fraction = mask.area() as f64 / whole as f64;
         object.visible_box = mask.bounds();
         object.visible_mask = mask;
+        let over = later
+            .iter()
+            .filter(|other| other.amodal_mask.overlaps(&object.amodal_mask));
+        object.covered_by = over.map(|other| other.id).collect();
+        objects = later;
     }
 }
 

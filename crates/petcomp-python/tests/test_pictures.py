@@ -231,6 +231,30 @@ def test_masks_behind_others_are_hidden_there():
         assert seen.size == 0 or box == [*seen.min(0)[::-1], *(seen.max(0) + 1)[::-1]]
 
 
+def test_masks_behind_others_are_obstructed(tmp_path):
+    masks = np.zeros((3, 12, 16), bool)
+    masks[0, 1:6, 1:9] = masks[1, 5:11, 8:15] = masks[2, 8:11, 1:6] = True
+    sample = petcomp.Sample.from_masks(np.zeros((12, 16, 3), np.uint8), list(masks), [0, 1, 0], ["a", "b"])
+    assert [found["covered_by"] for found in sample.labels["objects"]] == [[2], [], []]
+    assert sample.classes.tolist() == [0, 1, 0]
+
+    def written(obstructed):
+        """Class and whether ignored in COCO, and the classes in YOLO."""
+        labels = {"formats": ["yolo", "coco"], "obstructed": obstructed}
+        folder, all_train = tmp_path / obstructed, {"val_percent": 0}
+        petcomp.generate(lambda k: sample, 1, folder, classes=["a", "b"], labels=labels, split=all_train)
+        coco = json.loads((folder / "annotations/instances_train.json").read_text())
+        first = coco["categories"][0]["id"]
+        found = [(one["category_id"] - first, one["iscrowd"]) for one in coco["annotations"]]
+        rows = (folder / "labels/train/000000.txt").read_text().splitlines()
+        return sorted(found), sorted(int(row.split()[0]) for row in rows)
+
+    assert written("drop") == ([(0, 0), (1, 0)], [0, 1])
+    assert written("keep") == ([(0, 0), (0, 0), (1, 0)], [0, 0, 1])
+    assert written("ignore") == ([(0, 0), (0, 1), (1, 0)], [0, 1])
+    assert written("class") == ([(0, 0), (1, 0), (2, 0)], [0, 1, 2])
+
+
 def test_a_card_above_covers_the_one_below():
     two = shot().with_card(
         petcomp.Card(id=2, texture=np.full((4, 4, 3), 200, np.uint8), size=(0.2, 0.1), position=(0, 0, 0.1))

@@ -43,7 +43,8 @@ class Sample:
 
         * ``image``: height x width x 3 or 4, float32 (scene-linear, premultiplied, alpha 0 to 1) or uint8 (sRGB)
         * ``masks``: one per object, height x width, bool or float32 (above 0.5 is inside); where masks overlap,
-          the last is in front
+          the last is in front, and the others are obstructed: unless ``labels["obstructed"]`` says otherwise,
+          ``generate`` gives them no label
         * ``object_classes``: the class of each object, an index into ``classes``
         """
         numbers = [_class_number(number) for number in object_classes]
