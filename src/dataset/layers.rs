@@ -113,10 +113,13 @@ fn check_deep(sample: &Sample) -> Result<()> {
     if (deep_w, deep_h) == (w, h) {
         return Ok(());
     }
-    let what = format!(
-        "the sample has depth for {deep_w} x {deep_h} pixels, expected the picture's {w} x {h}, as rendered samples have"
-    );
-    Err(Error::value("layers", what))
+    if deep_w == 0 {
+        let what =
+            "\"layers\", but the sample was not rendered, so there is no light of single objects";
+        return Err(Error::value("labels.formats", what));
+    }
+    let what = format!("{deep_w} x {deep_h} pixels, expected the picture's {w} x {h}");
+    Err(Error::value("deep", what))
 }
 
 /// The name of a channel and how its value is computed from a pixel.
