@@ -12,6 +12,8 @@ pub(crate) const MAX_LIGHTS: usize = 64;
 
 pub(super) const SHARE: Bounds = Bounds::new(0.0, 1.0, "a share");
 pub(super) const SCALE: Bounds = Bounds::new(0.01, 100.0, "a factor on objects of 5 mm to 5 m");
+/// That of an asset times the cube of [`SCALE`].
+pub(super) const MASS: Bounds = Bounds::new(1e-12, 1e12, "kilograms");
 pub(super) const EV: Bounds = Bounds::new(-32.0, 32.0, "the range of 32-bit pictures");
 /// Exposure of a scene, which is solved from light of any brightness: a wider range than for typed
 /// values.

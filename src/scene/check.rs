@@ -1,14 +1,14 @@
 //! Validation of a scene, once, before any work.
 
-use crate::bounds::{ALBEDO, Bounds, LONGEST_SIDE_PX, MASS, MOST_PIXELS};
+use crate::bounds::{ALBEDO, Bounds, LONGEST_SIDE_PX, MOST_PIXELS};
 use crate::camera::Camera;
 use crate::color::Albedo;
 use crate::error::{Error, Result};
 use crate::geom::{Pose, UnitQuaternion};
 use crate::pixel::LinearRgb;
 use crate::scene::bounds::{
-    CAST_SHARE, EV, FOCAL, FRICTION, GRADE, LENGTH, MAX_LIGHTS, MAX_OBJECTS, PHOTO_SIDE, PIXEL,
-    PLACE, RADIANCE, SHARE, SOLVED_EV, TURN,
+    CAST_SHARE, EV, FOCAL, FRICTION, GRADE, LENGTH, MASS, MAX_LIGHTS, MAX_OBJECTS, PHOTO_SIDE,
+    PIXEL, PLACE, RADIANCE, SHARE, SOLVED_EV, TURN,
 };
 use crate::scene::hull::doubled_corner_area;
 use crate::scene::{

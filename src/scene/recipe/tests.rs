@@ -572,6 +572,24 @@ fn drawn_values_stay_in_their_ranges() {
 }
 
 #[test]
+fn an_object_may_weigh_what_any_asset_does_at_any_scale() {
+    for (mass, scale) in [(1e-6, 0.01), (1e6, 100.0)] {
+        let recipe = Recipe {
+            scale: Range::fixed(scale),
+            ..Recipe::default()
+        };
+        let asset = AssetVariant {
+            mass,
+            ..catalog(1).remove(0)
+        };
+        let scene = recipe.scene(7, 0, &[tray("a")], &[asset]).unwrap();
+        let object = &scene.objects[0];
+        assert!((object.mass / (mass * scale.powi(3)) - 1.0).abs() < 1e-12);
+        scene.check().unwrap();
+    }
+}
+
+#[test]
 fn friction_and_bounce_are_drawn_for_a_scene() {
     let recipe = Recipe {
         friction: Range::new(0.2, 0.6),
