@@ -841,7 +841,17 @@ fn the_frames_of_a_sequence_are_keyed_into_folders() {
     }
     let frames = ["shot/0.png", "shot/1.png", "shot/2.png"];
     let folders = ["-o", "keyed", "--matte", "mattes"];
-    desk.ok(&[&["matte", "key"][..], &frames, &folders, &screen].concat());
+    let told = ["--progress", "json"];
+    let output = desk.run(&[&["matte", "key"][..], &frames, &folders, &screen, &told].concat());
+    assert!(output.status.success());
+    let told = text(&output.stderr);
+    let first: serde_json::Value =
+        serde_json::from_str(told.lines().next().unwrap_or_default()).expect("JSON");
+    assert_eq!(
+        (&first["done"], &first["of"]),
+        (&0.into(), &3.into()),
+        "{told}"
+    );
     for k in 0..3 {
         let [together, alone] = ["keyed/", "alone_"].map(|at| desk.bytes(&format!("{at}{k}.exr")));
         assert_eq!(together, alone);

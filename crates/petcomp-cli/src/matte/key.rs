@@ -275,6 +275,7 @@ impl KeyerWork<'_> {
     fn key_sequence(&self, frames: &[FrameFiles], global: &GlobalArgs) -> Result<()> {
         let progress = global.start_progress("frames");
         let (stop, count) = (interruption(), frames.len() as u64);
+        progress.update(0, count);
         let batch = Mutex::new((FileBatch::default(), 0));
         let key = |keyed: &mut Keyed, frame: &FrameFiles| {
             if stop.load(Ordering::Relaxed) {
