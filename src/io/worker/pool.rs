@@ -78,7 +78,7 @@ pub fn worker_version() -> Result<String> {
 /// Next to the running program; one folder up is for test programs, which cargo puts below the
 /// others.
 fn find_program() -> Option<PathBuf> {
-    if let Some(named) = std::env::var_os(PROGRAM_VARIABLE) {
+    if let Some(named) = std::env::var_os(PROGRAM_VARIABLE).filter(|named| !named.is_empty()) {
         return Some(named.into());
     }
     let own = std::env::current_exe().ok()?;

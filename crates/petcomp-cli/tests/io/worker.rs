@@ -210,6 +210,20 @@ fn a_worker_without_a_full_sandbox_is_refused_where_that_is_asked_for() {
     );
 }
 
+#[test]
+fn an_empty_path_of_the_worker_is_none() {
+    let folder = Folder::new();
+    let picture = folder.with("palette.tif", &palette_tiff());
+    let mut program = Command::new(env!("CARGO_BIN_EXE_petcomp"));
+    program
+        .args(["--oiio", "worker", "diff"])
+        .args([&picture, &picture])
+        .env("PETCOMP_OIIO_WORKER", "");
+    let output = program.output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{told}");
+}
+
 /// Loading OpenImageIO costs 0.2 s and 260 libraries at every start.
 #[cfg(target_os = "linux")]
 #[test]
