@@ -16,10 +16,14 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
 
 /// Memory that a photo takes for each of its pixels while it is cut out: 130 bytes, measured with
 /// photos of 12 and 24 megapixels.
 const BYTES_PER_PIXEL: u64 = 140;
+
+/// No process needs longer for one file of a cut-out: an older half-written one is a killed run's.
+const LONGEST_WRITE: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// What [`build`] did.
 #[derive(Clone, Debug)]
@@ -253,7 +257,7 @@ fn record(
     outcomes: Vec<Result<PhotoRecord>>,
     folder: &Path,
 ) -> Result<(Manifest, TakenIn)> {
-    let _alone = lock(folder)?;
+    let alone = lock(folder)?;
     let mut manifest = read_or_new(folder)?;
     list.add_classes_to(&mut manifest)?;
     let taken = take_in(list, outcomes, folder, &mut manifest);
@@ -262,6 +266,9 @@ fn record(
     }
     let mut removed = taken.removed.iter();
     removed.try_for_each(|file| files::remove(folder, file))?;
+    if alone.is_some() {
+        io::sweep(folder, LONGEST_WRITE)?;
+    }
     Ok((manifest, taken))
 }
 
@@ -1052,6 +1059,31 @@ mod tests {
             );
             assert!(!out.exists());
         }
+    }
+
+    #[test]
+    fn what_killed_runs_left_is_deleted_after_a_day() {
+        let folder = folder_with(TWO);
+        let out = folder.path().join("out");
+        std::fs::create_dir_all(out.join("a")).unwrap();
+        let left = |name: &str, hours: u64| {
+            let file = std::fs::File::create(out.join(name)).unwrap();
+            let age = Duration::from_secs(hours * 3600);
+            file.set_modified(std::time::SystemTime::now() - age)
+                .unwrap();
+        };
+        let names = [
+            (".petcomp-a.tmp", 25),
+            ("a/.petcomp-b.tmp", 25),
+            (".petcomp-c.tmp", 23),
+            (".mine.tmp", 25),
+        ];
+        for (name, hours) in names {
+            left(name, hours);
+        }
+        build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap();
+        let stays = names.map(|(name, _)| out.join(name).exists());
+        assert_eq!(stays, [false, false, true, true]);
     }
 
     #[test]

@@ -7,9 +7,9 @@ use crate::error::{Error, Result};
 use crate::io;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
-use std::ffi::OsStr;
 use std::fs::{DirEntry, File, TryLockError};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Name of the file that records what a dataset was made from.
 pub(crate) const IDENTITY: &str = "dataset.json";
@@ -36,7 +36,7 @@ pub(crate) fn claim(plan: &Plan) -> Result<FolderClaim> {
     refuse_foreign_files(folder)?;
     let lock = lock(folder)?;
     sign(plan, before)?;
-    sweep(folder)?;
+    io::sweep(folder, Duration::ZERO)?;
     begin_writers(plan)?;
     Ok(FolderClaim { _lock: lock })
 }
@@ -228,25 +228,6 @@ fn lock(folder: &Path) -> Result<File> {
         }
         Err(TryLockError::Error(e)) => Err(Error::file(&path, e)),
     }
-}
-
-/// Deletes what a killed run left half-written.
-fn sweep(folder: &Path) -> Result<()> {
-    for entry in io::entries(folder)? {
-        match entry.file_type() {
-            Ok(kind) if kind.is_dir() => sweep(&entry.path())?,
-            Ok(kind) if kind.is_file() && is_half_written(&entry.file_name()) => {
-                std::fs::remove_file(entry.path()).map_err(|e| Error::file(entry.path(), e))?;
-            }
-            _ => {}
-        }
-    }
-    Ok(())
-}
-
-fn is_half_written(name: &OsStr) -> bool {
-    let name = name.to_string_lossy();
-    name.starts_with(".petcomp-") && name.ends_with(".tmp")
 }
 
 /// Everything that decides the bytes of a dataset's samples, as read back from a file.

@@ -127,7 +127,7 @@ pub use fs::{
 };
 pub(crate) use fs::{
     Syncing, absolute_folder, files_below, is_apple_double, length_inside, natural_key, open_own,
-    real_path, refuse_foreign, refuse_links, stem_text, sync_file_system, with_last_step,
+    real_path, refuse_foreign, refuse_links, stem_text, sweep, sync_file_system, with_last_step,
     write_through,
 };
 pub use header::Header;

@@ -2,13 +2,15 @@
 //! synced, and then moved there. Files that are recorded in a journal may be moved first and synced
 //! together.
 
+use super::listing::entries;
 use super::open::reason;
 use crate::error::{Error, Result};
 use crate::work::{self, Kind};
 use std::cell::Cell;
-use std::fs::{File, Permissions};
+use std::fs::{DirEntry, File, Permissions};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Component, Path, PathBuf};
+use std::time::Duration;
 
 /// When files are synced to disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -196,11 +198,39 @@ fn sync_all_files(_: &File) -> std::io::Result<()> {
     Err(ErrorKind::Unsupported.into())
 }
 
+/// How the name of a temporary file begins and ends.
+const TEMPORARY: [&str; 2] = [".petcomp-", ".tmp"];
+
+/// Deletes the temporary files that killed runs left in a folder and its subfolders, if they are at
+/// least this old: younger ones may be another run's.
+pub(crate) fn sweep(folder: &Path, age: Duration) -> Result<()> {
+    for entry in entries(folder)? {
+        match entry.file_type() {
+            Ok(kind) if kind.is_dir() => sweep(&entry.path(), age)?,
+            Ok(kind) if kind.is_file() && is_left_over(&entry, age) => {
+                std::fs::remove_file(entry.path()).map_err(|e| Error::file(entry.path(), e))?;
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn is_left_over(entry: &DirEntry, age: Duration) -> bool {
+    let name = entry.file_name();
+    let name = name.to_string_lossy();
+    let written = entry.metadata().and_then(|meta| meta.modified());
+    let elapsed = written.map(|at| at.elapsed().unwrap_or_default());
+    name.starts_with(TEMPORARY[0])
+        && name.ends_with(TEMPORARY[1])
+        && elapsed.is_ok_and(|elapsed| elapsed >= age)
+}
+
 /// A new file that is deleted unless it is moved to its destination, with the user's default
 /// permissions.
 fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".petcomp-").suffix(".tmp");
+    builder.prefix(TEMPORARY[0]).suffix(TEMPORARY[1]);
     #[cfg(unix)]
     builder.permissions(<Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o666));
     builder.tempfile_in(folder)

@@ -19,7 +19,7 @@ pub use sanitize_path::{below, inside};
 pub use text_name::path_text;
 
 pub(crate) use atomic::{
-    Syncing, absolute_folder, sync_file_system, with_last_step, write_bytes, write_through,
+    Syncing, absolute_folder, sweep, sync_file_system, with_last_step, write_bytes, write_through,
 };
 pub(crate) use distinct::real_path;
 pub(crate) use listing::{files_below, is_apple_double};
