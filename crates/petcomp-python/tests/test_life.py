@@ -343,9 +343,7 @@ def interrupted(*words):
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
     words = [*PROGRAM, "-j", "1", *map(str, words)]
-    program = subprocess.Popen(
-        words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=hear
-    )
+    program = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=hear)
     try:
         time.sleep(2)
         struck = time.monotonic()
