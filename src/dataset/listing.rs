@@ -36,7 +36,9 @@ pub(crate) fn is_list(place: &Path) -> bool {
 fn listed_images(list: &Path) -> Result<Vec<PathBuf>> {
     let folder = folder_of(list);
     let text = io::read_text(list)?;
-    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let lines = io::lines(&text)
+        .map(str::trim)
+        .filter(|line| !line.is_empty());
     Ok(lines.map(|line| without_dots(&folder.join(line))).collect())
 }
 

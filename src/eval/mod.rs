@@ -72,6 +72,7 @@ pub use yolo::{read_yolo_detections, read_yolo_truth};
 pub use yolov5::yolov5;
 
 use crate::geom::BBox;
+use crate::io;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -283,7 +284,7 @@ pub fn check_confidence(number: f64) -> std::result::Result<(), String> {
 
 /// The lines of a text that are not blank, with their indices.
 fn filled_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    let lines = text.lines().enumerate();
+    let lines = io::lines(text).enumerate();
     lines.filter(|(_, line)| !line.trim().is_empty())
 }
 

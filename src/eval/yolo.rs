@@ -733,6 +733,26 @@ mod tests {
     }
 
     #[test]
+    fn lines_may_end_as_on_any_system() {
+        for end in ["\n", "\r\n", "\r"] {
+            let rows = [
+                "0 0.5 0.5 0.2 0.4",
+                "",
+                "1 0.2 0.2 0.1 0.1",
+                "2 0.8 0.8 0.1 0.1",
+            ]
+            .join(end);
+            let classes = |text: &str| {
+                let sheet = sheet_of(text, "", [10, 10])?;
+                Ok::<Vec<u32>, String>(sheet.truth.iter().map(|b| b.class).collect())
+            };
+            assert_eq!(classes(&rows).unwrap(), [0, 1, 2], "{end:?}");
+            let said = classes(&rows.replace("2 0.8", "2 x")).unwrap_err();
+            assert!(said.starts_with("line 4: "), "{said}");
+        }
+    }
+
+    #[test]
     fn the_id_of_a_track_is_no_confidence() {
         let parsed = |line: &str| parse_detections(line, [10, 10], 0);
         let said = "line 1: 7, expected a confidence, 0 to 1; is it a track id? (save_conf=True)";

@@ -3,6 +3,7 @@
 use crate::dataset::finding::Finding;
 use crate::diagnostic::Code;
 use crate::eval::KnownRows;
+use crate::io;
 use std::path::Path;
 
 /// Class of a row, and the sides of its box; none for an outline.
@@ -35,7 +36,7 @@ pub(super) fn read_rows(
 
 /// The columns of each row that is not empty, with its line number.
 fn split_rows(text: &str) -> Vec<(usize, Vec<&str>)> {
-    let rows = text.lines();
+    let rows = io::lines(text);
     let rows = rows.map(|row| row.split_whitespace().collect::<Vec<_>>());
     let numbered = (1..).zip(rows);
     numbered

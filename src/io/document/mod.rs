@@ -186,6 +186,17 @@ pub fn read_text(path: impl AsRef<Path>) -> Result<String> {
     utf8(path, read_bytes(path)?)
 }
 
+/// Whether a file begins with the byte order mark that [`read_text`] drops.
+pub(crate) fn has_byte_order_mark(path: &Path) -> bool {
+    let mark = BYTE_ORDER_MARK.to_string();
+    read_bytes(path).is_ok_and(|bytes| bytes.starts_with(mark.as_bytes()))
+}
+
+/// The lines of a text, ended as Python's: by `\r\n`, `\n` or a lone `\r`.
+pub(crate) fn lines(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().flat_map(|line| line.split('\r'))
+}
+
 /// The bytes of a text file.
 pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     let limit = ReadOptions::default().limits.document_bytes;
