@@ -901,6 +901,76 @@ fn a_split_and_the_check_take_empty_pictures_for_no_look_alikes() {
 }
 
 #[test]
+fn a_byte_order_mark_is_a_fault_of_a_label_and_of_a_list() {
+    let dir = made(12);
+    let label = dir.path().join("labels/train/000001.txt");
+    let rows = std::fs::read_to_string(&label).unwrap();
+    std::fs::write(&label, format!("\u{feff}{rows}")).unwrap();
+    let list = "\u{feff}./images/val/000000.png\n./images/val/000005.png\n";
+    std::fs::write(dir.path().join("val.txt"), list).unwrap();
+    let yaml = "train: images/train\nval: val.txt\nnames: [a, b, c]\n";
+    std::fs::write(dir.path().join("data.yaml"), yaml).unwrap();
+    let marked = |found: Vec<String>| -> Vec<String> {
+        let marked = found.into_iter().filter(|f| f.contains("byte order mark"));
+        marked.collect()
+    };
+    let expected = [
+        "labels/train/000001.txt:1: a byte order mark, which is part of the class to trainers [dataset.bad_label_row]",
+        "val.txt:1: a byte order mark, which is part of the first path to trainers [dataset.unreadable_file]",
+    ];
+    assert_eq!(marked(faults(dir.path())), expected);
+}
+
+#[test]
+fn rows_may_end_as_on_any_system() {
+    let dir = made(12);
+    let label = dir.path().join("labels/train/000003.txt");
+    let rows = check(dir.path()).unwrap().rows;
+    let text = std::fs::read_to_string(&label).unwrap();
+    assert_eq!(text.lines().count(), 2);
+    std::fs::remove_file(dir.path().join("index.jsonl")).unwrap();
+    for end in ["\r\n", "\r"] {
+        std::fs::write(&label, text.replace('\n', end)).unwrap();
+        let checked = check(dir.path()).unwrap();
+        assert_eq!((checked.findings, checked.rows), (vec![], rows.clone()));
+    }
+}
+
+/// Trainers resolve the path of a folder of images before they replace its `images` by `labels`.
+#[test]
+#[cfg(unix)]
+fn labels_are_where_the_link_of_their_images_leads() {
+    let dir = tempfile::tempdir().unwrap();
+    let set = dir.path().join("set");
+    make(&plan(&set, 12)).unwrap();
+    std::fs::remove_file(set.join("index.jsonl")).unwrap();
+    let lead_to = |place: &str| {
+        let (own, place) = (set.join("images/train"), dir.path().join(place));
+        std::fs::create_dir_all(place.parent().unwrap()).unwrap();
+        std::fs::rename(own.canonicalize().unwrap(), &place).unwrap();
+        let _ = std::fs::remove_file(&own);
+        std::os::unix::fs::symlink(&place, own).unwrap();
+        faults(&set)
+    };
+    let found = lead_to("photos");
+    assert_eq!(found.len(), 9, "{found:?}");
+    let said = "../photos/000001.txt: missing or not text, but images/train/000001.png exists, \
+                whose folder is a link: trainers look for labels where it leads [dataset.missing_label]";
+    assert!(found.contains(&said.to_owned()), "{found:?}");
+    std::fs::create_dir_all(dir.path().join("far/labels")).unwrap();
+    std::fs::rename(
+        set.join("labels/train"),
+        dir.path().join("far/labels/train"),
+    )
+    .unwrap();
+    assert_eq!(lead_to("far/images/train"), [""; 0]);
+    // A link to all of the set changes nothing.
+    let whole = dir.path().join("whole");
+    std::os::unix::fs::symlink(&set, &whole).unwrap();
+    assert_eq!(faults(&whole), [""; 0]);
+}
+
+#[test]
 fn an_empty_folder_fails_the_check() {
     let dir = tempfile::tempdir().unwrap();
     assert!(

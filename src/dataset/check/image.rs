@@ -11,9 +11,19 @@ use crate::io;
 use crate::pixel::PremulRgba;
 use std::path::{Path, PathBuf};
 
+/// An image that the dataset names; its paths are relative to the dataset's folder.
+pub(super) struct ListedImage {
+    pub(super) path: PathBuf,
+    /// Where trainers look for its label file.
+    pub(super) label: PathBuf,
+    pub(super) part: Part,
+}
+
 /// An image and its labels.
 pub(super) struct CheckedImage {
     pub(super) path: PathBuf,
+    /// Where trainers look for its label file.
+    pub(super) label: PathBuf,
     pub(super) part: Part,
     pub(super) findings: Vec<Finding>,
     /// The good rows of its label file.
@@ -32,13 +42,13 @@ impl CheckedImage {
     /// Reads an image of the dataset in `folder` and its label file.
     pub(super) fn read(
         folder: &Path,
-        path: PathBuf,
-        part: Part,
+        ListedImage { path, label, part }: ListedImage,
         class_count: Option<usize>,
     ) -> Self {
         let checksum = size_and_checksum(&folder.join(&path));
         let mut image = Self {
             path,
+            label,
             part,
             findings: Vec::new(),
             rows: Vec::new(),
@@ -77,22 +87,31 @@ impl CheckedImage {
     }
 
     fn read_labels(&mut self, folder: &Path, class_count: Option<usize>) {
-        let label = YoloSet::label_of(&self.path);
-        let Ok(text) = io::read_text(folder.join(&label)) else {
+        let Ok(text) = io::read_text(folder.join(&self.label)) else {
             // A missing image is reported already.
-            if !folder.join(&self.path).exists() {
-                return;
+            if folder.join(&self.path).exists() {
+                self.findings.push(self.missing_label());
             }
-            let message = format!("missing or not text, but {} exists", self.path.display());
-            return self
-                .findings
-                .push(Finding::in_file(label, Code::MissingLabel, message));
+            return;
         };
+        if io::has_byte_order_mark(&folder.join(&self.label)) {
+            let message = "a byte order mark, which is part of the class to trainers";
+            let finding = Finding::in_line(&self.label, 1, Code::BadLabelRow, message);
+            self.findings.push(finding);
+        }
         self.is_empty = text.trim().is_empty();
         self.boxes = boxes_in(&text);
-        let (rows, findings) = read_rows(&label, &text, class_count);
+        let (rows, findings) = read_rows(&self.label, &text, class_count);
         self.rows = rows;
         self.findings.extend(findings);
+    }
+
+    fn missing_label(&self) -> Finding {
+        let mut message = format!("missing or not text, but {} exists", self.path.display());
+        if self.label != YoloSet::label_of(&self.path) {
+            message += ", whose folder is a link: trainers look for labels where it leads";
+        }
+        Finding::in_file(&self.label, Code::MissingLabel, message)
     }
 }
 

@@ -19,7 +19,7 @@ use crate::diagnostic::Code;
 use crate::error::{Error, Result};
 use crate::eval::is_class_list;
 use crate::io;
-use image::CheckedImage;
+use image::{CheckedImage, ListedImage};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -63,7 +63,9 @@ pub struct CheckedBox {
 ///   unless both show nothing;
 /// * no validation image looks like a training image ([`NEAR_DUPLICATE_RMS`]) whose label file shows
 ///   the same, or is a training image that was saved again, unless both show nothing;
-/// * every image has a label file and every label file an image;
+/// * every image has a label file and every label file an image; if a folder of images is a link,
+///   trainers look for labels where it leads;
+/// * label files and lists have no byte order mark;
 /// * rows have 5 columns (or, in files of outlines, 7 or more, an odd number), an integer class
 ///   below `nc`, shares in 0..1, sides above 0, and no duplicate in the same file;
 /// * if sidecar files have the objects' poses, something supports each object
@@ -219,7 +221,7 @@ impl Checker<'_> {
         let listed = self.list_images(yaml);
         let mut images: Vec<CheckedImage> = listed
             .into_par_iter()
-            .map(|(part, path)| CheckedImage::read(self.folder, path, part, yaml.class_count()))
+            .map(|image| CheckedImage::read(self.folder, image, yaml.class_count()))
             .collect();
         for image in &mut images {
             self.findings.append(&mut image.findings);
@@ -228,12 +230,11 @@ impl Checker<'_> {
     }
 
     /// The images of both parts, each part in order of name.
-    fn list_images(&mut self, yaml: &DataYaml) -> Vec<(Part, PathBuf)> {
+    fn list_images(&mut self, yaml: &DataYaml) -> Vec<ListedImage> {
         let mut images = Vec::new();
         for part in Part::ALL {
             for place in self.places(yaml, part) {
-                let found = self.list_images_in(&place, part);
-                images.extend(found.into_iter().map(|path| (part, path)));
+                images.extend(self.list_images_in(&place, part));
             }
         }
         images
@@ -246,15 +247,35 @@ impl Checker<'_> {
         named.map(|named| place_of(&root, named)).collect()
     }
 
-    /// As paths relative to the dataset's folder; an image in a list may be elsewhere.
-    fn list_images_in(&mut self, place: &Path, part: Part) -> Vec<PathBuf> {
+    /// An image in a list may be elsewhere.
+    fn list_images_in(&mut self, place: &Path, part: Part) -> Vec<ListedImage> {
         let found = images_in(place).unwrap_or_default();
         if found.is_empty() && self.may_be_empty != Some(part) {
             let place = io::relative(place, self.folder);
             self.add(place, Code::NoImages, "no images, expected at least one");
         }
-        let found = found.iter();
-        found.map(|path| io::relative(path, self.folder)).collect()
+        if is_list(place) && io::has_byte_order_mark(place) {
+            let place = io::relative(place, self.folder);
+            let message = "a byte order mark, which is part of the first path to trainers";
+            let finding = Finding::in_line(place, 1, Code::UnreadableFile, message);
+            self.findings.push(finding);
+        }
+        let trained = self.trained_place(place);
+        let listed = found.iter().map(|image| {
+            let path = io::relative(image, self.folder);
+            let below = image.strip_prefix(place).map(|below| trained.join(below));
+            let label = YoloSet::label_of(below.as_ref().unwrap_or(&path));
+            ListedImage { path, label, part }
+        });
+        listed.collect()
+    }
+
+    /// A folder of images as trainers know it, which follow links; a list as it is.
+    fn trained_place(&self, place: &Path) -> PathBuf {
+        match is_list(place) {
+            true => io::relative(place, self.folder),
+            false => io::relative(&io::real_path(place), &io::real_path(self.folder)),
+        }
     }
 
     /// Images with the same bytes as an earlier one, which is a training image if any of them is;
@@ -291,14 +312,13 @@ impl Checker<'_> {
 
     /// Label files in the folders of images that belong to no image; a list may leave images out.
     fn find_orphan_labels(&mut self, images: &[CheckedImage], yaml: &DataYaml) {
-        let wanted = images.iter().map(|image| YoloSet::label_of(&image.path));
-        let wanted: BTreeSet<PathBuf> = wanted.collect();
+        let wanted: BTreeSet<&PathBuf> = images.iter().map(|image| &image.label).collect();
         let places = Part::ALL
             .into_iter()
             .flat_map(|part| self.places(yaml, part));
         let folders: Vec<PathBuf> = places.filter(|place| !is_list(place)).collect();
         for folder in folders {
-            for label in list_labels(self.folder, &io::relative(&folder, self.folder)) {
+            for label in list_labels(self.folder, &self.trained_place(&folder)) {
                 if !wanted.contains(&label) {
                     self.add(label, Code::OrphanLabel, "no image with this name");
                 }
