@@ -365,9 +365,11 @@ def test_ctrl_c_ends_the_program(recipe, tmp_path):
     )
     assert (status, "Traceback" in said) == (-signal.SIGINT, False) and lasted < 2, said
     # Commands whose work the next run continues say so.
+    rows = (f"{SAMPLES / 'bottles/b0000_0.png'},bottle{i},bottle,0.25\n" for i in range(300))
+    (tmp_path / "photos.csv").write_text("file,asset,class,length\n" + "".join(rows))
     for words in (
         ["dataset", "generate", recipe, "-n", "100000", "-o", tmp_path / "set", "--yes"],
-        ["asset", "build", SAMPLES / "bottles", "-o", tmp_path / "assets"],
+        ["asset", "build", tmp_path / "photos.csv", "-o", tmp_path / "assets"],
     ):
         status, said, _ = interrupted(*words)
         assert (status, "Traceback" in said) == (130, False) and "interrupted" in said, said
