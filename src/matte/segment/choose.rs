@@ -210,8 +210,8 @@ fn searches(scales: &[SearchScale<'_>], options: &SegmentOptions) -> Vec<SearchR
 const STRICTER_FACTOR: f32 = 1.4;
 const LAXER_FACTOR: f32 = 1.0 / STRICTER_FACTOR;
 
-/// How far a side of the hull's box moves, pixels of the whole picture: when edges must be stronger
-/// or the same picture is searched at another depth, and when edges may be weaker.
+/// How far the hull moves, pixels of the whole picture: when edges must be stronger or the same
+/// picture is searched at another depth, and when edges may be weaker.
 fn drift_px(
     searched: &[SearchRun],
     pick: usize,

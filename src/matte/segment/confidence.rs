@@ -10,15 +10,13 @@ pub struct Confidence {
     pub support: f64,
     /// Mean overlap (intersection over union) with what searches at other depths found, 0 to 1.
     pub agreement: f64,
-    /// How far a side of the hull's box moves when edges must be stronger, or at another depth:
-    /// pixels of the picture of `working_size`.
+    /// How far the hull moves when edges must be stronger, or at another depth: pixels of the
+    /// picture of `working_size`.
     pub drift_px: f64,
-    /// How far a side of the hull's box moves when edges may be weaker: pixels of the picture of
-    /// `working_size`.
+    /// How far the hull moves when edges may be weaker: pixels of the picture of `working_size`.
     #[serde(default)]
     pub faint_px: f64,
-    /// How far a side of the hull's box lies beyond that of the outline: pixels of the picture
-    /// that was searched.
+    /// How far the hull lies beyond that of the outline: pixels of the picture that was searched.
     pub stray_px: f64,
     /// Blur of the object's edges, standard deviation in pixels of the picture that was searched.
     pub blur_px: f64,
@@ -33,14 +31,15 @@ pub struct Confidence {
 const MIN_SUPPORT: f64 = 0.8;
 /// An outline that agrees less with other searches gives a warning.
 const MIN_AGREEMENT: f64 = 0.75;
-/// A box that moves by more than its tolerance gives a warning.
-const MAX_DRIFT_PX: f64 = 2.0;
-/// A box that moves farther where edges may be weaker gives a warning: faint tips, or the object's
-/// own shadow. Twice the tolerance, since what noise makes of weak edges moves it, too: on 24 photos
-/// of 32 kinds twice as many right outlines would be flagged with one.
-const MAX_FAINT_PX: f64 = 4.0;
-/// A box that lies farther beyond the outline than its tolerance gives a warning: what is there
-/// encloses no area.
+/// A hull that moves farther, in any direction, gives a warning. With this limit and the next, as
+/// many right outlines are flagged and as many wrong ones missed, on 12 photos of 32 kinds, as with
+/// 2 and 4 pixels for the sides of its box; of such limits, these miss the fewest of 32 slanted
+/// cards in JPEGs. On 12 other photos, 86 of 182 right ones are flagged (were 71).
+const MAX_DRIFT_PX: f64 = 5.0;
+/// A hull that moves farther where edges may be weaker gives a warning: faint tips, the object's own
+/// shadow, or ringing. More, since what noise makes of weak edges moves it, too.
+const MAX_FAINT_PX: f64 = 9.0;
+/// A hull that lies farther beyond the outline gives a warning: what is there encloses no area.
 const MAX_STRAY_PX: f64 = 2.0;
 /// Edges that are softer than this give a warning: their band reaches 2 pixels, the tolerance of a
 /// box, to either side (twice a Gaussian's deviation). Photos in focus have 0.9 at most, and those
@@ -110,7 +109,7 @@ impl Confidence {
         Diagnostic::warning(
             Code::ThresholdSensitive,
             format_args!(
-                "low confidence: bounding box moves {:.0} px at a higher edge threshold; is a part of the object as faint as the screen?",
+                "low confidence: outline moves {:.0} px at a higher edge threshold; is a part of the object as faint as the screen?",
                 self.drift_px
             ),
         )
@@ -120,7 +119,7 @@ impl Confidence {
         Diagnostic::warning(
             Code::ThresholdSensitive,
             format_args!(
-                "low confidence: bounding box moves {:.0} px at a lower edge threshold; is there a faint tip, a shadow or, in a small JPEG, ringing (then take a larger photo)?",
+                "low confidence: outline moves {:.0} px at a lower edge threshold; is there a faint tip, a shadow or, in a small JPEG, ringing (then take a larger photo)?",
                 self.faint_px
             ),
         )
@@ -130,7 +129,7 @@ impl Confidence {
         Diagnostic::warning(
             Code::BoxBeyondOutline,
             format_args!(
-                "low confidence: bounding box extends {:.0} px beyond the outline, where edges enclose no area",
+                "low confidence: hull extends {:.0} px beyond the outline, where edges enclose no area",
                 self.stray_px
             ),
         )
@@ -179,7 +178,7 @@ mod tests {
             (|c| c.support = 0.5, "50 % of the outline lies on edges"),
             (|c| c.agreement = 0.5, "by only 50 %"),
             (|c| c.drift_px = 7.0, "moves 7 px at a higher"),
-            (|c| c.faint_px = 9.0, "moves 9 px at a lower"),
+            (|c| c.faint_px = 11.0, "moves 11 px at a lower"),
             (|c| c.blur_px = 2.0, "blurred by 2.0 px"),
             (|c| c.stray_px = 5.0, "5 px beyond the outline"),
             (|c| c.width_px = 12.0, "only 12 px wide"),
@@ -196,9 +195,9 @@ mod tests {
     }
 
     #[test]
-    fn a_box_that_grows_may_be_the_ringing_of_a_small_jpeg() {
+    fn a_hull_that_grows_may_be_the_ringing_of_a_small_jpeg() {
         let swollen = Confidence {
-            faint_px: 9.0,
+            faint_px: 11.0,
             ..SURE
         };
         let told = swollen.diagnostics(1.0, 1.0);
@@ -210,7 +209,7 @@ mod tests {
     fn lengths_are_told_in_pixels_of_the_photo() {
         let unsure = Confidence {
             drift_px: 7.0,
-            faint_px: 9.0,
+            faint_px: 11.0,
             stray_px: 5.0,
             blur_px: 2.0,
             width_px: 12.0,
@@ -221,7 +220,7 @@ mod tests {
             warnings.iter().map(ToString::to_string).collect::<String>()
         };
         let (reduced, enlarged) = (told(4.0, 8.0), told(0.25, 0.25));
-        for expected in ["28 px", "36 px", "40 px", "16.0 px", "96 px", "about 8 px"] {
+        for expected in ["28 px", "44 px", "40 px", "16.0 px", "96 px", "about 8 px"] {
             assert!(reduced.contains(expected), "{expected}: {reduced}");
         }
         for expected in ["moves 2 px", "1 px beyond", "2.0 px", "12 px", "about 1 px"] {

@@ -2,9 +2,8 @@
 
 use crate::geom::Point2;
 use crate::image::Mask;
-use crate::matte::arrays::largest_difference;
 use crate::matte::outline::points_of;
-use geo::{Area, ConvexHull, MultiPoint, Point};
+use geo::{Area, ConvexHull, Distance, Euclidean, LineString, MultiPoint, Point, Polygon};
 
 /// Convex hull of the object whose edges these pixels are, in order, clockwise as seen; empty where
 /// there is no area.
@@ -57,22 +56,23 @@ pub(in crate::matte) fn sides(polygon: &[Point2<f64>]) -> [f64; 4] {
         })
 }
 
-/// The largest distance between a side of one polygon's box and that of another.
-pub(super) fn farthest_side(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
-    largest_difference(sides(a), sides(b))
+/// The largest distance from a point of one convex polygon to the other (Hausdorff): how far an
+/// outline moved, in any direction.
+pub(super) fn farthest(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
+    growth(a, b).max(growth(b, a))
 }
 
-/// By how much the side of one polygon's box that lies farthest beyond another's does so; 0 where
-/// none does, and the box's longer side where the other has no corner.
+/// By how much one convex polygon goes beyond another; 0 where it does not, and its box's longer
+/// side where the other has no corner.
 pub(super) fn growth(from: &[Point2<f64>], to: &[Point2<f64>]) -> f64 {
-    let [left, top, right, bottom] = sides(to);
-    let [l, t, r, b] = if from.is_empty() {
-        [right, bottom, left, top]
-    } else {
-        sides(from)
-    };
-    [l - left, t - top, right - r, bottom - b]
-        .into_iter()
+    if from.is_empty() {
+        let [left, top, right, bottom] = sides(to);
+        return (right - left).max(bottom - top).max(0.0);
+    }
+    let ring: LineString = from.iter().map(|p| (p.x, p.y)).collect();
+    let from = Polygon::new(ring, Vec::new());
+    to.iter()
+        .map(|p| Euclidean.distance(&Point::new(p.x, p.y), &from))
         .fold(0.0, f64::max)
 }
 
@@ -107,17 +107,43 @@ mod tests {
     }
 
     #[test]
-    fn boxes_are_compared_side_by_side() {
+    fn straight_polygons_are_as_far_apart_as_their_sides() {
         let square =
             |x: f64, w: f64| [[x, 1.0], [x + w, 1.0], [x + w, 5.0], [x, 5.0]].map(Point2::from);
         assert_eq!(sides(&square(2.0, 3.0)), [2.0, 1.0, 5.0, 5.0]);
-        assert_eq!(farthest_side(&square(2.0, 3.0), &square(1.0, 7.0)), 3.0);
+        assert_eq!(farthest(&square(2.0, 3.0), &square(1.0, 7.0)), 3.0);
     }
 
     #[test]
-    fn all_of_a_box_lies_beyond_nothing() {
+    fn a_bump_on_a_slanted_side_counts_although_the_box_stays() {
+        let (sin, cos) = 40_f64.to_radians().sin_cos();
+        let turned = |corners: &[[f64; 2]]| -> Vec<_> {
+            let turn = |[x, y]: &[f64; 2]| Point2::new(cos * x - sin * y, sin * x + cos * y);
+            corners.iter().map(turn).collect()
+        };
+        let card = turned(&[
+            [-150.0, -60.0],
+            [150.0, -60.0],
+            [150.0, 60.0],
+            [-150.0, 60.0],
+        ]);
+        let bumpy = turned(&[
+            [-150.0, -60.0],
+            [0.0, -70.0],
+            [150.0, -60.0],
+            [150.0, 60.0],
+            [-150.0, 60.0],
+        ]);
+        assert_eq!(sides(&card), sides(&bumpy));
+        for apart in [farthest(&card, &bumpy), farthest(&bumpy, &card)] {
+            assert!((apart - 10.0).abs() < 1e-9, "{apart}");
+        }
+    }
+
+    #[test]
+    fn all_of_a_polygon_lies_beyond_nothing() {
         let tall = [[2.0, 1.0], [5.0, 1.0], [5.0, 8.0], [2.0, 8.0]].map(Point2::from);
-        let inner = [[3.0, 1.0], [5.0, 1.0], [5.0, 6.0], [3.0, 6.0]].map(Point2::from);
+        let inner = [[2.0, 1.0], [5.0, 1.0], [5.0, 6.0], [2.0, 6.0]].map(Point2::from);
         let beyond = [growth(&[], &tall), growth(&inner, &tall), growth(&[], &[])];
         assert_eq!(beyond, [7.0, 2.0, 0.0]);
     }

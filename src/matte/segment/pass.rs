@@ -52,9 +52,9 @@ pub(super) struct Pass {
 }
 
 impl Pass {
-    /// The largest distance between a side of the hull's box and that of another search.
+    /// How far the hull lies from that of another search, at most.
     pub(super) fn distance(&self, other: &Self) -> f64 {
-        hull::farthest_side(&self.hull, &other.hull)
+        hull::farthest(&self.hull, &other.hull)
     }
 }
 

@@ -325,6 +325,36 @@ fn specks_all_over_are_told() {
 }
 
 #[test]
+fn a_weak_bump_on_a_slanted_side_is_told_although_the_box_stays() {
+    let (sin, cos) = 40_f64.to_radians().sin_cos();
+    let bar = |bump_shade: Option<f32>| {
+        photo(400, 300, GREEN, move |x, y| {
+            let (x, y) = (x - 200.0, y - 150.0);
+            let (along, across) = (cos * x + sin * y, cos * y - sin * x);
+            let shade = bump_shade.filter(|_| disc(along, across, [0.0, -40.0, 15.0]));
+            let is_bar = along.abs() < 120.0 && across.abs() < 40.0;
+            is_bar
+                .then_some(WHITE)
+                .or(shade.map(|shade| GREEN.scale(shade)))
+        })
+    };
+    // The rim of the bump has up to 18 times the noise.
+    let options = SegmentOptions {
+        finest_threshold: Threshold::Noise(19.0),
+        ..SegmentOptions::default()
+    };
+    let found = |bump_shade| segment(&bar(bump_shade), &options).unwrap();
+    let told = |found: &Segmentation| {
+        let mut codes = found.diagnostics.iter().map(|d| d.code);
+        codes.any(|code| code == Code::ThresholdSensitive)
+    };
+    let (plain, bumpy) = (found(None), found(Some(0.7)));
+    assert!(largest_difference(hull::sides(&plain.hull), hull::sides(&bumpy.hull)) < 1.0);
+    assert!(!told(&plain), "{:?}", plain.diagnostics);
+    assert!(told(&bumpy), "{:?}", bumpy.confidence);
+}
+
+#[test]
 fn impossible_options_are_named() {
     let said = |change: fn(&mut SegmentOptions)| {
         let mut options = SegmentOptions::default();
