@@ -149,6 +149,9 @@ impl RenderedTile {
 }
 
 impl BentLattice {
+    /// Not inlined: the compiler would also compute it where there is no such lattice, of memory that
+    /// was never written, at which valgrind takes offence.
+    #[inline(never)]
     fn position_of(&self, px: [f64; 2]) -> (LatticePosition, LatticePosition) {
         let ideal = self.ideal_from_picture * Vector3::new(px[0], px[1], 1.0);
         self.lattice.position_of(ideal.x, ideal.y)
