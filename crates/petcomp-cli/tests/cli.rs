@@ -1343,9 +1343,13 @@ fn film_is_written_into_files_called_exr_alone() {
 fn a_mask_that_is_no_coverage_is_named() {
     let desk = Desk::new();
     let photos = ["a.exr", "b.exr"];
-    let [green, beyond] = [[0.1, 0.6, 0.15], [1.5; 3]].map(LinearRgb::from);
-    for (name, color) in [("a.exr", green), ("b.exr", green), ("mask.exr", beyond)] {
-        desk.write_picture(name, &Image::filled(8, 8, color));
+    let green = Image::filled(32, 32, LinearRgb::new(0.1, 0.6, 0.15));
+    let beyond = Image::from_fn(32, 32, |x, y| {
+        let is_inside = (12..20).contains(&x) && (12..20).contains(&y);
+        LinearRgb::grey(if is_inside { 1.5 } else { 0.0 })
+    });
+    for (name, picture) in [("a.exr", &green), ("b.exr", &green), ("mask.exr", &beyond)] {
+        desk.write_picture(name, picture);
     }
     for (way, count) in [("film", 1), ("triangulate", 2)] {
         let plates = ["--plate", "a.exr", "--plate", "b.exr"];
