@@ -69,9 +69,9 @@ class Study:
         short = settings.pop("short", {})
         return settings | (short if self.arms["arms"][arm].get("short") else {})
 
-    def seeds(self, arm, count=None):
-        """Seeds of an arm: `count` of them, or as many as the arm has."""
-        return range(count or self.training(arm)["seeds"])
+    def seeds(self, arm, chosen=None):
+        """Seeds of an arm: those chosen, or as many as the arm has."""
+        return chosen or range(self.training(arm)["seeds"])
 
     def folder(self, arm, seed):
         return self.cache / "runs" / arm / str(seed)
