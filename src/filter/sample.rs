@@ -38,9 +38,7 @@ pub(crate) fn sample_bilinear_clamped<P: Mix>(image: &Image<P>, x: f64, y: f64) 
 /// The cubic value at `(x, y)` in pixels, as [`sample_cubic_clamped`]; 0 outside the picture.
 #[inline]
 pub(crate) fn sample_cubic<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
-    let inside =
-        (0.0..image.width() as f64).contains(&x) && (0.0..image.height() as f64).contains(&y);
-    if inside {
+    if is_inside(image, x, y) {
         sample_cubic_clamped(image, x, y)
     } else {
         P::default()
@@ -105,9 +103,12 @@ fn cubic_weights(t: f32) -> [f32; 4] {
 /// The pixel whose square holds `(x, y)`, for pixels of any kind; `None` outside the picture.
 #[inline]
 pub(crate) fn sample_nearest<P: Copy>(image: &Image<P>, x: f64, y: f64) -> Option<P> {
-    let inside =
-        (0.0..image.width() as f64).contains(&x) && (0.0..image.height() as f64).contains(&y);
-    inside.then(|| image[(x as usize, y as usize)])
+    is_inside(image, x, y).then(|| image[(x as usize, y as usize)])
+}
+
+#[inline(always)]
+fn is_inside<P: Copy>(image: &Image<P>, x: f64, y: f64) -> bool {
+    (0.0..image.width() as f64).contains(&x) && (0.0..image.height() as f64).contains(&y)
 }
 
 /// The last pixel whose centre is not beyond a coordinate, and how far beyond it that is.

@@ -114,8 +114,8 @@ pub use document::{
 #[cfg(feature = "pipeline")]
 pub(crate) use document::{check_depth, parse_toml};
 pub(crate) use document::{
-    from_table, from_table_with, has_byte_order_mark, lines, parse_json, parse_toml_with,
-    read_bytes, read_json_data, suggestion,
+    from_table, from_table_with, lines, parse_json, parse_toml_with, read_bytes, read_json_data,
+    read_marked_text, suggestion,
 };
 pub use document::{read_document, write_document};
 #[doc(hidden)]

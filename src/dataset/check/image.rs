@@ -87,14 +87,14 @@ impl CheckedImage {
     }
 
     fn read_labels(&mut self, folder: &Path, class_count: Option<usize>) {
-        let Ok(text) = io::read_text(folder.join(&self.label)) else {
+        let Ok((text, is_marked)) = io::read_marked_text(&folder.join(&self.label)) else {
             // A missing image is reported already.
             if folder.join(&self.path).exists() {
                 self.findings.push(self.missing_label());
             }
             return;
         };
-        if io::has_byte_order_mark(&folder.join(&self.label)) {
+        if is_marked {
             let message = "a byte order mark, which is part of the class to trainers";
             let finding = Finding::in_line(&self.label, 1, Code::BadLabelRow, message);
             self.findings.push(finding);

@@ -254,7 +254,7 @@ impl Checker<'_> {
             let place = io::relative(place, self.folder);
             self.add(place, Code::NoImages, "no images, expected at least one");
         }
-        if is_list(place) && io::has_byte_order_mark(place) {
+        if is_list(place) && io::read_marked_text(place).is_ok_and(|(_, is_marked)| is_marked) {
             let place = io::relative(place, self.folder);
             let message = "a byte order mark, which is part of the first path to trainers";
             let finding = Finding::in_line(place, 1, Code::UnreadableFile, message);

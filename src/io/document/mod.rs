@@ -186,10 +186,11 @@ pub fn read_text(path: impl AsRef<Path>) -> Result<String> {
     utf8(path, read_bytes(path)?)
 }
 
-/// Whether a file begins with the byte order mark that [`read_text`] drops.
-pub(crate) fn has_byte_order_mark(path: &Path) -> bool {
-    let mark = BYTE_ORDER_MARK.to_string();
-    read_bytes(path).is_ok_and(|bytes| bytes.starts_with(mark.as_bytes()))
+/// The same, and whether the file begins with the byte order mark.
+pub(crate) fn read_marked_text(path: &Path) -> Result<(String, bool)> {
+    let bytes = read_bytes(path)?;
+    let is_marked = bytes.starts_with(BYTE_ORDER_MARK.to_string().as_bytes());
+    Ok((utf8(path, bytes)?, is_marked))
 }
 
 /// The lines of a text, ended as Python's: by `\r\n`, `\n` or a lone `\r`.
