@@ -180,44 +180,56 @@ fn ring_radius(shares: usize, n: usize) -> f64 {
 }
 
 /// Nodes at the middles of equal steps of the sine of the angle under which `point` sees them, along
-/// either side; none if equal pieces are short enough.
+/// either side of what the receiver's plane leaves of a light; none if equal pieces are short enough.
 ///
 /// Most light comes from where a large light is near, so there the nodes are.
-fn pieces_near(light: &AreaLight, counts: [usize; 2], point: Point3<f64>) -> Option<Vec<Node>> {
-    let (frame, [a, b]) = (frame(light), half_sides(light));
+fn pieces_near(
+    light: &AreaLight,
+    counts: [usize; 2],
+    point: Point3<f64>,
+    horizon: &LightHorizon,
+) -> Option<Vec<Node>> {
+    let (frame, half) = (frame(light), half_sides(light));
     let way = point - frame.center;
     let distance = frame.normal.dot(&way);
-    let longest = (2.0 * a / counts[0] as f64).max(2.0 * b / counts[1] as f64);
-    if distance <= 0.0 || longest <= LONGEST_EQUAL_PIECE * distance {
+    let longest = (2.0 * half[0] / counts[0] as f64).max(2.0 * half[1] / counts[1] as f64);
+    let is_seen = distance > 0.0 && horizon.middle > -horizon.highest_rise(light.shape);
+    if !is_seen || longest <= LONGEST_EQUAL_PIECE * distance {
         return None;
     }
     let foot = [frame.x.dot(&way), frame.y.dot(&way)];
+    let steps = |axis: usize, range: [f64; 2]| {
+        let ends = range.map(|end| end * half[axis]);
+        sine_steps(ends, foot[axis], distance, counts[axis])
+    };
+    let axes = horizon.axes_by_rise();
+    let [outer, inner] = axes;
     let mut nodes = Vec::with_capacity(counts[0] * counts[1]);
-    for (x, width) in sine_steps(a, foot[0], distance, counts[0]) {
-        let half = match light.shape {
-            LightShape::Rectangle => b,
-            LightShape::Ellipse => b * (1.0 - (x / a).powi(2)).max(0.0).sqrt(),
-        };
-        let chord = sine_steps(half, foot[1], distance, counts[1]);
-        nodes.extend(chord.map(|(y, length)| Node {
-            point: frame.point(x, y),
-            area: width * length,
+    for (a, width) in steps(outer, horizon.extent(light.shape, axes)) {
+        let chord = horizon.chord(light.shape, axes, a / half[outer]);
+        nodes.extend(steps(inner, chord).map(|(b, length)| {
+            let mut place = [0.0; 2];
+            (place[outer], place[inner]) = (a, b);
+            Node {
+                point: frame.point(place[0], place[1]),
+                area: width * length,
+            }
         }));
     }
     Some(nodes)
 }
 
-/// Places in `-half..half` at the middles of equal steps of the sine of the angle under which they
+/// Places between two ends at the middles of equal steps of the sine of the angle under which they
 /// are seen, and the lengths that they stand for; at a distance from the line, over `foot`.
 fn sine_steps(
-    half: f64,
+    [from, to]: [f64; 2],
     foot: f64,
     distance: f64,
     count: usize,
 ) -> impl Iterator<Item = (f64, f64)> {
     let sine = |at: f64| (at - foot) / (at - foot).hypot(distance);
-    let first = sine(-half);
-    let step = (sine(half) - first) / count as f64;
+    let first = sine(from);
+    let step = (sine(to) - first) / count as f64;
     (0..count).map(move |i| {
         let sine = first + (i as f64 + 0.5) * step;
         let cosine = (1.0 - sine * sine).sqrt();
@@ -227,8 +239,8 @@ fn sine_steps(
 }
 
 /// Sample points of the part of a light that is above the plane through `point` with unit `normal`:
-/// those of [`pieces`], or of a light that is large and near [`pieces_near`], where the plane does
-/// not cut the light, else as many on what it leaves.
+/// those of [`pieces_near`] of a light that is large and near, else those of [`pieces`] where the
+/// plane does not cut the light, and as many on what it leaves where it does.
 ///
 /// # Method
 /// What is left of a rectangle is strips across the side that the plane turns away from fastest,
@@ -245,9 +257,11 @@ pub(crate) fn nodes_above(
     let [a, b] = half_sides(light);
     let counts = counts.map(|n| n.max(1));
     let horizon = LightHorizon::new(&frame, [a, b], point, normal);
+    if let Some(near) = pieces_near(light, counts, point, &horizon) {
+        return near;
+    }
     let Some(left) = horizon.visible_part(light.shape, counts) else {
-        let near = pieces_near(light, counts, point);
-        return near.unwrap_or_else(|| pieces(light, counts));
+        return pieces(light, counts);
     };
     left.into_iter()
         .map(|([x, y], area)| Node {
@@ -278,10 +292,17 @@ impl LightHorizon {
     /// Points and areas of what the plane leaves, with the light's sides running from -1 to 1; none
     /// where it cuts nothing.
     fn visible_part(&self, shape: LightShape, counts: [usize; 2]) -> Option<Vec<([f64; 2], f64)>> {
-        let ([a, b], height) = (self.rise.map(f64::abs), self.middle.abs());
+        (self.middle.abs() < self.highest_rise(shape)).then(|| match shape {
+            LightShape::Rectangle => self.strips(counts),
+            LightShape::Ellipse => self.chords(counts),
+        })
+    }
+
+    /// How far the light's highest point is above its middle.
+    fn highest_rise(&self, shape: LightShape) -> f64 {
         match shape {
-            LightShape::Rectangle => (height < a + b).then(|| self.strips(counts)),
-            LightShape::Ellipse => (height < self.steepest_rise()).then(|| self.chords(counts)),
+            LightShape::Rectangle => self.rise[0].abs() + self.rise[1].abs(),
+            LightShape::Ellipse => self.steepest_rise(),
         }
     }
 
@@ -289,14 +310,40 @@ impl LightHorizon {
         self.rise[0].hypot(self.rise[1])
     }
 
+    /// From where to where the part above the plane reaches along one side, `outer` of both.
+    fn extent(&self, shape: LightShape, [outer, inner]: [usize; 2]) -> [f64; 2] {
+        let [middle, rise, across] = [self.middle, self.rise[outer], self.rise[inner]];
+        if shape == LightShape::Rectangle {
+            return above(middle + across.abs(), rise);
+        }
+        let steepest = self.steepest_rise();
+        let at = (-middle / steepest).clamp(-1.0, 1.0);
+        let half = (1.0 - at * at).sqrt() * across.abs() / steepest;
+        let cut = at * rise / steepest;
+        [
+            if middle > rise { -1.0 } else { cut - half },
+            if middle > -rise { 1.0 } else { cut + half },
+        ]
+    }
+
+    /// From where to where the part above the plane reaches along `inner`, at a place along `outer`.
+    fn chord(&self, shape: LightShape, [outer, inner]: [usize; 2], at: f64) -> [f64; 2] {
+        let half = match shape {
+            LightShape::Rectangle => 1.0,
+            LightShape::Ellipse => (1.0 - at * at).max(0.0).sqrt(),
+        };
+        above(self.middle + self.rise[outer] * at, self.rise[inner])
+            .map(|end| end.clamp(-half, half))
+    }
+
     /// Points and areas in the square -1..1 above the plane.
     fn strips(&self, counts: [usize; 2]) -> Vec<([f64; 2], f64)> {
-        let [outer, inner] = self.axes_by_rise();
-        let [middle, rise, across] = [self.middle, self.rise[outer], self.rise[inner]];
+        let (shape, axes) = (LightShape::Rectangle, self.axes_by_rise());
+        let [outer, inner] = axes;
         let [strips, along] = [outer, inner].map(|axis| gauss_legendre(counts[axis]));
         let mut points = Vec::with_capacity(strips.len() * along.len());
-        for (a, width) in rule_on(above(middle + across.abs(), rise), &strips) {
-            for (b, length) in rule_on(above(middle + rise * a, across), &along) {
+        for (a, width) in rule_on(self.extent(shape, axes), &strips) {
+            for (b, length) in rule_on(self.chord(shape, axes, a), &along) {
                 let mut point = [0.0; 2];
                 (point[outer], point[inner]) = (a, b);
                 points.push((point, width * length));
@@ -500,6 +547,46 @@ mod tests {
                     brightest < 0.35 * sum,
                     "{shape:?} {size} {height}: {brightest}"
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn a_large_light_nearby_that_the_horizon_cuts_is_sampled_where_its_light_comes_from() {
+        for shape in [LightShape::Rectangle, LightShape::Ellipse] {
+            for (size, height, tilt) in [
+                ([30.0, 30.0], 1.0, 0.4),
+                ([30.0, 30.0], 1.0, 1.2),
+                ([1.0, 1.0], 0.1, 0.7),
+                ([8.0, 4.0], 0.5, 0.9),
+            ] {
+                let light = AreaLight {
+                    shape,
+                    target: [0.3 * height, 0.0, 0.0],
+                    ..AreaLight::new([0.3 * height, 0.0, height], size, 10.0)
+                };
+                for turn in [0.0, 0.6, 2.5] {
+                    let normal = Vector3::new(
+                        libm::sin(tilt) * libm::cos(turn),
+                        libm::sin(tilt) * libm::sin(turn),
+                        libm::cos(tilt),
+                    );
+                    let nodes = nodes_above(&light, [3; 2], Point3::origin(), &normal);
+                    let each = nodes
+                        .iter()
+                        .map(|&node| irradiance(&[node], &light, Point3::origin(), normal));
+                    let (sum, brightest) =
+                        each.fold((0.0, 0.0_f64), |(sum, most), e| (sum + e, most.max(e)));
+                    let exact = unit_irradiance(&light, Point3::origin(), normal);
+                    assert!(
+                        (sum / exact - 1.0).abs() < 0.2,
+                        "{shape:?} {size:?} {tilt} {turn}: {sum} against {exact}"
+                    );
+                    assert!(
+                        brightest < 0.35 * sum,
+                        "{shape:?} {size:?} {tilt} {turn}: {brightest} of {sum}"
+                    );
+                }
             }
         }
     }
