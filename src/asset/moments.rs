@@ -18,6 +18,9 @@ const MAX_PIECES: usize = 1024;
 /// the ground too.
 const ANY_DIRECTION_SHARE: f64 = 0.25;
 
+/// Parts along either side of a piece that tell which of its light is over a horizon.
+const PARTS_PER_SIDE: usize = 8;
+
 /// Light of a part of the sky.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moments {
@@ -217,6 +220,22 @@ impl LightSums {
             .collect()
     }
 
+    /// The light of the parts of a piece that are over a receiver's horizon.
+    pub(super) fn light_above(&self, piece: &Piece, normal: &Vector3<f64>) -> Moments {
+        self.parts(piece)
+            .filter(|part| part.luminous().dot(normal) > 0.0)
+            .fold(Moments::default(), |sum, part| sum.plus(&part, 1.0))
+    }
+
+    /// The light of even parts of a piece.
+    fn parts(&self, piece: &Piece) -> impl Iterator<Item = Moments> {
+        let [columns, rows] = [piece.columns, piece.rows].map(even_parts);
+        rows.flat_map(move |rows| {
+            let columns = columns.clone();
+            columns.map(move |columns| self.piece(columns, rows).moments)
+        })
+    }
+
     /// Irradiance on a receiver, nothing in the way.
     pub(super) fn irradiance(&self, normal: &Vector3<f64>) -> [f64; 3] {
         let mut sum = [0.0; 3];
@@ -226,6 +245,13 @@ impl LightSums {
         }
         sum
     }
+}
+
+/// At most [`PARTS_PER_SIDE`] even parts of some cells.
+fn even_parts([start, end]: [usize; 2]) -> impl Iterator<Item = [usize; 2]> + Clone {
+    let cells = end - start;
+    let count = cells.min(PARTS_PER_SIDE);
+    (0..count).map(move |k| even_span(k, count, cells).map(|cell| start + cell))
 }
 
 /// The cells of part `k` of `n` even ones.

@@ -1,7 +1,7 @@
 //! A picture of everything around: an equirectangular environment map.
 
 use super::equirectangular::{direction_to_uv, sample};
-use super::moments::{LightSums, Piece};
+use super::moments::{LightSums, Moments, Piece};
 use crate::error::{Error, Result};
 use crate::geom::Vector3;
 use crate::image::Image;
@@ -83,6 +83,11 @@ impl Panorama {
     /// The panorama in even rectangles, `rows` of twice as many.
     pub(crate) fn even(&self, rows: usize) -> Vec<Piece> {
         self.sums().even(rows)
+    }
+
+    /// The light of a piece as far as it comes from over a receiver's horizon.
+    pub(crate) fn light_above(&self, piece: &Piece, normal: &Vector3<f64>) -> Moments {
+        self.sums().light_above(piece, normal)
     }
 
     /// Irradiance on a receiver with this unit normal, nothing in the way; red, green, blue.

@@ -1,6 +1,6 @@
 //! An environment map as few directions, each standing for a piece of the sky.
 
-use crate::asset::Piece;
+use crate::asset::{Moments, Panorama, Piece};
 use crate::geom::Vector3;
 use crate::pixel::LinearRgb;
 use crate::scene::{EnvironmentMap, turned};
@@ -24,9 +24,9 @@ pub struct SkyPiece {
 /// # Method
 /// The map is cut into rectangles in the way that makes the errors of shadows smallest
 /// ([`Panorama::pieces`](crate::asset::Panorama::pieces)), so a sun is a piece of its own. A piece
-/// that the receiver's horizon does not cut gives exactly `n . integral of L w dw`; what the
-/// horizon cuts off others is made up for by scaling all to the irradiance that a sum over the
-/// whole map gives.
+/// that the receiver's horizon does not cut gives exactly `n . integral of L w dw`; others give what
+/// their parts over the horizon do, and all are scaled to the irradiance that a sum over the whole
+/// map gives.
 pub fn sky_pieces(map: &EnvironmentMap, count: usize, normal: &Vector3<f64>) -> Vec<SkyPiece> {
     scaled_pieces(map, &map.panorama.pieces(count), normal)
 }
@@ -50,7 +50,7 @@ fn scaled_pieces(map: &EnvironmentMap, pieces: &[Piece], normal: &Vector3<f64>) 
     // In the frame of the picture, which the map is turned against.
     let local = turned(normal, map.rotation);
     let whole = map.panorama.irradiance(&local);
-    let seen = visible_pieces(pieces, &local, whole);
+    let seen = visible_pieces(&map.panorama, pieces, &local, whole);
     let scale = irradiance_scale(&seen, whole, f64::from(map.strength));
     seen.into_iter()
         .map(|piece| piece.in_world(map.rotation, scale))
@@ -60,13 +60,14 @@ fn scaled_pieces(map: &EnvironmentMap, pieces: &[Piece], normal: &Vector3<f64>) 
 /// The pieces over a horizon; one piece for all of its light where a map gives some and none of its
 /// pieces does.
 fn visible_pieces(
+    panorama: &Panorama,
     pieces: &[Piece],
     normal: &Vector3<f64>,
     irradiance: [f64; 3],
 ) -> Vec<VisiblePiece> {
     let mut seen: Vec<_> = pieces
         .iter()
-        .filter_map(|piece| VisiblePiece::over_horizon(piece, normal))
+        .filter_map(|piece| VisiblePiece::of_light(&panorama.light_above(piece, normal), normal))
         .collect();
     if seen.is_empty() && irradiance.iter().any(|&e| e > 0.0) {
         // A sun has taken all the cuts, on the other side: what little there is here is one piece.
@@ -109,15 +110,55 @@ impl VisiblePiece {
         }
     }
 
-    /// None for a piece below a receiver's horizon.
-    fn over_horizon(piece: &Piece, normal: &Vector3<f64>) -> Option<Self> {
-        let direction = piece.moments.direction()?;
-        let irradiance = piece.moments.irradiance(normal);
-        let lights = direction.dot(normal) > 0.0 && irradiance.iter().any(|&v| v > 0.0);
-        lights.then_some(Self {
-            direction,
-            irradiance,
-            width: piece.moments.width(),
+    /// None where no light is.
+    fn of_light(light: &Moments, normal: &Vector3<f64>) -> Option<Self> {
+        Some(Self {
+            direction: light.direction()?,
+            irradiance: light.irradiance(normal),
+            width: light.width(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::uv_to_direction;
+    use crate::image::Image;
+    use std::sync::Arc;
+
+    /// Dim, with two bright windows; dark where it is not lit.
+    fn room(is_lit: impl Fn(&Vector3<f64>) -> bool + Sync) -> EnvironmentMap {
+        let windows = [0.0_f64, 120.0].map(|azimuth| {
+            let (sin, cos) = libm::sincos(azimuth.to_radians());
+            Vector3::new(cos, sin, 0.6).normalize()
+        });
+        let image = Image::from_fn(256, 128, |x, y| {
+            let direction = uv_to_direction([(x as f64 + 0.5) / 256.0, (y as f64 + 0.5) / 128.0]);
+            let is_window = windows.iter().any(|window| window.dot(&direction) > 0.978);
+            let radiance = if is_window { 300.0 } else { 0.25 };
+            LinearRgb::grey(if is_lit(&direction) { radiance } else { 0.0 })
+        });
+        EnvironmentMap::new(Arc::new(Panorama::new(image).unwrap()))
+    }
+
+    /// The windows take nearly all cuts: the floor stays one piece, whose middle is below the
+    /// horizon of what stands upright.
+    #[test]
+    fn what_turns_away_from_windows_gets_the_light_of_the_floor() {
+        let (whole, floor) = (room(|_| true), room(|direction| direction.z < 0.0));
+        for (tilt, azimuth) in [(60.0_f64, 240.0_f64), (90.0, 240.0), (90.0, 260.0)] {
+            let (sin, cos) = libm::sincos(tilt.to_radians());
+            let (y, x) = libm::sincos(azimuth.to_radians());
+            let normal = Vector3::new(sin * x, sin * y, cos);
+            let pieces = sky_pieces(&whole, 32, &normal);
+            let below = pieces.iter().filter(|piece| piece.direction.z < 0.0);
+            let found: f32 = below.map(|piece| piece.irradiance.g).sum();
+            let expected = floor.panorama.irradiance(&normal)[1] as f32;
+            assert!(
+                (found / expected - 1.0).abs() < 0.1,
+                "{tilt} {azimuth}: {found} of {expected}"
+            );
+        }
     }
 }
