@@ -61,7 +61,7 @@ enum Verb {
     Stage(StageVerb),
     /// Evaluate detections against ground truth: average precision, curves, confusion matrix
     Eval(eval::EvalArgs),
-    /// Compare two images, with the flags and exit codes of OpenImageIO's idiff
+    /// Compare two images, with the flags of OpenImageIO's idiff
     Diff(diff::DiffArgs),
     /// Serve pages for the browser: label corners, inspect mattes, tune a recipe, browse a dataset
     #[cfg(feature = "studio")]

@@ -21,7 +21,8 @@ pub(crate) struct SettleArgs {
     /// options
     #[arg(long)]
     quality: Option<Quality>,
-    /// CSV file for the path of every object: about one line per object and 1/60 second
+    /// CSV file for the path of every object that may touch another: about one line per object and
+    /// 1/60 second
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
     /// Image of the objects at rest to write, from above and from the side

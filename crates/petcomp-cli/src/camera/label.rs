@@ -19,8 +19,8 @@ pub(crate) struct InitLabelArgs {
     /// bottom left
     #[arg(long, value_name = "CORNERS", value_parser = parse_corners)]
     corners: Option<[[f64; 2]; 4]>,
-    /// Label of another photo of the same rectangle: its size, markers and camera name are copied,
-    /// and the markers detected
+    /// Label of another photo of the same rectangle: its surface, markers and camera name are
+    /// copied, lens and crop too if the photos have the same size, and the markers detected
     #[arg(long, value_name = "LABEL")]
     like: Option<PathBuf>,
     /// Label to write; by default NAME.label.json next to the photo

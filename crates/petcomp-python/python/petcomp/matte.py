@@ -45,8 +45,8 @@ def key(
 ) -> Keyed:
     """Key a photo exactly like Blender's Keying node, bit for bit.
 
-    * ``image``: height x width x 3 or 4, float32 (scene-linear, alpha premultiplied; used without a copy if its
-      rows are contiguous) or uint8 (sRGB, straight alpha)
+    * ``image``: height x width x 3 or 4, float32 (scene-linear, alpha premultiplied; used without a copy if
+      C-contiguous) or uint8 (sRGB, straight alpha)
     * ``screen``: three scene-linear numbers, a pixel (3, float32 or uint8 like ``image``), or a photo of the
       empty screen of the same size
     * ``profile``: ``blender-3.4``, ``blender-4.2``, ``blender-4.5`` or ``robust``

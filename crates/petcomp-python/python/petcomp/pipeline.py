@@ -72,7 +72,7 @@ class Pipeline:
 
     @property
     def config(self) -> dict[str, Any]:
-        """The recipe including all defaults, as plain data."""
+        """The recipe including its preset and most defaults, as plain data; some unset keys are absent."""
         config: dict[str, Any] = loaded(self._native.config_json())
         return config
 

@@ -74,15 +74,15 @@ class Sample:
 
     @cached_property
     def depth(self) -> npt.NDArray[np.float32]:
-        """Depth of the front object along the optical axis: height x width, float32, metres.
+        """Depth of the foremost object that covers more than 5 % of a pixel: height x width, float32, metres.
 
-        Infinite where there is no object, and everywhere in a sample ``from_masks``, whose depth is unknown.
+        Measured along the optical axis. Infinite where there is no object, and everywhere in a sample ``from_masks``, whose depth is unknown.
         """
         return self._native.depth()
 
     @cached_property
     def ids(self) -> npt.NDArray[np.uint32]:
-        """Id of the front object: height x width, uint32; 0 where there is none."""
+        """Id of the object that ``depth`` is of: height x width, uint32; 0 where there is none."""
         return self._native.ids()
 
     @cached_property
