@@ -1,5 +1,6 @@
 """Confidence intervals from the bootstrap over pictures and the random variation of trainings."""
 
+import statistics
 import zlib
 
 import numpy as np
@@ -7,10 +8,14 @@ import numpy as np
 ROUNDS = 500
 # How often the chance of trainings is drawn in each round: unlike a choice of pictures it costs nothing.
 CHANCES = 20
-PERCENTILES = [2.5, 97.5]
-# Relative standard deviation of mAP@0.5:0.95 between trainings of 40,000 images that differ in their seed alone, with
-# six degrees of freedom: `python -m study.chance results/first_rooms`.
-TRAINING_DEVIATION = 0.0303
+# Half of a confidence interval of 95 %, in standard deviations of the normal distribution.
+REACH = 1.96
+# Relative standard deviations of mAP@0.5:0.95 between trainings of 40,000 images that differ in their seed alone: in all
+# rooms alike, and in each room by itself; and how well they are known:
+# `python -m study.chance results/first_rooms results/few_real`.
+SHARED_DEVIATION = 0.0197
+ROOM_DEVIATION = 0.0369
+FREEDOM = 13
 
 
 def samples(arm, rounds=ROUNDS):
@@ -22,12 +27,20 @@ def samples(arm, rounds=ROUNDS):
     return np.array([np.mean([over_rooms(turn, rooms) for rooms in arm.values()]) for turn in range(rounds)])
 
 
-def with_chance(name, samples, trainings):
-    """`CHANCES` times as many samples of an arm, with the random variation of a mean over this many trainings."""
-    deviation = TRAINING_DEVIATION / np.sqrt(trainings)
+def with_chance(name, samples, trainings, rooms):
+    """`CHANCES` times as many samples of an arm, with the random variation of a mean over this many trainings and
+    rooms."""
+    size = (CHANCES, len(samples))
+    # The deviation itself is uncertain, and the same for all arms: a ratio of two has Student's distribution.
+    scale = np.sqrt(FREEDOM / np.random.default_rng(0).chisquare(FREEDOM, size))
     # Drawn for each arm by itself, unlike the pictures.
-    chance = np.random.default_rng(zlib.crc32(name.encode())).normal(0, deviation, (CHANCES, len(samples)))
-    return (samples * (1 + chance)).ravel()
+    normal = np.random.default_rng(zlib.crc32(name.encode())).normal(size=size)
+    return (samples * (1 + deviation(rooms) / np.sqrt(trainings) * scale * normal)).ravel()
+
+
+def deviation(rooms):
+    """Relative standard deviation between trainings of the mean over so many rooms."""
+    return np.hypot(SHARED_DEVIATION, ROOM_DEVIATION / np.sqrt(rooms))
 
 
 def over_rooms(turn, rooms):
@@ -47,5 +60,12 @@ def map_of(matches, times):
     return np.mean(found) if found else 0.0
 
 
-def interval(values):
-    return [float(v) for v in np.percentile(values, PERCENTILES)]
+def interval(values, estimate):
+    """The bias-corrected interval (Efron 1981): scores of resampled pictures, some of them there several times, tend to
+    be better than the estimate."""
+    normal = statistics.NormalDist()
+    below = (np.mean(values < estimate) + np.mean(values <= estimate)) / 2
+    # Not 0 or 1, which are infinitely far.
+    bias = normal.inv_cdf(np.clip(below, 1 / len(values), 1 - 1 / len(values)))
+    percentiles = [100 * normal.cdf(2 * bias + side * REACH) for side in (-1, 1)]
+    return [float(v) for v in np.percentile(values, percentiles)]

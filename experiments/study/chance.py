@@ -1,6 +1,6 @@
 """Random variation of trainings: how much those of an arm vary if only the seed differs.
 
-    python -m study.chance results/first_rooms
+    python -m study.chance results/first_rooms results/few_real
 """
 
 import sys
@@ -11,33 +11,52 @@ import numpy as np
 from . import archive
 
 
-def main(folder):
-    seeds = of_seeds(archive.rows(folder))
-    if not seeds:
-        raise SystemExit(f"{folder / 'results.csv'}: no arm with several seeds")
-    for arm, scores in seeds.items():
-        print(said(arm, *pooled([scores])))
-    print(said("all of them", *pooled(seeds.values())))
+def main(folders):
+    arms = [scores for folder in folders for scores in of_seeds(archive.rows(folder)).values()]
+    if not arms:
+        raise SystemExit(f"{', '.join(map(str, folders))}: no arm with several seeds")
+    for folder in folders:
+        for arm, scores in of_seeds(archive.rows(folder)).items():
+            print(said(f"{folder.name}: {arm}", [scores]))
+    print(said("all of them", arms))
+    shared, own = components(arms)
+    print(f"in all rooms alike {shared:.4f}, in each room by itself {own:.4f}")
 
 
-def said(name, deviation, freedom):
-    return f"{name}: relative standard deviation {deviation:.4f}, {freedom} degrees of freedom"
+def said(name, arms):
+    return f"{name}: relative standard deviation {pooled(over_rooms(arms)):.4f}, {freedom(arms)} degrees of freedom"
 
 
 def of_seeds(rows):
-    """mAP@0.5:0.95 of each seed, mean over rooms, by arm, for arms with several seeds."""
+    """mAP@0.5:0.95 by arm, for arms with several seeds: seeds x rooms."""
     scores = {}
     for row in rows:
         scores.setdefault(row["arm"], {}).setdefault(row["seed"], []).append(float(row["map50_95"]))
-    return {arm: np.mean(list(seeds.values()), 1) for arm, seeds in scores.items() if len(seeds) > 1}
+    return {arm: np.array(list(seeds.values())) for arm, seeds in scores.items() if len(seeds) > 1}
+
+
+def components(arms):
+    """Relative standard deviations between the seeds of an arm: what all rooms share, and what each has beside it."""
+    rooms = arms[0].shape[1]
+    of_mean = pooled(over_rooms(arms)) ** 2
+    of_room = pooled([scores[:, [room]] for scores in arms for room in range(rooms)]) ** 2
+    own = (of_room - of_mean) * rooms / (rooms - 1)
+    return np.sqrt(np.maximum([of_mean - own / rooms, own], 0))
+
+
+def over_rooms(arms):
+    return [scores.mean(1, keepdims=True) for scores in arms]
 
 
 def pooled(arms):
-    """Relative standard deviation between the seeds of an arm, and its degrees of freedom."""
-    freedom = sum(len(scores) - 1 for scores in arms)
+    """Relative standard deviation between the seeds of an arm."""
     squares = sum(np.sum((scores / scores.mean() - 1) ** 2) for scores in arms)
-    return np.sqrt(squares / freedom), freedom
+    return np.sqrt(squares / freedom(arms))
+
+
+def freedom(arms):
+    return sum(len(scores) - 1 for scores in arms)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main([Path(folder) for folder in sys.argv[1:]])

@@ -3,6 +3,7 @@
 import base64
 import html
 import io
+import re
 from pathlib import Path
 
 import cv2
@@ -38,7 +39,7 @@ def write(study, rows, summary, drawn_ratios, effects, path):
         table(["arm", *map(str, study.rooms)], room_rows(rows, study.rooms)),
         table(["ratio", *map(str, study.rooms)], room_ratio_rows(rows, study)),
         "<h2>The pictures</h2>",
-        *sheets(study),
+        *sheets(study, earlier_sheets(path)),
     ]
     text = f"<!doctype html><meta charset=utf-8><title>petcomp: experiments</title><style>{STYLE}</style>"
     files.write_text(path, text + "\n".join(parts) + "\n")
@@ -55,7 +56,7 @@ def description(study, rows):
         f"{lengths} image iterations of batch {training['batch']}. Tested on "
         f"{study.test_pictures} pictures of each of the rooms {', '.join(map(str, study.rooms))}; intervals "
         "are 95 %, by bootstrap over pictures and with the chance of each training, a standard deviation of "
-        f"{bootstrap.TRAINING_DEVIATION * 100:.0f} % as after 40,000 images (shorter ones have more). "
+        f"{bootstrap.deviation(len(study.rooms)) * 100:.0f} % as after 40,000 images (shorter ones have more). "
         "A difference whose interval holds 0 (a ratio's: 1) is none. "
         f"The trainings took {cpu_hours(rows):.1f} CPU hours."
     )
@@ -153,13 +154,13 @@ def shares_plot(study, summary, lines):
 
 
 def by_generator(study, summary):
-    """Arms of the default classes and length whose batches have a share of each source, by generator, ordered by
+    """Arms of the default classes, length and rooms whose batches have a share of each source, by generator, ordered by
     their share of the real pictures."""
     lines = {}
     for arm in sorted(summary, key=lambda arm: study.arms["arms"][arm].get("real", 0)):
         options = study.arms["arms"][arm]
         has_shares = options.get("mix") not in ("concatenate", "equation2", "fine_tune")
-        if has_shares and not {"classes", "images"} & options.keys():
+        if has_shares and not {"classes", "images", "short", "real_rooms"} & options.keys():
             lines.setdefault(options.get("synthetic"), []).append(arm)
     return {generator: arms for generator, arms in lines.items() if len(arms) > 1}
 
@@ -186,12 +187,18 @@ def svg(figure):
     return text[text.index("<svg") :]
 
 
-def sheets(study):
+def earlier_sheets(path):
+    """The sheets of the page as it is, by name: they outlive the cache."""
+    text = path.read_text() if path.exists() else ""
+    return {name: part for part, name in re.findall(r'(<h3>([^<]*)</h3><img alt="" [^>]*>)', text)}
+
+
+def sheets(study, earlier):
     """A few pictures of reality and of each generator used."""
-    for room in study.rooms:
-        yield sheet(f"room {room}", study.world / f"room{room}/real/piles/images")
-    for name in study.arms["generators"]:
-        yield sheet(name, study.cache / "synthetic" / name / "images/train")
+    folders = {f"room {room}": study.world / f"room{room}/real/piles/images" for room in study.rooms}
+    folders |= {name: study.cache / "synthetic" / name / "images/train" for name in study.arms["generators"]}
+    for name, folder in folders.items():
+        yield sheet(name, folder) or earlier.get(name, "")
 
 
 def sheet(name, folder):

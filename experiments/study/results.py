@@ -88,7 +88,12 @@ def over_pictures(matches):
 
 def with_chance(drawn, matches):
     """The same with the random variation of trainings."""
-    return {arm: bootstrap.with_chance(arm, rounds, len(matches[arm])) for arm, rounds in drawn.items()}
+    return {arm: of_trainings(arm, rounds, matches[arm]) for arm, rounds in drawn.items()}
+
+
+def of_trainings(arm, rounds, seeds):
+    rooms = len(next(iter(seeds.values())))
+    return bootstrap.with_chance(arm, rounds, len(seeds), rooms)
 
 
 def means(matches):
@@ -103,7 +108,7 @@ def summary(study, matches, means, drawn):
         arm: {
             "seeds": len(matches[arm]),
             "mean": means[arm],
-            "interval": bootstrap.interval(drawn[arm]),
+            "interval": bootstrap.interval(drawn[arm], means[arm]),
             **against(arm, study.arms["arms"][arm].get("against", "real"), means, drawn),
         }
         for arm in matches
@@ -121,7 +126,7 @@ def against(arm, other, means, drawn):
         return {}
     rounds = drawn[arm] / np.maximum(drawn[other], np.finfo(float).tiny)
     ratio = means[arm] / means[other]
-    return {"against": other, "ratio": ratio, "ratio_interval": bootstrap.interval(rounds)}
+    return {"against": other, "ratio": ratio, "ratio_interval": bootstrap.interval(rounds, ratio)}
 
 
 def mean_score(of_arm):

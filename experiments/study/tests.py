@@ -10,10 +10,10 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 
-from . import archive, bootstrap, chance, files, main, results, score
+from . import archive, bootstrap, chance, files, main, page, results, score
 
-# Half of an interval of 95 %, in standard deviations.
-REACH = 1.96
+# Half of an interval of 95 %, in standard deviations known with `bootstrap.FREEDOM` degrees of freedom.
+STUDENT = 2.160
 
 
 class Intervals(unittest.TestCase):
@@ -23,11 +23,11 @@ class Intervals(unittest.TestCase):
         drawn = results.with_chance(over_pictures, matches)
         self.assertGreater(width(drawn["real"]), width(over_pictures["real"]))
 
-    def test_chance_by_number_of_trainings(self):
-        for trainings in (1, 4):
-            drawn = bootstrap.with_chance("real", np.ones(500), trainings)
-            low, high = bootstrap.interval(drawn)
-            reach = REACH * bootstrap.TRAINING_DEVIATION / np.sqrt(trainings)
+    def test_chance_by_number_of_trainings_and_rooms(self):
+        for trainings, rooms in ((1, 1), (1, 3), (4, 3)):
+            drawn = bootstrap.with_chance("real", np.ones(500), trainings, rooms)
+            low, high = bootstrap.interval(drawn, 1)
+            reach = STUDENT * bootstrap.deviation(rooms) / np.sqrt(trainings)
             self.assertAlmostEqual((high - 1) / reach, 1, delta=0.05)
             self.assertAlmostEqual((1 - low) / reach, 1, delta=0.05)
 
@@ -36,14 +36,50 @@ class Intervals(unittest.TestCase):
         over_pictures = results.over_pictures({"real": arm, "alike": arm})
         np.testing.assert_array_equal(over_pictures["real"], over_pictures["alike"])
         drawn = results.with_chance(over_pictures, {"real": arm, "alike": arm})
-        reach = REACH * bootstrap.TRAINING_DEVIATION * np.sqrt(2)
+        reach = STUDENT * bootstrap.deviation(1) * np.sqrt(2)
         self.assertAlmostEqual(width(drawn["alike"] / drawn["real"]) / (2 * reach), 1, delta=0.05)
 
-    def test_deviation_is_of_the_first_rooms(self):
-        seeds = chance.of_seeds(archive.rows(main.HERE / "results/first_rooms"))
-        deviation, freedom = chance.pooled(seeds.values())
-        self.assertAlmostEqual(deviation, bootstrap.TRAINING_DEVIATION, places=4)
-        self.assertEqual(freedom, 6)
+    def test_intervals_are_bias_corrected(self):
+        """Rounds that are half a deviation too high say that the estimate is as much too high."""
+        rounds = np.random.default_rng(1).normal(0.5, 1, 100_000)
+        low, high = bootstrap.interval(rounds, 0)
+        self.assertAlmostEqual(low, -0.5 - 1.96, delta=0.05)
+        self.assertAlmostEqual(high, -0.5 + 1.96, delta=0.05)
+
+    def test_rounds_that_are_all_the_same_have_an_interval(self):
+        self.assertEqual(bootstrap.interval(np.zeros(100), 0), [0, 0])
+
+    def test_deviation_is_that_of_the_trainings(self):
+        folders = [main.HERE / "results" / name for name in ("first_rooms", "few_real")]
+        arms = [scores for folder in folders for scores in chance.of_seeds(archive.rows(folder)).values()]
+        shared, own = chance.components(arms)
+        self.assertAlmostEqual(shared, bootstrap.SHARED_DEVIATION, places=4)
+        self.assertAlmostEqual(own, bootstrap.ROOM_DEVIATION, places=4)
+        self.assertEqual(chance.freedom(arms), bootstrap.FREEDOM)
+
+    def test_components_of_trainings(self):
+        """What all rooms share does not become less with their number."""
+        rng = np.random.default_rng(2)
+        arms = [1 + rng.normal(0, 0.02, (20, 1)) + rng.normal(0, 0.04, (20, 3)) for _ in range(500)]
+        shared, own = chance.components(arms)
+        self.assertAlmostEqual(shared, 0.02, delta=0.002)
+        self.assertAlmostEqual(own, 0.04, delta=0.002)
+
+
+class Page(unittest.TestCase):
+    def test_shares_are_of_arms_that_differ_in_nothing_else(self):
+        study = SimpleNamespace(arms=main.read_arms())
+        arms = dict.fromkeys(["real", "elsewhere", "real_short", "real_longer", "real_25"])
+        self.assertEqual(page.by_generator(study, arms), {None: ["real_25", "real"]})
+
+
+    def test_sheets_outlive_the_cache(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "index.html"
+            study = SimpleNamespace(rooms=[21], world=Path(folder), cache=Path(folder), arms={"generators": {"alike": {}}})
+            kept = '<h3>alike</h3><img alt="" src="data:image/jpeg;base64,AAAA">'
+            path.write_text(f"<h2>The pictures</h2>{kept}")
+            self.assertEqual("".join(page.sheets(study, page.earlier_sheets(path))), kept)
 
 
 class Check(unittest.TestCase):
@@ -130,7 +166,7 @@ def some_matches(pictures=20):
 
 
 def width(values):
-    low, high = bootstrap.interval(values)
+    low, high = bootstrap.interval(values, np.median(values))
     return high - low
 
 
