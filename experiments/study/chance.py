@@ -12,19 +12,27 @@ from . import archive
 
 
 def main(folders):
-    arms = [scores for folder in folders for scores in of_seeds(archive.rows(folder)).values()]
+    arms = of_folders(folders)
     if not arms:
         raise SystemExit(f"{', '.join(map(str, folders))}: no arm with several seeds")
-    for folder in folders:
-        for arm, scores in of_seeds(archive.rows(folder)).items():
-            print(said(f"{folder.name}: {arm}", [scores]))
-    print(said("all of them", arms))
-    shared, own = components(arms)
+    for name, scores in arms.items():
+        print(said(name, [scores]))
+    print(said("all of them", arms.values()))
+    shared, own = components(arms.values())
     print(f"in all rooms alike {shared:.4f}, in each room by itself {own:.4f}")
 
 
 def said(name, arms):
     return f"{name}: relative standard deviation {pooled(over_rooms(arms)):.4f}, {freedom(arms)} degrees of freedom"
+
+
+def of_folders(folders):
+    """The scores of `of_seeds` in several results, by folder and arm."""
+    return {
+        f"{folder.name}: {arm}": scores
+        for folder in folders
+        for arm, scores in of_seeds(archive.rows(folder)).items()
+    }
 
 
 def of_seeds(rows):
@@ -37,7 +45,7 @@ def of_seeds(rows):
 
 def components(arms):
     """Relative standard deviations between the seeds of an arm: what all rooms share, and what each has beside it."""
-    rooms = arms[0].shape[1]
+    rooms = next(iter(arms)).shape[1]
     of_mean = pooled(over_rooms(arms)) ** 2
     of_room = pooled([scores[:, [room]] for scores in arms for room in range(rooms)]) ** 2
     own = (of_room - of_mean) * rooms / (rooms - 1)

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 
-from . import archive, bootstrap, chance, files, main, page, results, score
+from . import bootstrap, chance, files, main, page, results, score
 
 # Half of an interval of 95 %, in standard deviations known with `bootstrap.FREEDOM` degrees of freedom.
 STUDENT = 2.160
@@ -50,8 +50,7 @@ class Intervals(unittest.TestCase):
         self.assertEqual(bootstrap.interval(np.zeros(100), 0), [0, 0])
 
     def test_deviation_is_that_of_the_trainings(self):
-        folders = [main.HERE / "results" / name for name in ("first_rooms", "few_real")]
-        arms = [scores for folder in folders for scores in chance.of_seeds(archive.rows(folder)).values()]
+        arms = chance.of_folders([main.HERE / "results" / name for name in ("first_rooms", "few_real")]).values()
         shared, own = chance.components(arms)
         self.assertAlmostEqual(shared, bootstrap.SHARED_DEVIATION, places=4)
         self.assertAlmostEqual(own, bootstrap.ROOM_DEVIATION, places=4)
@@ -71,7 +70,6 @@ class Page(unittest.TestCase):
         study = SimpleNamespace(arms=main.read_arms())
         arms = dict.fromkeys(["real", "elsewhere", "real_short", "real_longer", "real_25"])
         self.assertEqual(page.by_generator(study, arms), {None: ["real_25", "real"]})
-
 
     def test_sheets_outlive_the_cache(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -210,30 +210,31 @@ impl LightSums {
     /// The panorama in even rectangles, `per_side` rows of twice as many.
     pub(super) fn even(&self, per_side: usize) -> Vec<Piece> {
         let rows = per_side.clamp(1, GRID_CELLS[1]);
-        let columns = 2 * rows;
-        (0..rows)
-            .flat_map(|j| (0..columns).map(move |i| (i, j)))
-            .map(|(i, j)| {
-                let across = even_span(i, columns, GRID_CELLS[0]);
-                self.piece(across, even_span(j, rows, GRID_CELLS[1]))
-            })
-            .collect()
+        let [all_columns, all_rows] = GRID_CELLS.map(|cells| [0, cells]);
+        self.parts(
+            even_spans(all_columns, 2 * rows),
+            even_spans(all_rows, rows),
+        )
+        .collect()
     }
 
     /// The light of the parts of a piece that are over a receiver's horizon.
     pub(super) fn light_above(&self, piece: &Piece, normal: &Vector3<f64>) -> Moments {
-        self.parts(piece)
-            .filter(|part| part.luminous().dot(normal) > 0.0)
-            .fold(Moments::default(), |sum, part| sum.plus(&part, 1.0))
+        let [columns, rows] = [piece.columns, piece.rows]
+            .map(|cells| even_spans(cells, PARTS_PER_SIDE.min(cells[1] - cells[0])));
+        self.parts(columns, rows)
+            .map(|part| part.moments)
+            .filter(|light| light.luminous().dot(normal) > 0.0)
+            .fold(Moments::default(), |sum, light| sum.plus(&light, 1.0))
     }
 
-    /// The light of even parts of a piece.
-    fn parts(&self, piece: &Piece) -> impl Iterator<Item = Moments> {
-        let [columns, rows] = [piece.columns, piece.rows].map(even_parts);
-        rows.flat_map(move |rows| {
-            let columns = columns.clone();
-            columns.map(move |columns| self.piece(columns, rows).moments)
-        })
+    /// The rectangles of some columns and rows, row by row.
+    fn parts(
+        &self,
+        columns: impl Iterator<Item = [usize; 2]> + Clone,
+        rows: impl Iterator<Item = [usize; 2]>,
+    ) -> impl Iterator<Item = Piece> {
+        rows.flat_map(move |row| columns.clone().map(move |column| self.piece(column, row)))
     }
 
     /// Irradiance on a receiver, nothing in the way.
@@ -247,16 +248,10 @@ impl LightSums {
     }
 }
 
-/// At most [`PARTS_PER_SIDE`] even parts of some cells.
-fn even_parts([start, end]: [usize; 2]) -> impl Iterator<Item = [usize; 2]> + Clone {
+/// `count` even parts of some cells.
+fn even_spans([start, end]: [usize; 2], count: usize) -> impl Iterator<Item = [usize; 2]> + Clone {
     let cells = end - start;
-    let count = cells.min(PARTS_PER_SIDE);
-    (0..count).map(move |k| even_span(k, count, cells).map(|cell| start + cell))
-}
-
-/// The cells of part `k` of `n` even ones.
-fn even_span(k: usize, n: usize, cells: usize) -> [usize; 2] {
-    [k, k + 1].map(|k| k * cells / n)
+    (0..count).map(move |k| [k, k + 1].map(|k| start + k * cells / count))
 }
 
 fn total_error(halves: &[Piece; 2]) -> f64 {

@@ -1,4 +1,4 @@
-//! `petcomp diff`: compares two pictures with the flags and exit codes of OpenImageIO's `idiff`.
+//! `petcomp diff`: compares two pictures with the flags of OpenImageIO's `idiff`.
 
 use crate::global::GlobalArgs;
 use crate::print;

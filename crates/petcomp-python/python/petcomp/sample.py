@@ -76,7 +76,8 @@ class Sample:
     def depth(self) -> npt.NDArray[np.float32]:
         """Depth of the foremost object that covers more than 5 % of a pixel: height x width, float32, metres.
 
-        Measured along the optical axis. Infinite where there is no object, and everywhere in a sample ``from_masks``, whose depth is unknown.
+        Measured along the optical axis. Infinite where there is no object, and everywhere in a sample ``from_masks``,
+        whose depth is unknown.
         """
         return self._native.depth()
 
