@@ -40,30 +40,36 @@ def truth(world, room, count, classes, folder):
     return folder
 
 
-def photo_list(world, count, cut_out, has_thickness, others, folder):
-    """Write the list of photos of a user: class, and length and optionally thickness by tape measure.
-    `others` are entries of photos that do not show bottles."""
+def photo_list(world, count, cut_out, thickness, others, folder):
+    """Write the list of photos of a user: class, and length by tape measure; and if it is not 0, this share of
+    the thickness that a tape measure says for the bottle. `others` are entries of photos that do not show bottles."""
     lines = [f"classes = {json.dumps(files.CLASSES)}\n"]
     if cut_out:
         lines += ["[cut_out]\n", *(f"{key} = {json.dumps(value)}\n" for key, value in cut_out.items())]
     for index in range(count):
         bottle = json.loads((world / f"photos/bottles/b{index:04d}.json").read_text())
-        lines += [entry(world, bottle["instance"]["index"], photo, has_thickness) for photo in bottle["photos"]]
+        body = thickness_line(bottle["photos"], thickness)
+        lines += [entry(world, bottle["instance"]["index"], photo) + body for photo in bottle["photos"]]
     return files.write_text(folder / "photos.toml", "\n".join(lines + others))
 
 
-def entry(world, index, photo, has_thickness):
+def entry(world, index, photo):
     size = photo["size_m"]
     length = round(max(size["length"], size["width"]), 3)
-    thickness = f"thickness = {round(size['thickness'] / THICKNESS_STEP) * THICKNESS_STEP:.3f}\n" if has_thickness else ""
     return (
         "[[photos]]\n"
         f"file = {json.dumps(str(world / 'photos/bottles' / photo['files']['photo_png']))}\n"
         f'asset = "b{index:04d}"\n'
         f'class = "{files.CLASSES[photo["class_id"]]}"\n'
         f"length = {length}\n"
-        f"{thickness}"
     )
+
+
+def thickness_line(photos, share):
+    if not share:
+        return ""
+    measured = np.mean([photo["size_m"]["thickness"] for photo in photos])
+    return f"thickness = {share * round(measured / THICKNESS_STEP) * THICKNESS_STEP:.4f}\n"
 
 
 def backgrounds(world, rooms, measured, folder):

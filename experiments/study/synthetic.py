@@ -38,15 +38,16 @@ def place_photos(study, albedo):
 
 
 def build_assets(study, generator):
-    cut_out, has_thickness = generator.get("cut_out", {}), generator.get("thickness", False)
-    kinds = [*cut_out.values(), *(kind for kind in ("thickness", "distractors") if generator.get(kind))]
+    cut_out, thickness = generator.get("cut_out", {}), generator.get("thickness", 0)
+    kinds = [*cut_out.values(), *(["distractors"] if generator.get("distractors") else [])]
+    kinds += [f"thickness_{thickness}"] if thickness else []
     count = generator.get("bottles", study.arms["reality"]["bottles"])
     kinds += [str(count)] if "bottles" in generator else []
     name = "_".join(kinds) or "default"
     folder = study.cache / "assets" / name
     listed = study.cache / "photos" / name
     beside = distractors.entries(listed) if generator.get("distractors") else []
-    photos = study.photos or reality.photo_list(study.world, count, cut_out, has_thickness, beside, listed)
+    photos = study.photos or reality.photo_list(study.world, count, cut_out, thickness, beside, listed)
     study.petcomp("asset", "build", photos, "-o", folder)
     return folder
 

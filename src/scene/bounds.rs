@@ -93,6 +93,7 @@ pub(super) const ITERATIONS: Bounds = Bounds::new(1.0, 100.0, "contacts are exac
 pub(super) const WORK: Bounds = Bounds::new(1.0, 1e12, "objects and pairs, summed over time steps");
 pub(super) const CCD: Bounds = Bounds::new(0.0, 100.0, "stops within a step");
 pub(super) const THINNEST: Bounds = Bounds::new(1e-4, 1.0, "a share of the longer side");
+pub(super) const ROUNDING: Bounds = Bounds::new(0.0, 0.9, "a share of half the thickness");
 pub(super) const OVERLAP: Bounds = Bounds::new(1e-6, 1.0, "a share of the longer side");
 pub(super) const ENERGY: Bounds = Bounds::new(1e-6, 1e3, "a share of the drop's");
 pub(super) const GRAVITY: Bounds = Bounds::new(0.01, 1e4, "m/s^2; the Earth's is 9.81");

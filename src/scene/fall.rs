@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::geom::{UnitQuaternion, Vector3};
 use crate::scene::Object;
 use crate::scene::bounds::{
-    ATTEMPTS, CCD, ENERGY, GRAVITY, ITERATIONS, OVERLAP, STEP, THINNEST, TIME_LIMIT, WORK,
+    ATTEMPTS, CCD, ENERGY, GRAVITY, ITERATIONS, OVERLAP, ROUNDING, STEP, THINNEST, TIME_LIMIT, WORK,
 };
 use nalgebra::Quaternion;
 use serde::{Deserialize, Serialize};
@@ -22,6 +22,9 @@ pub struct SettleOptions {
     /// Minimum thickness of a falling body, as a share of its longer side; thinner cards are drawn
     /// thin but fall as bodies of this thickness. Default: 0.01 (2 mm for 200 mm).
     pub thinnest: f64,
+    /// Radius of the edges of a falling body, as a share of half its thickness: 0 is sharp, and
+    /// near 1 it rolls off its edges, as a crushed bottle does. Default: 0.
+    pub rounding: f64,
     /// Maximum accepted overlap of two bodies at rest, as a share of the typical card's longer
     /// side. Default: 0.0025 (0.5 mm for 200 mm).
     pub max_overlap: f64,
@@ -66,6 +69,7 @@ impl Default for SettleOptions {
             mode: SettleMode::Fall,
             gravity: [0.0, 0.0, -9.81],
             thinnest: 0.01,
+            rounding: 0.0,
             max_overlap: 0.0025,
             max_energy_rise: 0.01,
             time_limit: 10.0,
@@ -86,6 +90,12 @@ impl SettleOptions {
         Vector3::new(w, h, object.thickness.max(self.thinnest * w.max(h))) / 2.0
     }
 
+    /// Radius of the edges of that box, metres; at most half of its shortest side, whatever lies flat.
+    pub fn edge_radius(&self, object: &Object) -> f64 {
+        let half = self.half_body(object);
+        (self.rounding * half.z).min(half.x.min(half.y) / 2.0)
+    }
+
     /// Fails on the first invalid option.
     pub fn check(&self) -> Result<()> {
         for (name, value, bounds) in self.bounded_values() {
@@ -94,9 +104,10 @@ impl SettleOptions {
         self.check_gravity()
     }
 
-    fn bounded_values(&self) -> [(&str, f64, Bounds); 9] {
+    fn bounded_values(&self) -> [(&str, f64, Bounds); 10] {
         [
             ("thinnest", self.thinnest, THINNEST),
+            ("rounding", self.rounding, ROUNDING),
             ("max_overlap", self.max_overlap, OVERLAP),
             ("max_energy_rise", self.max_energy_rise, ENERGY),
             ("time_limit", self.time_limit, TIME_LIMIT),

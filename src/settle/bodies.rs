@@ -2,7 +2,7 @@
 //! relative to.
 
 use super::overlap::Solid;
-use crate::geom::{Pose, Vector3};
+use crate::geom::Pose;
 use crate::quantile::median;
 use crate::scene::{Object, Placement, Scene, SettleOptions};
 
@@ -70,22 +70,28 @@ pub(super) fn solids(scene: &Scene, options: &SettleOptions, poses: &[Option<Pos
 }
 
 fn solid_for(object: &Object, pose: Option<Pose>, options: &SettleOptions) -> Solid {
-    let half = options.half_body(object);
     Solid {
         world_from_body: pose.unwrap_or_else(Pose::identity),
-        half,
-        outline: outline_or_box(object, &half),
+        half: options.half_body(object),
+        outline: core_outline(object, options),
+        edge_radius: options.edge_radius(object),
         falls: pose.is_some() && is_dropped(object),
         is_gone: pose.is_none(),
     }
 }
 
-fn outline_or_box(object: &Object, half: &Vector3<f64>) -> Vec<[f64; 2]> {
-    if object.outline.is_empty() {
-        rectangle(half.x, half.y)
+/// Corners of the base of an object's core, counter-clockwise: its outline, or the rectangle of its
+/// card, scaled so that the body with its rounded edges is as long and wide as the card.
+pub(super) fn core_outline(object: &Object, options: &SettleOptions) -> Vec<[f64; 2]> {
+    let (half, radius) = (options.half_body(object), options.edge_radius(object));
+    let scale = [half.x, half.y].map(|half| 1.0 - radius / half);
+    let corners = if object.outline.is_empty() {
+        &rectangle(half.x, half.y)
     } else {
-        object.outline.clone()
-    }
+        &object.outline
+    };
+    let scaled = corners.iter().map(|[x, y]| [x * scale[0], y * scale[1]]);
+    scaled.collect()
 }
 
 /// Corners of a rectangle with these half lengths, counter-clockwise.

@@ -60,7 +60,7 @@ fn room_contacts(body: usize, solid: &Solid, surface: [f64; 2], reach: f64) -> V
         .flat_map(|(normal, distance)| {
             let touching = solid
                 .corners()
-                .filter(move |corner| corner.dot(&normal) - distance < reach);
+                .filter(move |corner| corner.dot(&normal) - distance < solid.edge_radius + reach);
             touching.map(move |point| Contact {
                 body,
                 by: None,
@@ -126,7 +126,7 @@ impl NearestCorners {
         let heights = solid.corners().map(|corner| corner.dot(towards));
         let height = heights.fold(f64::NEG_INFINITY, f64::max);
         Self {
-            height,
+            height: height + solid.edge_radius,
             corners: solid
                 .corners()
                 .filter(|corner| corner.dot(towards) > height - reach)
@@ -241,6 +241,7 @@ mod tests {
             world_from_body: Pose::from_parts(at.into(), rotation),
             half,
             outline,
+            edge_radius: 0.0,
             falls: true,
             is_gone: false,
         }

@@ -144,6 +144,7 @@ fn upright_box(solid: &Solid) -> Solid {
     let mut upright = solid.clone();
     upright.half = solid.extent();
     upright.outline = rectangle(upright.half.x, upright.half.y);
+    upright.edge_radius = 0.0;
     upright.world_from_body.rotation = UnitQuaternion::identity();
     upright
 }

@@ -539,6 +539,47 @@ mod tests {
     }
 
     #[test]
+    fn a_sharp_body_stands_on_its_edge_and_a_round_one_falls_over() {
+        let uprightness = |rounding: f64| {
+            let mut scene = falling(&[([0.0, 0.0], 0.05)]);
+            scene.objects[0].thickness = 0.05;
+            scene.objects[0].placement = Placement::Drop {
+                above: [0.0, 0.0],
+                height: 0.05,
+                rotation: UnitQuaternion::from_euler_angles(1.2, 0.0, 0.0),
+            };
+            // Not straight down, or it would be laid flat at once.
+            let options = SettleOptions {
+                gravity: [0.0, 0.1, -9.8],
+                rounding,
+                ..Default::default()
+            };
+            let rest = settle(scene, &options).unwrap();
+            assert_eq!(rest.verdict, SettleVerdict::Rested);
+            1.0 - (pose(&rest, 0).rotation * Vector3::z()).z.abs()
+        };
+        let [sharp, round] = [0.0, 0.9].map(uprightness);
+        assert!(sharp > 0.99 && round < 0.01, "{sharp} {round}");
+    }
+
+    #[test]
+    fn round_bodies_rest_without_overlap() {
+        let options = SettleOptions {
+            rounding: 0.9,
+            ..Default::default()
+        };
+        for k in 0..4 {
+            let mut scene = dropped(k, 10);
+            for object in &mut scene.objects {
+                object.outline = octagon(object.size);
+                object.thickness = 0.03;
+            }
+            let rest = settle(scene, &options).unwrap();
+            assert_eq!(rest.verdict, SettleVerdict::Rested);
+        }
+    }
+
+    #[test]
     fn another_try_raises_each_card_more_than_the_one_below_it() {
         let scene = dropped(2, 9);
         let (first, second) = (start_heights(&scene, 0), start_heights(&scene, 1));

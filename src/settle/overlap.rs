@@ -7,16 +7,23 @@ use crate::scene::half_extent;
 /// Sine of the angle up to which edges count as parallel: their normal would be noise, and other
 /// directions decide.
 const PARALLEL_SINE: f64 = 1e-6;
+/// Maximum number of steps towards the nearest points of two cores: after so many, the gap of round
+/// bodies is known to a hundredth of their radius.
+const APPROACH_STEPS: usize = 40;
+/// Length of such a step, as a share of the way to the farthest corner, below which it is the last.
+const MIN_APPROACH: f64 = 1e-9;
 
-/// A body in the world: a convex prism along its own `z`.
+/// A body in the world: a convex prism along its own `z`, the core, and all that is near it.
 #[derive(Clone, Debug)]
 pub(super) struct Solid {
     /// Its pose; the box around its card is centred in its own frame.
     pub(super) world_from_body: Pose,
     /// Half lengths of that box, metres.
     pub(super) half: Vector3<f64>,
-    /// Corners of its base, counter-clockwise; for a box, those of the box.
+    /// Corners of its core's base, counter-clockwise; for a sharp box, those of the box.
     pub(super) outline: Vec<[f64; 2]>,
+    /// Radius of its edges: how far it reaches beyond its core, metres.
+    pub(super) edge_radius: f64,
     /// Whether it was dropped; other bodies are stationary.
     pub(super) falls: bool,
     /// Whether it went over the rim: it is in no place and touches nothing.
@@ -33,13 +40,26 @@ impl Solid {
         [0, 1, 2].map(|i| r.matrix().column(i).into())
     }
 
-    /// All corners, in the world.
+    /// All corners of its core, in the world.
     pub(super) fn corners(&self) -> impl Iterator<Item = Vector3<f64>> {
         let [x, y, z] = self.axes();
+        let up = z * self.core_half_height();
         self.outline.iter().flat_map(move |&[a, b]| {
             let middle = self.center() + x * a + y * b;
-            [middle + z * self.half.z, middle - z * self.half.z]
+            [middle + up, middle - up]
         })
+    }
+
+    /// The corner of its core that is farthest in a direction.
+    fn farthest_corner(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        let along = |corner: &Vector3<f64>| corner.dot(direction);
+        self.corners()
+            .max_by(|a, b| along(a).total_cmp(&along(b)))
+            .expect("a base has corners")
+    }
+
+    fn core_half_height(&self) -> f64 {
+        self.half.z - self.edge_radius
     }
 
     /// Half lengths of the axis-aligned box around the box of its card.
@@ -57,8 +77,8 @@ impl Solid {
         let [x, y, z] = axes.map(|axis| axis.dot(direction));
         let at = self.center().dot(direction);
         let [low, high] = self.base_range(x, y);
-        let half_height = self.half.z * z.abs();
-        [at + low - half_height, at + high + half_height]
+        let beyond_base = self.core_half_height() * z.abs() + self.edge_radius;
+        [at + low - beyond_base, at + high + beyond_base]
     }
 
     /// Least and greatest `a * x + b * y` of the corners of its base.
@@ -212,7 +232,8 @@ pub(super) fn overlap_depth(a: &Solid, b: &Solid) -> f64 {
 /// Separating axes: two convex bodies are apart if and only if their projections are, along one of
 /// these directions: the faces' normals and the cross products of their edges ([Gottschalk, Lin and
 /// Manocha 1996]; 15 for two boxes). The greatest gap between projections is used as that of the
-/// bodies: it is the depth of an overlap, and a lower bound of a distance.
+/// bodies: it is the depth of an overlap, and a lower bound of a distance. Round bodies may also be
+/// apart along the direction between the nearest points of their cores.
 ///
 /// [Gottschalk, Lin and Manocha 1996]: https://doi.org/10.1145/237170.237244
 fn separation(a: &Solid, b: &Solid, reach: f64) -> Option<(f64, Vector3<f64>)> {
@@ -221,7 +242,12 @@ fn separation(a: &Solid, b: &Solid, reach: f64) -> Option<(f64, Vector3<f64>)> {
     }
     let (of_a, of_b) = (PrismDirections::new(a), PrismDirections::new(b));
     let mut widest = (f64::NEG_INFINITY, Vector3::z());
-    for direction in of_a.separating(&of_b) {
+    let is_round = a.edge_radius + b.edge_radius > 0.0;
+    let approaching = is_round.then(|| of_a.approaching(&of_b));
+    for direction in of_a
+        .separating(&of_b)
+        .chain(approaching.into_iter().flatten())
+    {
         widest = wider_gap(widest, of_a.gaps_to(&of_b, &direction), direction);
         if widest.0 >= reach {
             return None;
@@ -297,6 +323,25 @@ impl<'a> PrismDirections<'a> {
         faces.chain(self.edge_normals(other))
     }
 
+    /// Directions ever closer to that between the nearest points of two cores, if these are apart.
+    ///
+    /// # Method
+    /// [Gilbert 1966]: a point of the difference of both cores moves towards the corner of it that
+    /// is farthest back, until no other point of the way is closer to the origin.
+    ///
+    /// [Gilbert 1966]: https://doi.org/10.1137/0304007
+    fn approaching(&self, other: &Self) -> impl Iterator<Item = Vector3<f64>> {
+        let (from, to) = (self.solid, other.solid);
+        let nearer = |way: &Vector3<f64>| {
+            let back = way - (to.farthest_corner(&-way) - from.farthest_corner(way));
+            let share = way.dot(&back) / back.norm_squared();
+            (share > MIN_APPROACH).then(|| way - back * share.min(1.0))
+        };
+        std::iter::successors(Some(to.center() - from.center()), nearer)
+            .take(APPROACH_STEPS)
+            .filter_map(|way| way.try_normalize(f64::EPSILON))
+    }
+
     /// Normals of an edge of each of two prisms, for pairs that are not parallel.
     fn edge_normals(&self, other: &Self) -> impl Iterator<Item = Vector3<f64>> {
         let edges = self.edges.iter();
@@ -310,6 +355,7 @@ mod tests {
     use super::*;
     use crate::geom::{Point3, UnitQuaternion};
     use crate::scene::Draws;
+    use crate::settle::bodies::rectangle;
 
     fn solid(x: f64, y: f64, z: f64, angles: [f64; 3], half: [f64; 3]) -> Solid {
         let rotation = UnitQuaternion::from_euler_angles(angles[0], angles[1], angles[2]);
@@ -320,6 +366,7 @@ mod tests {
             world_from_body,
             half: half.into(),
             outline,
+            edge_radius: 0.0,
             falls: true,
             is_gone: false,
         }
@@ -443,6 +490,39 @@ mod tests {
         );
         // Through the left wall by 0.05, with its vertical side.
         assert!((deepest(&[triangle(-0.15)], &[], Some([0.4, 0.3])) - 0.05).abs() < 1e-12);
+    }
+
+    #[test]
+    fn round_bodies_are_apart_where_their_edges_are() {
+        let radius = 0.018;
+        let round = |x: f64, y: f64, turn: f64| Solid {
+            outline: rectangle(0.1 - radius, 0.04 - radius),
+            edge_radius: radius,
+            ..solid(x, y, 0.0, [0.0, 0.0, turn], [0.1, 0.04, 0.02])
+        };
+        // Corner against corner, both cores' projections this far apart along x and along y.
+        let depth = |gap: f64| {
+            let [x, y] = [0.1, 0.04].map(|half| 2.0 * (half - radius) + gap);
+            overlap_depth(&round(0.0, 0.0, 0.0), &round(x, y, 0.0))
+        };
+        assert_eq!(depth(1.45 * radius), 0.0);
+        let expected = 2.0 * radius - 1.3 * radius * 2.0_f64.sqrt();
+        assert!((depth(1.3 * radius) - expected).abs() < 0.01 * radius);
+        // A corner against a long side, and the floor under a body that stands on a long side.
+        let turned = |x: f64| overlap_depth(&round(0.0, 0.0, 0.0), &round(x, 0.0, 0.6));
+        assert!(turned(0.15) > 0.0 && turned(0.2) == 0.0);
+        let upright = Solid {
+            outline: rectangle(0.1 - radius, 0.04 - radius),
+            edge_radius: radius,
+            ..solid(
+                0.0,
+                0.0,
+                0.039,
+                [std::f64::consts::FRAC_PI_2, 0.0, 0.0],
+                [0.1, 0.04, 0.02],
+            )
+        };
+        assert!((deepest(&[upright], &[], Some([0.4, 0.3])) - 0.001).abs() < 1e-12);
     }
 
     #[test]

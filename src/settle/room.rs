@@ -135,6 +135,7 @@ fn standing(half: Vector3<f64>, world_from_body: Pose) -> Solid {
         world_from_body,
         outline: rectangle(half.x, half.y),
         half,
+        edge_radius: 0.0,
         falls: false,
         is_gone: false,
     }

@@ -301,10 +301,9 @@ impl Drop<'_> {
 
     /// The collider of an object, with its mass.
     fn collider(&self, object: &Object, units: &WorldUnits) -> ColliderBuilder {
-        let half = self.options.half_body(object) * units.length;
         self.with_contacts(collider::collider(
             object,
-            &half,
+            self.options,
             units.length,
             body_mass(object, units),
         ))

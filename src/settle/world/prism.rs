@@ -1,6 +1,7 @@
-//! A convex prism, bounded by upright sides and two faces, as a shape of the engine.
+//! A convex prism, bounded by upright sides and two faces, as a shape of the engine; its edges may be
+//! rounded.
 
-use rapier3d::parry::bounding_volume::{Aabb, BoundingSphere};
+use rapier3d::parry::bounding_volume::{Aabb, BoundingSphere, BoundingVolume};
 use rapier3d::parry::mass_properties::MassProperties;
 use rapier3d::parry::query::{PointProjection, PointQuery, Ray, RayCast, RayIntersection};
 use rapier3d::parry::shape::{
@@ -29,6 +30,8 @@ pub(super) struct Prism {
     /// Index of the side whose part is largest.
     largest: usize,
     hull: ConvexPolyhedron,
+    /// How far the body reaches beyond this core, which rounds its edges.
+    edge_radius: Real,
 }
 
 /// A face of a prism.
@@ -40,9 +43,9 @@ enum Face {
 }
 
 impl Prism {
-    /// The prism over a convex ring, counter-clockwise; none if the engine considers the shape too
-    /// thin.
-    pub(super) fn new(ring: &[[f64; 2]], half_height: f64) -> Option<Self> {
+    /// The prism over a convex ring, counter-clockwise, and all that is within a radius of it; none if
+    /// the engine considers the shape too thin.
+    pub(super) fn new(ring: &[[f64; 2]], half_height: f64, edge_radius: f64) -> Option<Self> {
         let ring = ring_at(ring, half_height);
         let lower = ring.iter().map(|corner| mirrored(*corner));
         let hull = ConvexPolyhedron::from_convex_hull(
@@ -59,6 +62,7 @@ impl Prism {
             parts,
             largest,
             hull,
+            edge_radius: edge_radius as f32,
         })
     }
 
@@ -260,11 +264,13 @@ impl PointQuery for Prism {
 
 impl Shape for Prism {
     fn compute_local_aabb(&self) -> Aabb {
-        self.hull.compute_local_aabb()
+        self.hull.compute_local_aabb().loosened(self.edge_radius)
     }
 
     fn compute_local_bounding_sphere(&self) -> BoundingSphere {
-        self.hull.compute_local_bounding_sphere()
+        self.hull
+            .compute_local_bounding_sphere()
+            .loosened(self.edge_radius)
     }
 
     fn clone_dyn(&self) -> Box<dyn Shape> {
@@ -289,7 +295,7 @@ impl Shape for Prism {
     }
 
     fn ccd_thickness(&self) -> Real {
-        self.hull.ccd_thickness()
+        self.hull.ccd_thickness() + self.edge_radius
     }
 
     fn ccd_angular_thickness(&self) -> Real {
@@ -305,7 +311,7 @@ impl Shape for Prism {
     }
 
     fn as_polygonal_feature_map(&self) -> Option<(&dyn PolygonalFeatureMap, Real)> {
-        Some((self, 0.0))
+        Some((self, self.edge_radius))
     }
 }
 
@@ -322,7 +328,7 @@ mod tests {
     }
 
     fn prism(n: usize) -> Prism {
-        Prism::new(&circle(n), 0.005).expect("a prism")
+        Prism::new(&circle(n), 0.005, 0.0).expect("a prism")
     }
 
     /// The largest area of four corners with this side, by brute force.
