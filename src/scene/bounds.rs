@@ -27,7 +27,6 @@ pub(super) const GRADE: Bounds = Bounds::new(0.0, 100.0, "a factor");
 pub(super) const WEIGHT: Bounds = Bounds::new(0.0, 1e6, "likelihood relative to the others");
 /// Degrees between the ends of a card. Beyond 60 it hides parts of itself from a camera that looks
 /// down at 45 degrees, and its body would no longer fall like a flat one.
-pub(super) const BILLBOARD: Bounds = Bounds::new(0.0, 10.0, "times the objects' thickness");
 pub(super) const BEND: Bounds = Bounds::new(-60.0, 60.0, "degrees from end to end");
 pub(super) const LIGHT_HEIGHT: Bounds =
     Bounds::metres(0.001, 1000.0, "a light farther away is a sun");

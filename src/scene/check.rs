@@ -7,8 +7,8 @@ use crate::error::{Error, Result};
 use crate::geom::{Pose, UnitQuaternion};
 use crate::pixel::LinearRgb;
 use crate::scene::bounds::{
-    BILLBOARD, CAST_SHARE, EV, FOCAL, FRICTION, GRADE, LENGTH, MASS, MAX_LIGHTS, MAX_OBJECTS,
-    PHOTO_SIDE, PIXEL, PLACE, RADIANCE, SHARE, SOLVED_EV, TURN,
+    CAST_SHARE, EV, FOCAL, FRICTION, GRADE, LENGTH, MASS, MAX_LIGHTS, MAX_OBJECTS, PHOTO_SIDE,
+    PIXEL, PLACE, RADIANCE, SHARE, SOLVED_EV, TURN,
 };
 use crate::scene::hull::doubled_corner_area;
 use crate::scene::{
@@ -31,7 +31,6 @@ impl Scene {
         self.check_view()?;
         self.check_objects()?;
         self.check_lights()?;
-        BILLBOARD.check("billboard", self.billboard)?;
         self.belt.map_or(Ok(()), |belt| belt.check())?;
         self.finish.check()?;
         check_exposure(self.exposure)

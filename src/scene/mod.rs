@@ -42,7 +42,6 @@
 
 mod belt;
 mod bend;
-mod billboard;
 pub(crate) mod bounds;
 mod catalog;
 mod check;
@@ -189,10 +188,6 @@ pub struct Scene {
     /// brightens the surface. Default: black, no interreflection.
     #[serde(default, skip_serializing_if = "LinearRgb::is_black")]
     pub interreflection: LinearRgb,
-    /// How far cards turn towards the camera: as if their bodies were this many times as thick as
-    /// the objects ([`Recipe::billboard`]). Default: 0, not at all.
-    #[serde(default, skip_serializing_if = "post_process::is_zero")]
-    pub billboard: f64,
     /// Displacement of the objects by a belt since they came to rest. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub belt: Option<Belt>,
@@ -230,7 +225,6 @@ impl Scene {
             light_direction: LightDirection::default(),
             light_map: LightMap::default(),
             interreflection: LinearRgb::BLACK,
-            billboard: 0.0,
             belt: None,
             edges: EdgeTreatment::default(),
             finish: PostProcess::default(),

@@ -35,7 +35,7 @@ pub struct PostProcess {
     pub sharpening: f64,
 }
 
-pub(super) fn is_zero(value: &f64) -> bool {
+fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 

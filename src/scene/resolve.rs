@@ -8,7 +8,6 @@ use crate::geom::{Point2, Pose, Quad};
 use crate::image::Image;
 use crate::matte::Flow;
 use crate::pixel::{LinearRgb, ObjectId};
-use crate::scene::billboard::facing;
 use crate::scene::check::check_picture_size;
 use crate::scene::{
     AreaLight, Blur, CameraSource, Card, EnvironmentMap, Exposure, LightGrid, LightMap, LightTint,
@@ -94,7 +93,7 @@ impl Scene {
             thin_lens: self.lens.thin_lens(&camera),
             plate: plate.map(|plate| self.shown_plate(&camera, plate)),
             catcher: [f64::INFINITY; 2],
-            cards: self.cards(&seen, look)?,
+            cards: self.cards(look)?,
             lights: self.tinted_lights(cast),
             ambient: self.ambient * cast,
             light_grid: self.light_grid()?,
@@ -157,28 +156,12 @@ impl Scene {
         self.view.plate(camera, value)
     }
 
-    fn cards(
-        &self,
-        camera: &Camera,
-        look: impl Fn(&Object) -> Result<Option<Appearance>>,
-    ) -> Result<Vec<Card>> {
+    fn cards(&self, look: impl Fn(&Object) -> Result<Option<Appearance>>) -> Result<Vec<Card>> {
         let numbered = self.objects.iter().enumerate();
         let there = numbered.filter(|(_, object)| object.placement != Placement::Gone);
         there
-            .map(|(i, object)| {
-                let card = self.carried(resting_card(i, object, &look)?);
-                Ok(self.billboard(object, card, camera))
-            })
+            .map(|(i, object)| Ok(self.carried(resting_card(i, object, &look)?)))
             .collect()
-    }
-
-    /// A card turned towards the camera as far as it is thick.
-    fn billboard(&self, object: &Object, mut card: Card, camera: &Camera) -> Card {
-        if self.billboard > 0.0 {
-            let thickness = self.billboard * object.thickness;
-            card.quad.world_from_card = facing(&card.quad, thickness, &camera.center());
-        }
-        card
     }
 
     /// A card where the belt has moved it.

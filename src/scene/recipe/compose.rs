@@ -116,7 +116,6 @@ impl Recipe {
             light_direction: self.light_direction.draw(draws),
             light_map: self.light_map.clone(),
             interreflection: self.draw_interreflection(draws, background),
-            billboard: self.billboard.draw(draws, "billboard"),
             edges: EdgeTreatment::draw(&self.edges, draws),
             ..Scene::new(self.image, background.camera, surface)
         }

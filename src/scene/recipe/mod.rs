@@ -12,9 +12,7 @@ use crate::bounds::Bounds;
 use crate::color::Albedo;
 use crate::error::{Error, Result};
 use crate::scene::belt::SequencePlace;
-use crate::scene::bounds::{
-    BEND, BILLBOARD, EV, FRICTION, MAX_LIGHTS, MAX_OBJECTS, RADIANCE, SCALE, SHARE,
-};
+use crate::scene::bounds::{BEND, EV, FRICTION, MAX_LIGHTS, MAX_OBJECTS, RADIANCE, SCALE, SHARE};
 use crate::scene::check::{check_albedo, check_cast, check_count, check_each, check_image};
 use crate::scene::stack::too_large;
 use crate::scene::{
@@ -115,11 +113,6 @@ pub struct Recipe {
     /// albedo, or the albedo itself if that is unknown. Default: 0, none.
     #[serde(skip_serializing_if = "Range::is_zero")]
     pub interreflection: Range,
-    /// How far cards turn towards the camera, so that an object that stands on edge does not look
-    /// like a line: as if their bodies were ellipsoids this many times as thick as the objects.
-    /// Default: 0, not at all.
-    #[serde(skip_serializing_if = "Range::is_zero")]
-    pub billboard: Range,
     /// A belt that carries the objects past the camera, in sequences of pictures. Default: none,
     /// every picture is an independent scene.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -162,7 +155,6 @@ impl Default for Recipe {
             light_direction: LightDirectionSource::Drawn,
             light_map: LightMap::default(),
             interreflection: Range::fixed(0.0),
-            billboard: Range::fixed(0.0),
             belt: None,
             finish: PostProcessRanges::default(),
             settle: SettleOptions::default(),
@@ -296,7 +288,6 @@ impl Recipe {
         check_cast(&self.cast)?;
         self.light_map.check()?;
         self.interreflection.check("interreflection", &SHARE)?;
-        self.billboard.check("billboard", &BILLBOARD)?;
         self.belt.map_or(Ok(()), |belt| belt.check())?;
         self.finish.check()?;
         self.settle.check()
