@@ -1,11 +1,11 @@
-"""Compares the positions of bottles and the look of trays in reality and in synthetic pictures.
+"""Compares how bottles lie and how trays look in reality and in synthetic pictures.
 
     python -m study.heaps [--rooms 21,22] WORLD SYNTHETIC...
 
 Prints a row for the piles of a world and one for each dataset folder: the positions of the bottles relative to
-half the surface's width and height, how many are labelled, and the luma of the tray's floor: the share darker
-than 0.45 of its median, and its standard deviation divided by its mean. Reality means the training pictures of
-the rooms used for choosing.
+half the surface's width and height, how many are labelled, how many of these are tilted by more than 20 and 45
+degrees, and the luma of the tray's floor: the share darker than 0.45 of its median, and its standard deviation
+divided by its mean. Reality means the training pictures of the rooms used for choosing.
 """
 
 import argparse
@@ -17,6 +17,8 @@ import numpy as np
 
 FAR = 0.6
 DARK = 0.45
+# Cosines of the tilts that count.
+TILTS = np.cos(np.radians([20, 45]))
 # The floor of a tray seen from straight above, pixels.
 FLOOR = (160, 110)
 
@@ -28,20 +30,22 @@ def main():
     parser.add_argument("datasets", type=Path, nargs="*")
     options = parser.parse_args()
     folders = [options.world / f"room{room}/real/piles" for room in options.rooms.split(",")]
-    print("| | pictures | mean abs(x) | mean abs(y) | x beyond 0.6 | y beyond 0.6 | labelled | in a picture | dark | contrast |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    print("| | pictures | mean abs(x) | mean abs(y) | x beyond 0.6 | y beyond 0.6 | labelled | in a picture | tilted by 20 | by 45 | dark | contrast |")
+    print("| --- " * 12 + "|")
     report("reality", [real_pile(path) for folder in folders for path in folder.glob("truth/*.json")])
     for folder in options.datasets:
         report(folder.name, [synthetic_heap(path) for path in (folder / "scenes").rglob("*.json")])
 
 
 def real_pile(path):
-    """Return `(x, y, labelled)` of each bottle, and the floor."""
+    """Return `(x, y, cosine of the tilt, labelled)` of each bottle, and the floor."""
     pile = json.loads(path.read_text())
     half = np.array(pile["tray"]["floor_m"]) / 2
-    poses = [np.array(bottle["pose"])[:2, 3] / half for bottle in pile["bottles"]]
+    poses = [np.array(bottle["pose"]) for bottle in pile["bottles"]]
     picture = next(path.parents[1].glob(f"images/{path.stem}.*"))
-    bottles = [(*place, bottle["unobstructed"]) for place, bottle in zip(poses, pile["bottles"])]
+    bottles = [
+        (*(pose[:2, 3] / half), pose[2, 2], bottle["unobstructed"]) for pose, bottle in zip(poses, pile["bottles"])
+    ]
     return bottles, floor(picture, pile["tray"]["corners_px"])
 
 
@@ -51,9 +55,12 @@ def synthetic_heap(path):
     half = np.array(scene["surface"]["size"]) / 2
     # What went over the rim is in no picture.
     numbered = [(k, one["placement"]) for k, one in enumerate(scene["objects"], 1) if one["placement"] != "gone"]
-    places = [(k, np.array(placement["at"]["translation"])[:2] / half) for k, placement in numbered]
+    poses = [(k, placement["at"]) for k, placement in numbered]
     picture = Path(str(path).replace("/scenes/", "/images/")).with_suffix(".jpg")
-    bottles = [(*place, k in record["labelled"]) for k, place in places]
+    bottles = [
+        (*(np.array(pose["translation"])[:2] / half), rotation(pose["rotation"])[2, 2], k in record["labelled"])
+        for k, pose in poses
+    ]
     return bottles, floor(picture, corners_px(scene["camera"]["known"], half))
 
 
@@ -80,12 +87,13 @@ def floor(picture, corners):
 
 
 def report(name, pictures):
-    x, y, labelled = np.abs(np.array([row for bottles, _ in pictures for row in bottles], float)).T
+    x, y, upright, labelled = np.abs(np.array([row for bottles, _ in pictures for row in bottles], float)).T
     floors = [floor for _, floor in pictures]
     dark = np.mean([(floor < DARK * np.median(floor)).mean() for floor in floors])
     contrast = np.mean([floor.std() / floor.mean() for floor in floors])
     places = [x.mean(), y.mean(), (x > FAR).mean(), (y > FAR).mean()]
-    cells = [*places, labelled.mean(), labelled.sum() / len(pictures), dark, contrast]
+    tilted = [(upright[labelled > 0] < tilt).mean() for tilt in TILTS]
+    cells = [*places, labelled.mean(), labelled.sum() / len(pictures), *tilted, dark, contrast]
     print(f"| {name} | {len(pictures)} | " + " | ".join(f"{cell:.2f}" for cell in cells) + " |")
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from . import bootstrap, chance, files, main, page, results, score
 
 # Half of an interval of 95 %, in standard deviations known with `bootstrap.FREEDOM` degrees of freedom.
-STUDENT = 2.160
+STUDENT = 2.120
 
 
 class Intervals(unittest.TestCase):

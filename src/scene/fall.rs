@@ -22,8 +22,8 @@ pub struct SettleOptions {
     /// Minimum thickness of a falling body, as a share of its longer side; thinner cards are drawn
     /// thin but fall as bodies of this thickness. Default: 0.01 (2 mm for 200 mm).
     pub thinnest: f64,
-    /// Radius of the edges of a falling body, as a share of half its thickness: 0 is sharp, and
-    /// near 1 it rolls off its edges, as a crushed bottle does. Default: 0.
+    /// Radius of the edges of a falling body, as a share of half its thickness, 0 (sharp) to 0.9:
+    /// thick bodies with round edges do not stand on them. Default: 0.
     pub rounding: f64,
     /// Maximum accepted overlap of two bodies at rest, as a share of the typical card's longer
     /// side. Default: 0.0025 (0.5 mm for 200 mm).
@@ -90,7 +90,7 @@ impl SettleOptions {
         Vector3::new(w, h, object.thickness.max(self.thinnest * w.max(h))) / 2.0
     }
 
-    /// Radius of the edges of that box, metres; at most half of its shortest side, whatever lies flat.
+    /// Radius of the edges of that box, metres; at most a quarter of its width and height.
     pub fn edge_radius(&self, object: &Object) -> f64 {
         let half = self.half_body(object);
         (self.rounding * half.z).min(half.x.min(half.y) / 2.0)

@@ -3,10 +3,11 @@
 //! [`settle`] turns every [`Placement::Drop`] into a [`Placement::At`] and leaves the rest of the
 //! scene unchanged; without falling objects it returns the scene as it is and builds no physics
 //! world. Objects fall as thin boxes ([`SettleOptions::half_body`]) or as convex prisms
-//! ([`Object::outline`](crate::scene::Object::outline)), between the surface's walls or, if it has
-//! none, between frictionless walls of infinite height on its edges. A card lies in the *middle*
-//! plane of its body. Objects already at rest are stationary obstacles; a card that cannot touch
-//! anything needs no physics.
+//! ([`Object::outline`](crate::scene::Object::outline)), with sharp or round edges
+//! ([`SettleOptions::rounding`]), between the surface's walls or, if it has none, between
+//! frictionless walls of infinite height on its edges. A card lies in the *middle* plane of its
+//! body. Objects already at rest are stationary obstacles; a card that cannot touch anything needs
+//! no physics.
 //!
 //! The result is judged by tests that are independent of the physics engine: for overlap, for what
 //! supports each body, and by its energy. A failed attempt is repeated from other heights, with
