@@ -61,10 +61,10 @@ fn room_contacts(body: usize, solid: &Solid, surface: [f64; 2], reach: f64) -> V
             let touching = solid
                 .corners()
                 .filter(move |corner| corner.dot(&normal) - distance < solid.edge_radius + reach);
-            touching.map(move |point| Contact {
+            touching.map(move |corner| Contact {
                 body,
                 by: None,
-                point,
+                point: corner - normal * solid.edge_radius,
                 normal,
                 rough: normal.z > 0.0,
             })

@@ -242,12 +242,8 @@ fn separation(a: &Solid, b: &Solid, reach: f64) -> Option<(f64, Vector3<f64>)> {
     }
     let (of_a, of_b) = (PrismDirections::new(a), PrismDirections::new(b));
     let mut widest = (f64::NEG_INFINITY, Vector3::z());
-    let is_round = a.edge_radius + b.edge_radius > 0.0;
-    let approaching = is_round.then(|| of_a.approaching(&of_b));
-    for direction in of_a
-        .separating(&of_b)
-        .chain(approaching.into_iter().flatten())
-    {
+    let directions = of_a.separating(&of_b).chain(of_a.approaching(&of_b));
+    for direction in directions {
         widest = wider_gap(widest, of_a.gaps_to(&of_b, &direction), direction);
         if widest.0 >= reach {
             return None;
@@ -323,7 +319,8 @@ impl<'a> PrismDirections<'a> {
         faces.chain(self.edge_normals(other))
     }
 
-    /// Directions ever closer to that between the nearest points of two cores, if these are apart.
+    /// If either body is round, directions ever closer to that between the nearest points of their
+    /// cores.
     ///
     /// # Method
     /// [Gilbert 1966]: a point of the difference of both cores moves towards the corner of it that
@@ -337,7 +334,9 @@ impl<'a> PrismDirections<'a> {
             let share = way.dot(&back) / back.norm_squared();
             (share > MIN_APPROACH).then(|| way - back * share.min(1.0))
         };
-        std::iter::successors(Some(to.center() - from.center()), nearer)
+        let is_round = from.edge_radius + to.edge_radius > 0.0;
+        let start = is_round.then(|| to.center() - from.center());
+        std::iter::successors(start, nearer)
             .take(APPROACH_STEPS)
             .filter_map(|way| way.try_normalize(f64::EPSILON))
     }
@@ -495,33 +494,24 @@ mod tests {
     #[test]
     fn round_bodies_are_apart_where_their_edges_are() {
         let radius = 0.018;
-        let round = |x: f64, y: f64, turn: f64| Solid {
+        let round = |x: f64, y: f64, z: f64, angles: [f64; 3]| Solid {
             outline: rectangle(0.1 - radius, 0.04 - radius),
             edge_radius: radius,
-            ..solid(x, y, 0.0, [0.0, 0.0, turn], [0.1, 0.04, 0.02])
+            ..solid(x, y, z, angles, [0.1, 0.04, 0.02])
         };
+        let level = round(0.0, 0.0, 0.0, [0.0; 3]);
         // Corner against corner, both cores' projections this far apart along x and along y.
         let depth = |gap: f64| {
             let [x, y] = [0.1, 0.04].map(|half| 2.0 * (half - radius) + gap);
-            overlap_depth(&round(0.0, 0.0, 0.0), &round(x, y, 0.0))
+            overlap_depth(&level, &round(x, y, 0.0, [0.0; 3]))
         };
         assert_eq!(depth(1.45 * radius), 0.0);
         let expected = 2.0 * radius - 1.3 * radius * 2.0_f64.sqrt();
         assert!((depth(1.3 * radius) - expected).abs() < 0.01 * radius);
         // A corner against a long side, and the floor under a body that stands on a long side.
-        let turned = |x: f64| overlap_depth(&round(0.0, 0.0, 0.0), &round(x, 0.0, 0.6));
+        let turned = |x: f64| overlap_depth(&level, &round(x, 0.0, 0.0, [0.0, 0.0, 0.6]));
         assert!(turned(0.15) > 0.0 && turned(0.2) == 0.0);
-        let upright = Solid {
-            outline: rectangle(0.1 - radius, 0.04 - radius),
-            edge_radius: radius,
-            ..solid(
-                0.0,
-                0.0,
-                0.039,
-                [std::f64::consts::FRAC_PI_2, 0.0, 0.0],
-                [0.1, 0.04, 0.02],
-            )
-        };
+        let upright = round(0.0, 0.0, 0.039, [std::f64::consts::FRAC_PI_2, 0.0, 0.0]);
         assert!((deepest(&[upright], &[], Some([0.4, 0.3])) - 0.001).abs() < 1e-12);
     }
 
