@@ -15,6 +15,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from . import reality
+
 FAR = 0.6
 DARK = 0.45
 # Cosines of the tilts that count.
@@ -29,20 +31,18 @@ def main():
     parser.add_argument("world", type=Path)
     parser.add_argument("datasets", type=Path, nargs="*")
     options = parser.parse_args()
-    folders = [options.world / f"room{room}/real/piles" for room in options.rooms.split(",")]
     print("| | pictures | mean abs(x) | mean abs(y) | x beyond 0.6 | y beyond 0.6 | labelled | in a picture | tilted by 20 | by 45 | dark | contrast |")
     print("| --- " * 12 + "|")
-    report("reality", [real_pile(path) for folder in folders for path in folder.glob("truth/*.json")])
+    piles = reality.training_piles(options.world, options.rooms.split(","))
+    report("reality", [real_pile(pile, picture) for pile, picture in piles])
     for folder in options.datasets:
         report(folder.name, [synthetic_heap(path) for path in (folder / "scenes").rglob("*.json")])
 
 
-def real_pile(path):
+def real_pile(pile, picture):
     """Return `(x, y, cosine of the tilt, labelled)` of each bottle, and the floor."""
-    pile = json.loads(path.read_text())
     half = np.array(pile["tray"]["floor_m"]) / 2
     poses = [np.array(bottle["pose"]) for bottle in pile["bottles"]]
-    picture = next(path.parents[1].glob(f"images/{path.stem}.*"))
     bottles = [
         (*(pose[:2, 3] / half), pose[2, 2], bottle["unobstructed"]) for pose, bottle in zip(poses, pile["bottles"])
     ]

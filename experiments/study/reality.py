@@ -30,6 +30,16 @@ def pictures(world, room, name, count):
     return [str(path) for path in found]
 
 
+def training_piles(world, rooms):
+    """What is true of every training picture of some rooms, and the picture."""
+    for room in rooms:
+        folder = world / f"room{room}/real/piles"
+        found = sorted(folder.glob("truth/*.json"))
+        if not found:
+            raise SystemExit(f"{folder}: no piles")
+        yield from ((json.loads(path.read_text()), folder / f"images/{path.stem}.jpg") for path in found)
+
+
 def truth(world, room, count, classes, folder):
     """Write YOLO labels of the test pictures of a room, unchanged or all with one class."""
     for picture in pictures(world, room, "test", count):

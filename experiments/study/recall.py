@@ -13,8 +13,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from pycocotools import mask
 
-from . import files, reality, score, train
+from . import reality, score, train
 from .train import Model  # noqa: F401 - checkpoints name it by the module that trained them
 
 TILTS = (0, 20, 45, 90)
@@ -39,34 +40,35 @@ def main():
 
 def of_training(folder, world, rooms):
     """Whether each bottle is found, by kind."""
-    training = json.loads((folder / "training.json").read_text())
-    pictures = {}
-    for room in rooms:
-        found = folder / f"recall/{room}"
-        named = reality.pictures(world, room, "real", training_pictures(world, room))
-        train.predict(training, folder / "detector/weights/last.pt", named, found)
-        pictures |= {path: list(score.rows(found / f"{Path(path).stem}.txt", reality.SIZE)) for path in named}
-    labels = sum(len(files.label_of(path).read_text().splitlines()) for path in pictures)
-    surest = sorted((row[2] for rows in pictures.values() for row in rows), reverse=True)[:labels]
+    piles = [one for room in rooms for one in detected_piles(folder, world, room)]
+    labels = sum(len(labelled(pile)) for pile, _ in piles)
+    least = sorted((confidence for _, rows in piles for *_, confidence in rows), reverse=True)[:labels][-1]
     kinds = defaultdict(list)
-    for path, rows in pictures.items():
-        for kind, is_found in bottles(Path(path), [box for _, box, confidence in rows if confidence >= surest[-1]]):
+    for pile, rows in piles:
+        for kind, is_found in bottles(pile, [box for _, box, confidence in rows if confidence >= least]):
             kinds[kind].append(is_found)
     return kinds
 
 
-def training_pictures(world, room):
-    return len(list((world / f"room{room}/real/piles/images").glob("*.jpg")))
+def detected_piles(folder, world, room):
+    """The training piles of a room, each with the rows of the detector."""
+    training, found = json.loads((folder / "training.json").read_text()), folder / f"recall/{room}"
+    piles = list(reality.training_piles(world, [room]))
+    train.predict(training, folder / "detector/weights/last.pt", [str(picture) for _, picture in piles], found)
+    return [(pile, list(score.rows(found / f"{picture.stem}.txt", reality.SIZE))) for pile, picture in piles]
 
 
-def bottles(path, boxes):
+def labelled(pile):
+    return [bottle for bottle in pile["bottles"] if bottle["unobstructed"]]
+
+
+def bottles(pile, boxes):
     """Yield each kind of each bottle with a label, and whether one of the boxes, surest first, finds it."""
-    pile = json.loads((path.parents[1] / f"truth/{path.stem}.json").read_text())
-    left = [bottle for bottle in pile["bottles"] if bottle["unobstructed"]]
+    left = labelled(pile)
     for box in boxes:
-        overlap, bottle = max(((iou(box, one["amodal_box_px"]), k) for k, one in enumerate(left)), default=(0, 0))
-        if overlap >= IOU:
-            yield from ((kind, True) for kind in kinds_of(left.pop(bottle), pile))
+        overlaps = [mask.iou([box], [xywh(bottle["amodal_box_px"])], [0]).item() for bottle in left]
+        if max(overlaps, default=0) >= IOU:
+            yield from ((kind, True) for kind in kinds_of(left.pop(int(np.argmax(overlaps))), pile))
     yield from ((kind, False) for bottle in left for kind in kinds_of(bottle, pile))
 
 
@@ -76,11 +78,9 @@ def kinds_of(bottle, pile):
     return "all", f"tilt: {low} to {high} degrees", f"light: {pile['light']}", f"colour: {bottle['colour']}"
 
 
-def iou(box, corners):
-    x, y, w, h = box
+def xywh(corners):
     left, top, right, bottom = corners
-    shared = np.clip([min(x + w, right) - max(x, left), min(y + h, bottom) - max(y, top)], 0, None).prod()
-    return shared / (w * h + (right - left) * (bottom - top) - shared)
+    return [left, top, right - left, bottom - top]
 
 
 if __name__ == "__main__":
