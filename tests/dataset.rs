@@ -357,7 +357,10 @@ fn another_plan_in_the_same_folder_is_refused_by_name() {
     };
     let seed = refused(&|p| p.seed = 8);
     assert!(
-        seed.ends_with("dataset.json: seed: the dataset was started with 7, this run has 8"),
+        seed.ends_with(
+            "dataset.json: seed: the dataset was started with 7, this run has 8; expected the same, \
+             or a new folder"
+        ),
         "{seed}"
     );
     let recipe = refused(&|p| p.recipe["objects"]["count"][1] = 20.into());
@@ -368,7 +371,7 @@ fn another_plan_in_the_same_folder_is_refused_by_name() {
     );
     assert!(
         refused(&|p| p.recipe["light"] = true.into())
-            .contains("recipe.light: the dataset was started with null")
+            .contains("recipe.light: the dataset was started without it, this run has true")
     );
     assert!(refused(&|p| p.obstructed = Obstructed::Keep).contains("obstructed"));
     assert!(refused(&|p| p.writers = vec![Arc::new(Yolo::default())]).contains("writers"));
@@ -1131,7 +1134,7 @@ fn archives_that_are_there_are_not_made_again() {
     assert_eq!(before, bytes(dir.path()));
     let e = make(&archive_plan(dir.path(), 31)).unwrap_err().to_string();
     assert!(
-        e.ends_with("count: the dataset was started with 30, this run has 31"),
+        e.contains("count: the dataset was started with 30, this run has 31;"),
         "{e}"
     );
 }
@@ -1425,7 +1428,8 @@ fn a_store_of_something_else_is_refused() {
     let refused = |plan: Plan| make(&plan).unwrap_err().to_string();
     assert_eq!(
         refused(store_plan(other.path(), 31, &store)),
-        "s3://bucket/prefix/dataset.json: count: the dataset was started with 30, this run has 31"
+        "s3://bucket/prefix/dataset.json: count: the dataset was started with 30, this run has 31; \
+         expected the same, or a new folder"
     );
     // An archive that no receipt vouches for, and that has other bytes.
     store.objects.lock().unwrap().remove("receipts/000001.json");
@@ -1527,7 +1531,7 @@ fn shards_that_do_not_make_a_whole_are_refused() {
     .unwrap();
     let mixed = refused(&[folders[0].clone(), folders[1].clone(), other]);
     assert!(
-        mixed.ends_with("dataset.json: seed: the dataset was started with 7, this run has 8"),
+        mixed.contains("dataset.json: seed: the dataset was started with 7, this run has 8;"),
         "{mixed}"
     );
 

@@ -111,8 +111,11 @@ fn check_is_folder(folder: &Path) -> Result<()> {
 /// Fails if the folder was started with another plan, naming the field.
 pub(super) fn check_same_plan(before: &Value, now: &Value, folder: &Path) -> Result<()> {
     of_this_format(before, folder)?;
-    same(before, now, "")
-        .map_err(|(at, what)| Error::value(at, what).in_file(identity_file(folder)))
+    same(before, now, "").map_err(|(at, what)| different(at, &what).in_file(identity_file(folder)))
+}
+
+fn different(at: String, what: &str) -> Error {
+    Error::value(at, format!("{what}; expected the same, or a new folder"))
 }
 
 /// The file that records what the dataset in a folder was made from.
@@ -277,9 +280,13 @@ pub(crate) fn same(before: &Value, now: &Value, at: &str) -> FieldComparison {
 }
 
 fn differ(before: &Value, now: &Value, at: &str) -> FieldComparison {
-    let (before, now) = (brief(before), brief(now));
-    let what = format!("the dataset was started with {before}, this run has {now}");
-    Err((at.to_owned(), what))
+    let what = match (before, now) {
+        // As a key that only a newer version writes.
+        (Value::Null, _) => format!("without it, this run has {}", brief(now)),
+        (_, Value::Null) => format!("with {}, this run has none", brief(before)),
+        _ => format!("with {}, this run has {}", brief(before), brief(now)),
+    };
+    Err((at.to_owned(), format!("the dataset was started {what}")))
 }
 
 fn same_entries(a: &[Value], b: &[Value], at: &str) -> FieldComparison {

@@ -19,7 +19,7 @@ use serde::Deserialize;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Maximum work for a picture previewed while a slider moves; a heap of 100 objects takes about 2
+/// Maximum work for a picture previewed while a slider moves; a heap of 100 cards takes about 2
 /// million.
 const MOST_WORK: u64 = 10_000_000;
 /// Longer sides of small pictures, pixels.
