@@ -4,6 +4,7 @@
 
 A TRAINING is a folder in `cache/STUDY/runs/ARM/` that used no real pictures. Counts the bottles with a label that one
 of the surest detections finds (IoU 0.5), of which there are as many as labels; each detection finds one bottle.
+Ultralytics keeps its settings in `YOLO_CONFIG_DIR`, or else in the home folder.
 """
 
 import argparse
