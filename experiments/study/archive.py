@@ -58,9 +58,9 @@ def numbers(row):
     return {key: int(row[key]) for key in ("seed", "room", "pictures")} | {"cpu_seconds": float(row["cpu_seconds"])}
 
 
-def tested(rows):
-    """Number of test pictures per room."""
-    return {row["room"]: row["pictures"] for row in rows}
+def tested(matches):
+    """Number of labels in each test picture, by room."""
+    return {int(room): sum(one.truths for one in classes).tolist() for room, classes in matches.items()}
 
 
 def unpacked(arrays):

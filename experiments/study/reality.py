@@ -23,11 +23,19 @@ THICKNESS_STEP = 0.005
 
 def pictures(world, room, name, count):
     """Full paths of the first pictures of a set."""
-    folder = world / f"room{room}" / name / "piles"
-    found = sorted((folder / "images").glob("*.jpg"))[:count]
-    if len(found) < count:
-        raise SystemExit(f"{folder}: {len(found)} pictures, expected {count}")
-    return [str(path) for path in found]
+    known = found(world, room, name, count)
+    if len(known) < count:
+        raise SystemExit(f"{world}/room{room}/{name}: {len(known)} pictures, expected {count}")
+    return known
+
+
+def found(world, room, name, count):
+    """Full paths of the first pictures of a set, as far as they are rendered."""
+    return [str(path) for path in sorted((world / f"room{room}/{name}/piles/images").glob("*.jpg"))[:count]]
+
+
+def label_counts(pictures):
+    return [len(files.label_of(picture).read_text().splitlines()) for picture in pictures]
 
 
 def training_piles(world, rooms):
@@ -43,11 +51,14 @@ def training_piles(world, rooms):
 def truth(world, room, count, classes, folder):
     """Write YOLO labels of the test pictures of a room, unchanged or all with one class."""
     for picture in pictures(world, room, "test", count):
-        label = files.label_of(picture)
-        rows = [line.split() for line in label.read_text().splitlines()]
-        lines = [" ".join(["0" if classes == 1 else row[0], *row[1:]]) + "\n" for row in rows]
-        files.write_text(folder / label.name, "".join(lines))
+        files.write_text(folder / files.label_of(picture).name, labels(picture, classes))
     return folder
+
+
+def labels(picture, classes):
+    """YOLO labels of a picture, unchanged or all with one class."""
+    rows = [line.split() for line in files.label_of(picture).read_text().splitlines()]
+    return "".join(" ".join(["0" if classes == 1 else row[0], *row[1:]]) + "\n" for row in rows)
 
 
 def photo_list(world, count, cut_out, thickness, others, folder):

@@ -18,21 +18,34 @@ SUMMARY_COLUMNS = "arm seeds mean low high against ratio ratio_low ratio_high".s
 def check(study, folder, planned=()):
     """Check that all scores are on the same test pictures, and that every row of `results.csv` is still known or
     belongs to a planned training."""
-    tested = {key: archive.tested(rows) for key, (rows, _) in archive.read(folder).items()}
+    tested = {key: archive.tested(matches) for key, (_, matches) in archive.read(folder).items()}
     tested |= {key: studies.tested(study, *key) for key in study.trained()}
-    tested = {(arm, seed): pictures for (arm, seed), pictures in tested.items() if arm in study.arms["arms"]}
-    for key, pictures in tested.items():
-        check_tested(study, key, pictures)
+    tested = {(arm, seed): labels for (arm, seed), labels in tested.items() if arm in study.arms["arms"]}
     check_kept(folder, tested.keys() | set(planned))
+    kept = {key: labels for key, labels in tested.items() if key not in planned}
+    expected = studies.test_labels(study) or next(iter(kept.values()), {})
+    for key, labels in kept.items():
+        check_number(study, key, {room: len(of_room) for room, of_room in labels.items()})
+        check_labels(study, key, labels, expected)
 
 
-def check_tested(study, key, pictures):
+def check_number(study, key, pictures):
     expected = dict.fromkeys(study.rooms, study.test_pictures)
     if pictures != expected:
         raise SystemExit(
             f"{study.name}: {key}: tested on so many pictures of each room: {pictures}, expected {expected}; see "
             "--test-pictures, --rooms and --name"
         )
+
+
+def check_labels(study, key, labels, expected):
+    """Check that the pictures are the expected ones: another world may have as many."""
+    for room, of_room in labels.items():
+        if of_room != expected[room]:
+            raise SystemExit(
+                f"{study.name}: {key}: tested on pictures of another world: room {room} had so many labels: {of_room}, "
+                f"expected {expected[room]}; train it again, or see --name"
+            )
 
 
 def check_kept(folder, known):

@@ -151,8 +151,16 @@ def real_pictures(study, rooms, count):
 
 
 def tested(study, arm, seed):
-    """Number of pictures of each room that a detector was tested on."""
-    return {int(room): len(pictures) for room, pictures in training_of(study, arm, seed)["test"].items()}
+    """Number of labels in each picture that a detector was tested on, by room."""
+    of_rooms = training_of(study, arm, seed)["test"]
+    return {int(room): reality.label_counts(pictures) for room, pictures in of_rooms.items()}
+
+
+def test_labels(study):
+    """Number of labels in each test picture, by room; nothing if the world is not rendered."""
+    of_rooms = {room: reality.found(study.world, room, "test", study.test_pictures) for room in study.rooms}
+    is_rendered = all(len(pictures) == study.test_pictures for pictures in of_rooms.values())
+    return {room: reality.label_counts(pictures) for room, pictures in of_rooms.items()} if is_rendered else {}
 
 
 def training_of(study, arm, seed):

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 
-from . import bootstrap, chance, files, main, page, results, score
+from . import archive, bootstrap, chance, files, main, page, results, score, study as studies
 
 # Half of an interval of 95 %, in standard deviations known with `bootstrap.FREEDOM` degrees of freedom.
 STUDENT = 2.120
@@ -86,6 +86,17 @@ class Check(unittest.TestCase):
         for rooms, test_pictures in ((None, None), ([24], 40)):
             with self.subTest(rooms=rooms), tempfile.TemporaryDirectory() as cache:
                 check_headline(Path(cache), rooms, test_pictures)
+
+    def test_scores_on_pictures_of_another_world_are_refused(self):
+        with tempfile.TemporaryDirectory() as folder:
+            here, elsewhere = some_matches(), some_matches()
+            elsewhere.truths[3] = 2
+            archive.write(Path(folder), {"real": {0: {"21": [here]}}, "alike": {0: {"21": [elsewhere]}}})
+            study = studies.Study(main.read_arms(), Path(folder), Path(folder), None)
+            study.arms["reality"] |= {"rooms": [21], "test_pictures": len(here.truths)}
+            with self.assertRaisesRegex(SystemExit, "another world: room 21"):
+                results.check(study, Path(folder))
+            results.check(study, Path(folder), [("alike", 0)])
 
 
 def check_headline(cache, rooms, test_pictures):

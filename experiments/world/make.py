@@ -24,8 +24,6 @@ SEEDS = {"test": 1, "real": 2}
 # Pictures that one process makes before the next one starts: what an interruption loses at most
 # is one picture, so this only spares the start of Blender.
 CHUNK = 6
-# Threads of NumPy's linear algebra wait for each other longer than they work.
-ONE_THREAD = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
 
 
 def main(argv):
@@ -120,7 +118,7 @@ def render(options, chunk):
     for first, count in runs([job["index"] for job in chunk]):
         arguments = [*chunk[0]["command"], "--out", chunk[0]["out"], "--first", first, "--count", count, *cache]
         command = [sys.executable, HERE / "world.py", *arguments, "--threads", 1]
-        done = subprocess.run([str(word) for word in command], capture_output=True, text=True, env=ONE_THREAD)
+        done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
         if done.returncode != 0:
             raise SystemExit(f"{' '.join(map(str, command))}\n{done.stderr[-2000:]}")
     return chunk

@@ -19,6 +19,9 @@ import os
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+# NumPy's linear algebra rounds differently on other processors, and a crush is chaotic: its kernels for AVX2 everywhere.
+# Its threads wait for each other longer than they work.
+os.environ |= {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_NUM_THREADS": "1"}
 
 
 def positive(kind):
