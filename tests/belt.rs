@@ -4,9 +4,9 @@
 
 mod python;
 
-use petcomp::dataset::{DatasetConfig, Part, Pipeline, SampleRecord, Summary, generate};
+use petcomp::dataset::{DatasetConfig, Part, Pipeline, SampleRecord, Summary, check, generate};
 use petcomp::scene::{Object, Placement};
-use petcomp::{asset, io};
+use petcomp::{Code, asset, io};
 use serde_json::Value;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -153,6 +153,15 @@ fn check_tracks(folder: &Path) {
         let image = folder.join(format!("images/train/{:06}.png", 2 + frame));
         assert_eq!(std::fs::read(shown).unwrap(), std::fs::read(image).unwrap());
     }
+    let changed = |text: &str| {
+        std::fs::write(sequence.join("gt/gt.txt"), text).unwrap();
+        let findings = check(folder).unwrap().findings.into_iter();
+        let changed = findings.filter(|finding| finding.diagnostic.code == Code::ChangedFile);
+        changed.map(|finding| finding.path).collect::<Vec<_>>()
+    };
+    let tracks = Path::new("mot/train/000001/gt/gt.txt");
+    assert_eq!(changed(&truth.replacen(",1,", ",0,", 1)), [tracks]);
+    assert_eq!(changed(&truth), [] as [&Path; 0]);
 }
 
 /// Two sequences of three pictures are two draws.

@@ -616,7 +616,7 @@ fn a_check_finds_every_fault_and_its_place() {
     );
     write(
         "labels/train/000003.txt",
-        &format!("{row}\n0 0.1 0.1 0.2 0.2 0.3 0.3\n"),
+        &format!("{row}\n0 0.1 0.1 0.2 0.2 0.3 0.3\n0 0.1 0.1 0.1 0.2 0.1 0.3\n"),
     );
     write("labels/train/000099.txt", "");
     std::fs::remove_file(dir.path().join("labels/train/000004.txt")).unwrap();
@@ -648,6 +648,7 @@ fn a_check_finds_every_fault_and_its_place() {
         "labels/train/000002.txt:4: \"a\", expected a number",
         "labels/train/000002.txt:5: class -1, expected an integer from 0",
         "labels/train/000003.txt:1: 5 columns, expected a class and at least 3 pairs",
+        "labels/train/000003.txt:3: an outline of 0 x ",
         "labels/train/000004.txt: missing",
         "labels/train/000099.txt: no image with this name",
         "images/val/000005.png: ",
@@ -689,6 +690,40 @@ fn an_image_of_both_parts_is_a_leak() {
         "images/train/000001.png: leak: validation image is also used for training [dataset.leak]"
     );
     assert!(!found.join("\n").contains("the same bytes"), "{found:?}");
+}
+
+#[test]
+fn files_joined_from_the_labels_of_images_are_compared_with_them() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&full_plan(dir.path(), 12)).unwrap();
+    assert_eq!(faults(dir.path()), [""; 0]);
+    for name in [
+        "annotations/instances_train.json",
+        "voc/val.txt",
+        "webdataset/train-000000.tar",
+    ] {
+        let path = dir.path().join(name);
+        let whole = std::fs::read(&path).unwrap();
+        let fault = format!(
+            "{name}: missing, or differs from the images' own labels; `petcomp dataset generate` writes it \
+             [dataset.changed_file]"
+        );
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(faults(dir.path()), std::slice::from_ref(&fault));
+        std::fs::write(&path, &whole[..whole.len() - 1]).unwrap();
+        assert_eq!(faults(dir.path()), [fault]);
+        std::fs::write(&path, &whole).unwrap();
+    }
+    let document = "annotations/instances_train.json";
+    let whole = text(dir.path(), document);
+    let edited = whole.replacen("\"topmost\":true", "\"topmost\":null", 1);
+    assert_ne!(edited, whole);
+    std::fs::write(dir.path().join(document), edited).unwrap();
+    assert_eq!(faults(dir.path()).len(), 1);
+    // Another petcomp wrote it.
+    let older = whole.replacen("petcomp ", "petcomp 0.0.", 1);
+    std::fs::write(dir.path().join(document), older).unwrap();
+    assert_eq!(faults(dir.path()), [""; 0]);
 }
 
 #[test]

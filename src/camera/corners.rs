@@ -8,9 +8,9 @@ use crate::geom::{Point2, Vector2, mean_point};
 /// Corners closer than this many pixels are one corner; also closer than [`COINCIDENT_SIGMAS`]
 /// times their noise.
 pub(super) const COINCIDENT_PX: f64 = 2.0;
-const COINCIDENT_SIGMAS: f64 = 4.0;
+pub(super) const COINCIDENT_SIGMAS: f64 = 4.0;
 /// A corner nearer than this many sigmas to the line of two others makes a triangle.
-const COLLINEAR_SIGMAS: f64 = 3.0;
+pub(super) const COLLINEAR_SIGMAS: f64 = 3.0;
 /// Below this length of the longest side corner noise is a large part of the picture.
 const SMALL_QUAD_PX: f64 = 50.0;
 

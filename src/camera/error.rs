@@ -1,5 +1,6 @@
 //! Why no camera could be found.
 
+use super::corners::{COINCIDENT_PX, COINCIDENT_SIGMAS, COLLINEAR_SIGMAS};
 use crate::diagnostic::Diagnostic;
 use crate::error::Error;
 
@@ -78,8 +79,8 @@ pub enum SolveError {
     NoMarkerCorners,
     /// Two corners coincide.
     #[error(
-        "surface.corners_px: the {} and the {} corner are {distance_px:.1} px apart, expected at least {limit_px:.1}",
-        corner_name(*.first), corner_name(*.second)
+        "surface.corners_px: the {} and the {} corner are {distance_px:.1} px apart, expected at least {limit_px:.1}{}",
+        corner_name(*.first), corner_name(*.second), reason_for_distance(*.limit_px)
     )]
     Coincident {
         /// One of them, from 0.
@@ -96,8 +97,9 @@ pub enum SolveError {
     NotConvex,
     /// Three corners are on one line, within noise.
     #[error(
-        "surface.corners_px: the {} corner is {distance_px:.1} px from the line of two others, expected at least {limit_px:.1}",
-        corner_name(*.corner)
+        "surface.corners_px: the {} corner is {distance_px:.1} px from the line of two others, expected at least {limit_px:.1} \
+         ({} times corner_sigma_px)",
+        corner_name(*.corner), COLLINEAR_SIGMAS
     )]
     Collinear {
         /// The corner as labelled, from 0.
@@ -124,7 +126,7 @@ pub enum SolveError {
     /// The best camera does not fit its label within the noise.
     #[error(
         "surface: no camera fits ({labelled} {rms_px:.1} px off, p = {p_value:.1e}): {}",
-        remedy(*.exchanged, *.heights_m)
+        remedy(*.exchanged, *.contradicted)
     )]
     NoFit {
         /// `corners` or, where none were labelled, `points`.
@@ -135,9 +137,8 @@ pub enum SolveError {
         p_value: f64,
         /// Chi squared as labelled and with width and height exchanged, where that repairs it.
         exchanged: Option<[f64; 2]>,
-        /// Height of the camera above the surface as labelled, and without that, metres, where
-        /// leaving it out repairs it.
-        heights_m: Option<[f64; 2]>,
+        /// The value without which a camera fits, where there is one.
+        contradicted: Option<ContradictedValue>,
     },
     /// No pose has the camera above the surface with the whole rectangle in front of it.
     #[error("surface.corners_px: no camera above the surface sees these corners")]
@@ -160,6 +161,32 @@ pub enum SolveError {
         /// Where they are from: `points` or `markers.map`.
         at: &'static str,
     },
+}
+
+/// A value of a label that contradicts all the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContradictedValue {
+    /// Its field.
+    pub at: &'static str,
+    /// As labelled: metres, pixels or a number.
+    pub stated: f64,
+    /// As the others have it.
+    pub found: f64,
+}
+
+impl std::fmt::Display for ContradictedValue {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { at, stated, found } = self;
+        let (decimals, unit) = match *at {
+            "camera.height_m" => (3, " m"),
+            "camera.k1" => (3, ""),
+            _ => (0, " px"),
+        };
+        write!(
+            f,
+            "{at}: {stated}{unit}, expected the {found:.decimals$}{unit} that the corners give, unless another value is wrong"
+        )
+    }
 }
 
 impl SolveError {
@@ -199,19 +226,23 @@ pub(crate) fn corner_name(corner: usize) -> &'static str {
 pub(crate) const MISFIT_CAUSES: &str = "wrong dimensions, corners of different rectangles, strong distortion, a cropped \
     picture, too small a corner_sigma_px, or an uncommon lens without EXIF data or camera.focal_px";
 
+/// Where the least distance of two corners comes from, if from their noise.
+fn reason_for_distance(limit_px: f64) -> String {
+    match limit_px > COINCIDENT_PX {
+        true => format!(" ({COINCIDENT_SIGMAS} times corner_sigma_px)"),
+        false => String::new(),
+    }
+}
+
 /// What to do about a label that no camera fits.
-fn remedy(exchanged: Option<[f64; 2]>, heights_m: Option<[f64; 2]>) -> String {
-    match (exchanged, heights_m) {
+fn remedy(exchanged: Option<[f64; 2]>, contradicted: Option<ContradictedValue>) -> String {
+    match (exchanged, contradicted) {
         (Some([before, after]), _) => {
             format!(
                 "swap width_m and height_m (chi squared {before:.1} as labelled, {after:.1} swapped)"
             )
         }
-        (None, Some([stated, found])) => {
-            format!(
-                "camera.height_m: {stated} m, expected the {found:.3} m that the corners give, unless both sides or the focal length are wrong"
-            )
-        }
+        (None, Some(value)) => value.to_string(),
         (None, None) => MISFIT_CAUSES.into(),
     }
 }

@@ -693,7 +693,8 @@ mod tests {
             let mut warnings = solution.warnings.iter();
             let conflict = warnings.find(|w| w.code == Code::FocalPriorConflict);
             let (focal_px, exif_px) = (solution.camera.focal_px.x, share * focal);
-            let told = format!("the corners give {focal_px:.0} px, EXIF data {exif_px:.0} px");
+            let told =
+                format!("the corners give {focal_px:.0} px, the 35 mm equivalent {exif_px:.0} px");
             assert!(conflict.unwrap().message.contains(&told), "{conflict:?}");
         }
     }

@@ -7,6 +7,10 @@ use crate::bounds::{ALBEDO, Bounds, CAMERA, SLOPE, WALL_HEIGHT, number};
 use crate::color::Albedo;
 use std::ops::RangeInclusive;
 
+/// Standard deviations of labelled points, pixels: with less, rounding outweighs what the other
+/// priors say.
+const POINT_NOISE: Bounds = Bounds::new(1e-4, MAX_MAGNITUDE, "pixels");
+
 /// No meaningful label holds larger numbers, or positive ones smaller than one over this.
 pub(crate) const MAX_MAGNITUDE: f64 = 1e9;
 
@@ -48,11 +52,33 @@ fn check_crop(crop: &Crop, size: [u32; 2]) -> Result<(), SolveError> {
 fn check_surface(surface: &LabelSurface) -> Result<(), SolveError> {
     if let Some(corners) = &surface.corners_px {
         check_finite("surface.corners_px", corners.as_flattened())?;
+        check_pixels(corners.as_flattened())?;
     }
-    check_positive("surface.corner_sigma_px", surface.corner_sigma_px)?;
+    check_within(
+        "surface.corner_sigma_px",
+        surface.corner_sigma_px,
+        &POINT_NOISE,
+    )?;
     check_albedo(surface.albedo)?;
     check_not_negative("surface.dimension_sigma_m", surface.dimension_sigma_m)?;
+    check_sigma(
+        "surface.dimension_sigma_m",
+        surface.dimension_sigma_m,
+        shorter_side(surface),
+    )?;
     surface.wall.iter().try_for_each(check_wall)
+}
+
+/// The corners are not shares of the picture's sides, as other formats have them.
+fn check_pixels(corners: &[f64]) -> Result<(), SolveError> {
+    let are_shares = corners.iter().all(|at| (0.0..=1.0).contains(at));
+    if !are_shares || corners.iter().all(|&at| at == 0.0) {
+        return Ok(());
+    }
+    Err(SolveError::OutOfBounds {
+        at: "surface.corners_px",
+        what: "all from 0 to 1, expected pixels; are they shares of the picture's sides?".into(),
+    })
 }
 
 fn check_wall(wall: &LabelWall) -> Result<(), SolveError> {
@@ -63,7 +89,31 @@ fn check_wall(wall: &LabelWall) -> Result<(), SolveError> {
 fn check_point(point: &LabelPoint) -> Result<(), SolveError> {
     check_finite("points.xyz_m", &point.xyz_m)?;
     check_finite("points.px", &point.px)?;
-    check_positive("points.sigma_px", point.sigma_px)
+    check_within("points.sigma_px", point.sigma_px, &POINT_NOISE)
+}
+
+fn shorter_side(surface: &LabelSurface) -> Option<f64> {
+    let sides = [surface.width_m, surface.height_m];
+    sides.into_iter().flatten().min_by(f64::total_cmp)
+}
+
+/// What a length is measured with is less than the length.
+fn check_sigma(
+    at: &'static str,
+    sigma: Option<f64>,
+    length: Option<f64>,
+) -> Result<(), SolveError> {
+    match (sigma, length) {
+        (Some(sigma), Some(length)) if sigma >= length => Err(SolveError::OutOfBounds {
+            at,
+            what: format!(
+                "{}, expected less than the {} m that it is the error of; is it in millimetres?",
+                number(sigma),
+                number(length)
+            ),
+        }),
+        _ => Ok(()),
+    }
 }
 
 fn check_camera(camera: &LabelCamera) -> Result<(), SolveError> {
@@ -78,7 +128,12 @@ fn check_camera(camera: &LabelCamera) -> Result<(), SolveError> {
     )?;
     check_positive("camera.height_m", camera.height_m)?;
     check_within("camera.height_m", camera.height_m, &CAMERA)?;
-    check_positive("camera.height_sigma_m", camera.height_sigma_m)
+    check_positive("camera.height_sigma_m", camera.height_sigma_m)?;
+    check_sigma(
+        "camera.height_sigma_m",
+        camera.height_sigma_m,
+        camera.height_m,
+    )
 }
 
 /// The focal length is one that a camera with a picture of this size can have.
@@ -218,6 +273,38 @@ mod tests {
                 )
             );
         }
+    }
+
+    #[test]
+    fn errors_of_lengths_that_are_in_millimetres_are_asked_about() {
+        let told = refusal(|label| {
+            label.surface.set_size([0.56, 0.37]);
+            label.surface.dimension_sigma_m = Some(2.0);
+        });
+        let expected = "surface.dimension_sigma_m: 2, expected less than the 0.37 m that it is the error of; is it in millimetres?";
+        assert_eq!(told, expected);
+        let told = refusal(|label| {
+            (label.camera.height_m, label.camera.height_sigma_m) = (Some(0.82), Some(30.0));
+        });
+        let expected = "camera.height_sigma_m: 30, expected less than the 0.82 m";
+        assert!(told.starts_with(expected), "{told}");
+    }
+
+    #[test]
+    fn corners_that_are_shares_of_the_picture_are_asked_about() {
+        let corners = [[0.3, 0.4], [0.7, 0.26], [0.78, 0.66], [0.27, 0.74]];
+        let told = refusal(|label| label.surface.corners_px = Some(corners));
+        assert!(
+            told.ends_with("are they shares of the picture's sides?"),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn points_have_some_noise() {
+        let told = refusal(|label| label.surface.corner_sigma_px = Some(1e-6));
+        let expected = "surface.corner_sigma_px: 1e-6, expected 0.0001 to";
+        assert!(told.starts_with(expected), "{told}");
     }
 
     #[test]

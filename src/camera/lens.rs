@@ -235,9 +235,25 @@ pub(crate) fn check_fold(at: &str, k1: f64, least: f64) -> Result<()> {
 /// Checks that a lens of this k1 can have taken the pictures of a camera that was solved with it.
 ///
 /// # Errors
-/// [`Error::Value`] for a barrel that folds their corners over.
+/// [`Error::Value`] for a barrel that folds their corners over, or a pincushion that shows them at
+/// more than twice their distance from the principal point.
 pub fn check_lens(camera: &Camera, k1: f64) -> Result<()> {
-    check_fold("camera.k1", k1, least_k1(camera))
+    check_fold("camera.k1", k1, least_k1(camera))?;
+    let reach = RadialDistortion::new(camera, 0.0).reach();
+    check_pincushion(k1, 4.0 / (reach * reach))
+}
+
+/// Fails on a k1 that is more than the largest one.
+fn check_pincushion(k1: f64, most: f64) -> Result<()> {
+    if k1 <= most {
+        return Ok(());
+    }
+    let what = format!(
+        "{}, expected at most {most:.3}: above it, this camera's pictures would show their corners at more than twice the \
+         distance from the principal point",
+        number(k1)
+    );
+    Err(Error::value("camera.k1", what))
 }
 
 #[cfg(test)]
@@ -267,6 +283,18 @@ pub(crate) mod tests {
 
     fn positions() -> impl Iterator<Item = Point2<f64>> {
         (0..=16).flat_map(|i| (0..=12).map(move |j| Point2::new(10.0 * i as f64, 10.0 * j as f64)))
+    }
+
+    #[test]
+    fn a_pincushion_is_one_that_a_lens_can_have() {
+        let reach = RadialDistortion::new(&camera(), 0.0).reach();
+        let most = 4.0 / (reach * reach);
+        // Where the radius shown is twice the real one.
+        let lens = RadialDistortion::new(&camera(), most);
+        assert!((reach / lens.undistorted_radius(reach) - 2.0).abs() < 1e-6);
+        assert!(check_lens(&camera(), 0.999 * most).is_ok());
+        let told = check_lens(&camera(), 1.001 * most).unwrap_err().to_string();
+        assert!(told.contains("expected at most"), "{told}");
     }
 
     #[test]

@@ -50,7 +50,7 @@ pub(crate) use chi::CHI2_99;
 pub(crate) use dlt::homography;
 #[doc(hidden)]
 pub use doctor::doctor;
-pub use error::SolveError;
+pub use error::{ContradictedValue, SolveError};
 #[doc(hidden)]
 pub use exchange::{BlenderCamera, ColmapModel, OpencvCamera, SensorFit};
 pub use file::{CameraFile, FocalPrior};

@@ -1,7 +1,7 @@
 //! A solved camera, and how reliable it is.
 
 use super::chi;
-use super::error::{MISFIT_CAUSES, SolveError};
+use super::error::{ContradictedValue, MISFIT_CAUSES, SolveError};
 use super::exchange::pose_from;
 use super::focal::FocalSource;
 use super::label::Framing;
@@ -89,9 +89,8 @@ pub struct Fit {
     pub p_value: Option<f64>,
     /// Chi squared with width and height swapped, where that fits clearly better.
     pub exchanged_chi2: Option<f64>,
-    /// Height of the camera above the surface as labelled, and without that, metres, where the
-    /// label fits only without it.
-    pub heights_m: Option<[f64; 2]>,
+    /// The value without which alone the label fits, where there is one.
+    pub contradicted: Option<ContradictedValue>,
     /// Distance of each corner from where it was labelled, pixels; none where only points were.
     pub per_corner_px: Option<[f64; 4]>,
     /// Iterations of the refinement.
@@ -225,7 +224,7 @@ impl Problem {
             dof,
             p_value: chi::exceeds(minimum.cost, dof),
             exchanged_chi2: None,
-            heights_m: None,
+            contradicted: None,
             per_corner_px,
             iterations: minimum.iterations,
             condition,
@@ -314,7 +313,7 @@ impl Solution {
             rms_px: self.rms_px,
             p_value: self.fit.p_value.unwrap_or(0.0),
             exchanged: exchanged.map(|exchanged| [self.fit.chi2, exchanged]),
-            heights_m: self.fit.heights_m,
+            contradicted: self.fit.contradicted,
         })
     }
 

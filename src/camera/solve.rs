@@ -2,10 +2,10 @@
 
 use super::chi::CHI2_99;
 use super::corners::COINCIDENT_PX;
-use super::error::SolveError;
+use super::error::{ContradictedValue, SolveError};
 use super::focal::PriorSource;
 use super::hedge::is_off_center;
-use super::label::{Framing, Label, LabelPoint};
+use super::label::{Framing, Label, LabelCamera, LabelPoint};
 use super::options::{CornerOrder, SolveOptions};
 use super::pinhole::diagonal_px;
 use super::problem::Problem;
@@ -101,7 +101,7 @@ fn solve_compared(label: &Label, options: &SolveOptions) -> Result<Solution, Sol
     }
     let solution = solve_without_wrong_exif(label, options)?;
     let compared = compare_exchanged_sides(label, options, solution);
-    Ok(compare_without_height(label, options, compared))
+    Ok(compare_without_stated(label, options, compared))
 }
 
 /// A solution and what it comes from.
@@ -336,7 +336,10 @@ fn source_and_causes(prior: PriorSource) -> [&'static str; 2] {
             "the label",
             "wrong camera.focal_px, a cropped or zoomed picture",
         ],
-        PriorSource::Exif => ["EXIF data", "wrong EXIF, a cropped or zoomed picture"],
+        PriorSource::Exif => [
+            "the 35 mm equivalent",
+            "wrong EXIF data or camera.focal_35mm, a cropped or zoomed picture",
+        ],
         PriorSource::Nominal => [
             "a common lens",
             "another lens (give camera.focal_px in the label), or wrong dimensions",
@@ -386,24 +389,107 @@ fn exchanged(label: &Label) -> Option<Label> {
     (size[0] != size[1]).then_some(exchanged)
 }
 
-/// Where a label does not fit but does without the height that it states, tells both heights.
-fn compare_without_height(
+/// Where a label does not fit but does without one of the values that it states, names the one
+/// without which it fits best.
+fn compare_without_stated(
     label: &Label,
     options: &SolveOptions,
     mut labelled: Solution,
 ) -> Solution {
-    if let Some(stated_m) = label.camera.height_m
-        && labelled.misfit().is_some()
-    {
-        let mut without = label.clone();
-        (without.camera.height_m, without.camera.height_sigma_m) = (None, None);
-        let other = solve_without_wrong_exif(&without, options).ok();
-        labelled.fit.heights_m = other
-            .filter(|other| other.misfit().is_none())
-            .filter(|other| other.fit.chi2 + CHI2_99 < labelled.fit.chi2)
-            .map(|other| [stated_m, other.camera.height_m()]);
+    if labelled.misfit().is_some() {
+        let fits = STATED_VALUES
+            .iter()
+            .filter_map(|value| value.fit_without(label, options));
+        let best = fits
+            .filter(|(chi2, _)| chi2 + CHI2_99 < labelled.fit.chi2)
+            .min_by(|(a, _), (b, _)| a.total_cmp(b));
+        labelled.fit.contradicted = best.map(|(_, value)| value);
     }
     labelled
+}
+
+/// A value of the camera that a label may state.
+struct StatedValue {
+    /// Drops it from a label.
+    forget: fn(&mut LabelCamera),
+    /// As stated, and as a solution without it has it; none where it is not stated.
+    compare: fn(&LabelCamera, &Solution) -> Option<ContradictedValue>,
+}
+
+const STATED_VALUES: [StatedValue; 4] = [
+    StatedValue {
+        forget: |camera| (camera.height_m, camera.height_sigma_m) = (None, None),
+        compare: |camera, found| {
+            Some(ContradictedValue {
+                at: "camera.height_m",
+                stated: camera.height_m?,
+                found: found.camera.height_m(),
+            })
+        },
+    },
+    StatedValue {
+        forget: |camera| {
+            (camera.focal_px, camera.focal_sigma, camera.focal_fixed) = (None, None, false);
+        },
+        compare: |camera, found| {
+            Some(ContradictedValue {
+                at: "camera.focal_px",
+                stated: camera.focal_px?,
+                found: found.camera.focal_px.x,
+            })
+        },
+    },
+    StatedValue {
+        forget: |camera| camera.principal_point_px = None,
+        compare: |camera, found| {
+            let (stated, found) = (camera.principal_point_px?, found.camera.principal_px);
+            let [across, down] = [0, 1].map(|axis: usize| ContradictedValue {
+                at: [
+                    "camera.principal_point_px[0]",
+                    "camera.principal_point_px[1]",
+                ][axis],
+                stated: stated[axis],
+                found: found[axis],
+            });
+            let error = |value: &ContradictedValue| (value.stated - value.found).abs();
+            Some(if error(&down) > error(&across) {
+                down
+            } else {
+                across
+            })
+        },
+    },
+    StatedValue {
+        forget: |camera| camera.k1 = None,
+        compare: |camera, found| {
+            Some(ContradictedValue {
+                at: "camera.k1",
+                stated: camera.k1?,
+                found: found.k1(),
+            })
+        },
+    },
+];
+
+impl StatedValue {
+    /// Chi squared of a label that states the value and fits without it.
+    fn fit_without(
+        &self,
+        label: &Label,
+        options: &SolveOptions,
+    ) -> Option<(f64, ContradictedValue)> {
+        let mut without = label.clone();
+        (self.forget)(&mut without.camera);
+        if without.camera == label.camera {
+            return None;
+        }
+        let solution = solve_without_wrong_exif(&without, options).ok()?;
+        let value = (self.compare)(&label.camera, &solution)?;
+        solution
+            .misfit()
+            .is_none()
+            .then_some((solution.fit.chi2, value))
+    }
 }
 
 #[cfg(test)]
@@ -511,6 +597,32 @@ mod tests {
         assert!(refusal.contains(&expected), "{refusal}");
     }
 
+    #[test]
+    fn the_value_of_the_camera_without_which_the_label_fits_is_named() {
+        let view = Scenario::default().tilted(35.0).view(1, 1);
+        let focal_px = view.camera.focal_px.x;
+        let middle = view.camera.principal_px.y;
+        let told = |change: &dyn Fn(&mut LabelCamera)| {
+            let mut label = view.label.clone();
+            label.image.cropped = Some(false);
+            change(&mut label.camera);
+            misfit(&label).unwrap().to_string()
+        };
+        for (stated, fixed) in [(2.0 * focal_px, false), (0.5 * focal_px, true)] {
+            let told = told(&|camera| {
+                (camera.focal_px, camera.focal_fixed) = (Some(stated), fixed);
+            });
+            let named = format!("camera.focal_px: {stated} px, expected the ");
+            assert!(told.contains(&named), "{told}");
+        }
+        let told_of_place = told(&|camera| camera.principal_point_px = Some([0.5, middle]));
+        let named = "camera.principal_point_px[0]: 0.5 px, expected the ";
+        assert!(told_of_place.contains(named), "{told_of_place}");
+        let told_of_lens = told(&|camera| camera.k1 = Some(1e6));
+        let named = "camera.k1: 1000000, expected the ";
+        assert!(told_of_lens.contains(named), "{told_of_lens}");
+    }
+
     /// A whole picture through a lens of about 1480 px.
     fn label_of_1480_px() -> Label {
         let corners = [
@@ -538,7 +650,7 @@ mod tests {
         let mut label = label_of_1480_px();
         label.camera.focal_35mm = Some(20.0);
         let (focal_px, said) = focal_conflict(&label);
-        let told = format!("the corners give {focal_px:.0} px, EXIF data 740 px");
+        let told = format!("the corners give {focal_px:.0} px, the 35 mm equivalent 740 px");
         assert!(said.contains(&told), "{said}");
     }
 

@@ -1,5 +1,6 @@
 //! Labels in COCO format: one JSON document for each part of the dataset.
 
+use crate::dataset::comparison::Comparison;
 use crate::dataset::formats::is_exact;
 use crate::dataset::paths::{create_part_folders, remove_files};
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
@@ -10,7 +11,8 @@ use crate::label::{ObjectLabel, RleMask, trace};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::collections::BTreeSet;
-use std::io::Write;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
 /// Numbers reserved for the annotations of one image. Ids are computed from the number of the image
@@ -155,8 +157,20 @@ impl Writer for Coco {
         Part::ALL.iter().try_for_each(|&part| {
             let path = folder.join(document(part));
             let shares = samples.iter().filter(|sample| sample.part == part);
-            io::write_through(&path, |out| join(out, folder, classes, shares))
+            io::write_through(&path, |out| {
+                write_info(out)?;
+                join(out, folder, classes, shares)
+            })
         })
+    }
+
+    fn changed(&self, folder: &Path, classes: &[String], samples: &[Written]) -> Vec<PathBuf> {
+        let is_changed = |part: &Part| {
+            let shares = samples.iter().filter(|sample| sample.part == *part);
+            !is_joined(folder, *part, classes, shares)
+        };
+        let changed = Part::ALL.into_iter().filter(is_changed);
+        changed.map(document).collect()
     }
 }
 
@@ -261,16 +275,36 @@ fn instance_id(entry: &Entry<'_>, object: u32) -> Result<Option<u64>> {
         .transpose()
 }
 
-/// Writes the document of a part, one image or annotation a line; holds one image's share in memory
-/// at a time.
+/// Whether the document of a part holds the shares of these samples, whichever petcomp wrote it.
+fn is_joined<'a>(
+    folder: &Path,
+    part: Part,
+    classes: &[String],
+    samples: impl Iterator<Item = &'a Written>,
+) -> bool {
+    let Ok(file) = File::open(folder.join(document(part))) else {
+        return false;
+    };
+    let mut file = BufReader::new(file);
+    let has_info = file.skip_until(b'\n').is_ok();
+    let mut rest = Comparison::new(file);
+    has_info && join(&mut rest, folder, classes, samples).is_ok() && rest.is_at_end()
+}
+
+/// Writes the first line of a document.
+fn write_info(out: &mut dyn Write) -> std::io::Result<()> {
+    let version = env!("CARGO_PKG_VERSION");
+    writeln!(out, "{{\"info\":{{\"description\":\"petcomp {version}\"}},")
+}
+
+/// Writes the rest of the document of a part, one image or annotation a line; holds one image's
+/// share in memory at a time.
 fn join<'a>(
     out: &mut dyn Write,
     folder: &Path,
     classes: &[String],
     samples: impl Iterator<Item = &'a Written>,
 ) -> std::io::Result<()> {
-    let version = env!("CARGO_PKG_VERSION");
-    writeln!(out, "{{\"info\":{{\"description\":\"petcomp {version}\"}},")?;
     writeln!(out, "\"categories\":{},", categories(classes))?;
     let mut images = Vec::new();
     write!(out, "\"annotations\":[")?;

@@ -212,7 +212,7 @@ fn merged_plan(document: &Value, count: u64, folder: &Path) -> Result<Plan> {
 }
 
 /// The writers that wrote with these settings.
-fn writers_of(settings: Vec<Map<String, Value>>) -> Result<Vec<Arc<dyn Writer>>> {
+pub(super) fn writers_of(settings: Vec<Map<String, Value>>) -> Result<Vec<Arc<dyn Writer>>> {
     let pictures = pictures_of(&settings)?;
     let named = settings.into_iter().flatten();
     named

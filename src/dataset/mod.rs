@@ -22,6 +22,7 @@ mod archives;
 mod background_photo;
 mod check;
 mod coco;
+mod comparison;
 mod config;
 mod contact_sheet;
 mod counts;
@@ -349,5 +350,12 @@ pub trait Writer: Send + Sync {
     fn finish(&self, folder: &Path, classes: &[String], samples: &[Written]) -> Result<()> {
         let _ = (folder, classes, samples);
         Ok(())
+    }
+
+    /// The files below the folder that are missing or not as [`finish`](Self::finish) writes them.
+    /// By default there are none.
+    fn changed(&self, folder: &Path, classes: &[String], samples: &[Written]) -> Vec<PathBuf> {
+        let _ = (folder, classes, samples);
+        Vec::new()
     }
 }

@@ -8,7 +8,6 @@ use crate::scene::Belt;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Writes `mot/{train,val}/SSSSSS/`, a folder for each sequence of a belt: `gt/gt.txt`,
@@ -92,11 +91,36 @@ impl Writer for Mot {
             let own = samples.iter().filter(|sample| sample.part == part);
             let sequences = sequences(folder, own)?;
             sequences.iter().try_for_each(|(number, frames)| {
-                let name = format!("{number:06}");
-                let place = folder.join(KIND).join(part.name()).join(&name);
-                self.write_sequence(&place, &name, frames)
+                self.write_sequence(&folder.join(place_of(part, *number)), *number, frames)
             })
         })
+    }
+
+    /// Pictures are compared in `images/`.
+    fn changed(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Vec<PathBuf> {
+        let mut changed = Vec::new();
+        for part in Part::ALL {
+            let own = samples.iter().filter(|sample| sample.part == part);
+            let Ok(sequences) = sequences(folder, own) else {
+                changed.push(Path::new(KIND).join(part.name()));
+                continue;
+            };
+            for (number, frames) in sequences {
+                let place = place_of(part, number);
+                let texts = [
+                    (TRACKS, tracks(&frames)),
+                    (INFO, self.info(number, &frames)),
+                ];
+                let other = texts
+                    .into_iter()
+                    .map(|(name, text)| (place.join(name), text))
+                    .filter(|(path, text)| {
+                        io::read_text(folder.join(path)).ok().as_ref() != Some(text)
+                    });
+                changed.extend(other.map(|(path, _)| path));
+            }
+        }
+        changed
     }
 }
 
@@ -134,33 +158,41 @@ impl Mot {
         })
     }
 
-    fn write_sequence(&self, place: &Path, name: &str, frames: &[SequenceFrame]) -> Result<()> {
+    fn write_sequence(&self, place: &Path, number: u64, frames: &[SequenceFrame]) -> Result<()> {
         let pictures = place.join("img1");
         io::create_folder(place.join("gt"))?;
         io::create_folder(&pictures)?;
-        let mut text = String::new();
         for SequenceFrame { share, image } in frames {
-            for line in &share.lines {
-                let _ = writeln!(text, "{line}");
-            }
             let shown = format!("{:06}.{}", share.belt.frame + 1, self.pictures.extension());
             link(image, &pictures.join(shown))?;
         }
-        io::write_text(place.join(TRACKS), &text)?;
-        io::write_text(place.join(INFO), &self.info(name, frames))
+        io::write_text(place.join(TRACKS), &tracks(frames))?;
+        io::write_text(place.join(INFO), &self.info(number, frames))
     }
 
-    fn info(&self, name: &str, frames: &[SequenceFrame]) -> String {
+    fn info(&self, number: u64, frames: &[SequenceFrame]) -> String {
         let length = frames.len();
         let last = frames.last().map(|frame| &frame.share);
         let [width, height] = last.map_or([0; 2], |share| share.image);
         let rate = last.map_or(0.0, |share| share.belt.frame_rate);
         format!(
-            "[Sequence]\nname={name}\nimDir=img1\nframeRate={rate}\nseqLength={length}\nimWidth={width}\n\
+            "[Sequence]\nname={number:06}\nimDir=img1\nframeRate={rate}\nseqLength={length}\nimWidth={width}\n\
              imHeight={height}\nimExt=.{}\n",
             self.pictures.extension()
         )
     }
+}
+
+/// The folder of a sequence.
+fn place_of(part: Part, number: u64) -> PathBuf {
+    let parts = Path::new(KIND).join(part.name());
+    parts.join(format!("{number:06}"))
+}
+
+/// The lines of `gt.txt`.
+fn tracks(frames: &[SequenceFrame]) -> String {
+    let lines = frames.iter().flat_map(|frame| &frame.share.lines);
+    lines.map(|line| format!("{line}\n")).collect()
 }
 
 /// Deletes the tracks of a part's sequences; their pictures stay, and so do files that others put

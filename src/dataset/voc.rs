@@ -66,6 +66,15 @@ impl Writer for Voc {
             io::write_text(folder.join(list(part)), &numbers_of(part, samples))
         })
     }
+
+    fn changed(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Vec<PathBuf> {
+        let is_changed = |part: &Part| {
+            let found = io::read_text(folder.join(list(*part)));
+            found.ok() != Some(numbers_of(*part, samples))
+        };
+        let changed = Part::ALL.into_iter().filter(is_changed);
+        changed.map(list).collect()
+    }
 }
 
 impl Voc {

@@ -4,7 +4,7 @@ use crate::dataset::{Entry, Part, Writer, Written};
 use crate::error::{Error, Result};
 use crate::io;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -63,6 +63,19 @@ impl Writer for WebDataset {
         Part::ALL
             .into_iter()
             .try_for_each(|part| self.write_archives(folder, part, samples))
+    }
+
+    /// Archives hold no checksums of their files' content.
+    fn changed(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Vec<PathBuf> {
+        let mut counts = BTreeMap::new();
+        for sample in samples {
+            let path = archive(Path::new(""), sample.part, self.number_of(sample));
+            *counts.entry(path).or_default() += 1;
+        }
+        let changed = counts
+            .into_iter()
+            .filter(|(path, samples)| !is_whole(&folder.join(path), *samples));
+        changed.map(|(path, _)| path).collect()
     }
 }
 

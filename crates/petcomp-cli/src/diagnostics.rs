@@ -5,7 +5,10 @@ use std::fmt::Display;
 
 /// Logs what a stage noticed about a file: `FILE: message [code]`, each at the level of its
 /// severity.
-pub(crate) fn report_diagnostics(file: impl Display, diagnostics: &[Diagnostic]) {
+pub(crate) fn report_diagnostics<'a>(
+    file: impl Display,
+    diagnostics: impl IntoIterator<Item = &'a Diagnostic>,
+) {
     for diagnostic in diagnostics {
         log::log!(
             level_of(diagnostic.severity),

@@ -53,7 +53,7 @@ impl Checked {
     /// Widths or heights of the boxes of a class, percent of the image, ascending.
     fn sides_of(&self, class: usize, side: usize) -> Vec<f64> {
         let boxes = self.boxes.iter().filter(|b| b.class == class);
-        let sides = boxes.filter_map(|b| b.sides);
+        let sides = boxes.map(|b| b.sides);
         let mut sides: Vec<f64> = sides.map(|sides| 100.0 * sides[side]).collect();
         sides.sort_by(f64::total_cmp);
         sides
@@ -91,7 +91,7 @@ impl Checked {
     }
 
     fn tiny_boxes(&self) -> Option<Diagnostic> {
-        let sides = self.boxes.iter().filter_map(|b| b.sides);
+        let sides = self.boxes.iter().map(|b| b.sides);
         let tiny = sides.filter(|sides| sides.iter().any(|side| *side < TINY_SIDE_SHARE));
         let (count, percent) = (tiny.count(), 100.0 * TINY_SIDE_SHARE);
         let message = format!("{count} boxes have a side below {percent:.0} % of the image's");

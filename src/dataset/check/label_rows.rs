@@ -6,8 +6,8 @@ use crate::eval::KnownRows;
 use crate::io;
 use std::path::Path;
 
-/// Class of a row, and the sides of its box; none for an outline.
-pub(super) type LabelRow = (usize, Option<[f64; 2]>);
+/// Class of a row, and the sides of its box or of that around its outline.
+pub(super) type LabelRow = (usize, [f64; 2]);
 
 /// As in trainers, a row with more columns means that the rows of its file are outlines.
 const MAX_BOX_COLUMNS: usize = 6;
@@ -67,9 +67,10 @@ impl RowFormat {
         let values: Vec<f64> = values.collect::<Result<_, _>>()?;
         self.check_class(row[0])?;
         check_shares(row, &values)?;
-        if !self.outlines && (values[3] <= 0.0 || values[4] <= 0.0) {
-            let (w, h) = (row[3], row[4]);
-            return Err(format!("a box of {w} x {h}, expected sides above 0"));
+        let [w, h] = self.sides(&values);
+        if w <= 0.0 || h <= 0.0 {
+            let what = if self.outlines { "an outline" } else { "a box" };
+            return Err(format!("{what} of {w} x {h}, expected sides above 0"));
         }
         Ok(values)
     }
@@ -112,8 +113,21 @@ impl RowFormat {
     }
 
     fn label(&self, values: &[f64]) -> LabelRow {
-        let sides = (!self.outlines).then(|| [values[3], values[4]]);
-        (values[0] as usize, sides)
+        (values[0] as usize, self.sides(values))
+    }
+
+    /// Width and height of a row's box: trainers take that around an outline.
+    fn sides(&self, values: &[f64]) -> [f64; 2] {
+        if !self.outlines {
+            return [values[3], values[4]];
+        }
+        [1, 2].map(|first| {
+            let places = values.iter().skip(first).step_by(2);
+            let [low, high] = places.fold([1.0, 0.0], |[low, high], &place| {
+                [place.min(low), place.max(high)]
+            });
+            high - low
+        })
     }
 }
 

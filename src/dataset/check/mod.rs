@@ -11,10 +11,11 @@ use crate::dataset::folder::{self, JOURNAL};
 use crate::dataset::journal::{NumberedLines, numbered_lines};
 use crate::dataset::journal_line::JournalLine;
 use crate::dataset::listing::{images_in, is_list, place_of, whole_path};
+use crate::dataset::merge::writers_of;
 use crate::dataset::near_duplicates::{Look, NEAR_DUPLICATE_RMS, nearest};
 use crate::dataset::paths::folder_of;
 use crate::dataset::yolo_yaml::DataYaml;
-use crate::dataset::{Part, YoloSet};
+use crate::dataset::{Part, Written, YoloSet};
 use crate::diagnostic::Code;
 use crate::error::{Error, Result};
 use crate::eval::is_class_list;
@@ -50,8 +51,8 @@ pub struct CheckedBox {
     pub part: Part,
     /// Its class.
     pub class: usize,
-    /// Width and height as shares of the image's; none for an outline.
-    pub sides: Option<[f64; 2]>,
+    /// Width and height as shares of the image's.
+    pub sides: [f64; 2],
 }
 
 /// Checks a YOLO dataset as YOLOv5 and Ultralytics do when they load it, and more strictly where
@@ -70,9 +71,10 @@ pub struct CheckedBox {
 ///   below `nc`, shares in 0..1, sides above 0, and no duplicate in the same file;
 /// * if sidecar files have the objects' poses, something supports each object
 ///   ([`hanging`](crate::settle::hanging));
-/// * if there is a journal, the files in it have the recorded sizes and checksums, and it
-///   lists every image. In a dataset that petcomp made without YOLO labels, only these and the
-///   sidecar files are checked.
+/// * if there is a journal, the files in it have the recorded sizes and checksums, it lists every
+///   image, and the files that are joined from them (COCO, Pascal VOC, MOT, archives) are there and
+///   hold what they are joined from; of archives only the samples are counted. In a dataset that
+///   petcomp made without YOLO labels, only these and the sidecar files are checked.
 ///
 /// # Errors
 /// If `folder` is not a folder that can be listed, or is a dataset of archives only, which has no
@@ -336,7 +338,27 @@ impl Checker<'_> {
             Err(e) => return self.add_unreadable(JOURNAL, &e),
         };
         self.find_changed_files(&lines);
+        self.find_changed_joined_files(&lines);
         self.find_unlisted_images(images, &lines);
+    }
+
+    /// A shard has no files of many samples.
+    fn find_changed_joined_files(&mut self, lines: &[(usize, JournalLine)]) {
+        let identity = folder::identity(self.folder).ok().flatten();
+        let Some(identity) = identity.filter(|identity| identity.get("shard").is_none()) else {
+            return;
+        };
+        let classes: Vec<String> = folder::field(&identity, "classes").unwrap_or_default();
+        // Those of other programs are not known.
+        let writers = folder::field(&identity, "writers").and_then(writers_of);
+        let mut samples: Vec<Written> = lines.iter().map(|(_, line)| line.written()).collect();
+        samples.sort_by_key(|sample| sample.k);
+        for writer in writers.unwrap_or_default() {
+            for path in writer.changed(self.folder, &classes, &samples) {
+                let message = "missing, or differs from the images' own labels; `petcomp dataset generate` writes it";
+                self.add(&path, Code::ChangedFile, message);
+            }
+        }
     }
 
     fn find_unlisted_images(&mut self, images: &[CheckedImage], lines: &[(usize, JournalLine)]) {

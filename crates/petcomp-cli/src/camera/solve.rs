@@ -8,7 +8,7 @@ use crate::print;
 use crate::values::parse_metres;
 use petcomp::camera::{self, Camera, CameraFile, Label, LabelledPhoto};
 use petcomp::camera::{Solution, SolveError, SolveOptions};
-use petcomp::{Error, Image, LinearRgb, io};
+use petcomp::{Code, Diagnostic, Error, Image, LinearRgb, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -204,12 +204,20 @@ pub(super) fn accepted(
         return Ok(solution);
     }
     if let Some(error) = solution.misfit() {
+        report_diagnostics(labelled, causes_of_misfit(&solution));
         return Err(needs_force(&labelled.source, error.into()));
     }
     // Pictures may show only the middle of the photo.
     camera::check_lens(&solution.camera, solution.k1())
         .map_err(|e| needs_force(&labelled.source, e))?;
     Ok(solution)
+}
+
+/// The warnings that do not merely repeat that no camera fits.
+fn causes_of_misfit(solution: &Solution) -> impl Iterator<Item = &Diagnostic> {
+    let repeated = [Code::PoorFit, Code::SidesSwapped];
+    let warnings = solution.warnings.iter();
+    warnings.filter(move |warning| !repeated.contains(&warning.code))
 }
 
 fn needs_force(label: &Path, why: Error) -> Error {
