@@ -44,13 +44,15 @@ fn solve_camera(label: &Label, plate: &str) -> Result<Camera> {
 }
 
 /// What a label and what a scene call the same.
-const SCENE_NAMES: [[&str; 2]; 6] = [
+const SCENE_NAMES: [[&str; 2]; 8] = [
     ["surface.corners_px", "camera.rectangle.corners_px"],
     [
         "swap width_m and height_m",
         "swap the sides in surface.size",
     ],
     [" too small a corner_sigma_px,", ""],
+    [" (3 times corner_sigma_px)", ""],
+    [" (4 times corner_sigma_px)", ""],
     ["without EXIF data or ", "without "],
     ["camera.focal_px", "camera.rectangle.focal_px"],
     ["camera.k1", "lens.k1"],

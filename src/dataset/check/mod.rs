@@ -349,7 +349,7 @@ impl Checker<'_> {
             return;
         };
         let classes: Vec<String> = folder::field(&identity, "classes").unwrap_or_default();
-        // Those of other programs are not known.
+        // The layouts of other programs are not known.
         let writers = folder::field(&identity, "writers").and_then(writers_of);
         let mut samples: Vec<Written> = lines.iter().map(|(_, line)| line.written()).collect();
         samples.sort_by_key(|sample| sample.k);
