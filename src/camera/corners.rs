@@ -8,9 +8,9 @@ use crate::geom::{Point2, Vector2, mean_point};
 /// Corners closer than this many pixels are one corner; also closer than [`COINCIDENT_SIGMAS`]
 /// times their noise.
 pub(super) const COINCIDENT_PX: f64 = 2.0;
-pub(super) const COINCIDENT_SIGMAS: f64 = 4.0;
+const COINCIDENT_SIGMAS: f64 = 4.0;
 /// A corner nearer than this many sigmas to the line of two others makes a triangle.
-pub(super) const COLLINEAR_SIGMAS: f64 = 3.0;
+const COLLINEAR_SIGMAS: f64 = 3.0;
 /// Below this length of the longest side corner noise is a large part of the picture.
 const SMALL_QUAD_PX: f64 = 50.0;
 
@@ -56,7 +56,12 @@ pub(crate) fn triangle_areas(c: &[Vector2<f64>; 4]) -> [f64; 4] {
 const OTHER_CORNERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
 
 fn refuse_coincident(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError> {
-    let limit_px = COINCIDENT_PX.max(COINCIDENT_SIGMAS * sigma);
+    let of_noise_px = COINCIDENT_SIGMAS * sigma;
+    let (limit_px, sigmas) = if of_noise_px > COINCIDENT_PX {
+        (of_noise_px, COINCIDENT_SIGMAS)
+    } else {
+        (COINCIDENT_PX, 0.0)
+    };
     for [first, second] in CORNER_PAIRS {
         let distance_px = (c[first] - c[second]).norm();
         if distance_px < limit_px {
@@ -65,6 +70,7 @@ fn refuse_coincident(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError>
                 second,
                 distance_px,
                 limit_px,
+                sigmas,
             });
         }
     }
@@ -115,6 +121,7 @@ fn refuse_folded(c: &[Point2<f64>; 4], order: [usize; 4], sigma: f64) -> Result<
                 corner: order[(left_out + 2) % 4],
                 distance_px: height_px.abs(),
                 limit_px,
+                sigmas: COLLINEAR_SIGMAS,
             });
         }
     }

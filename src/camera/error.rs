@@ -1,6 +1,5 @@
 //! Why no camera could be found.
 
-use super::corners::{COINCIDENT_PX, COINCIDENT_SIGMAS, COLLINEAR_SIGMAS};
 use crate::diagnostic::Diagnostic;
 use crate::error::Error;
 
@@ -80,7 +79,7 @@ pub enum SolveError {
     /// Two corners coincide.
     #[error(
         "surface.corners_px: the {} and the {} corner are {distance_px:.1} px apart, expected at least {limit_px:.1}{}",
-        corner_name(*.first), corner_name(*.second), reason_for_distance(*.limit_px)
+        corner_name(*.first), corner_name(*.second), reason_for_limit(*.sigmas)
     )]
     Coincident {
         /// One of them, from 0.
@@ -91,15 +90,16 @@ pub enum SolveError {
         distance_px: f64,
         /// The least distance.
         limit_px: f64,
+        /// How many `corner_sigma_px` that is; 0 if it does not depend on them.
+        sigmas: f64,
     },
     /// One corner lies inside the triangle of the others.
     #[error("surface.corners_px: not convex (one corner lies inside the triangle of the others)")]
     NotConvex,
     /// Three corners are on one line, within noise.
     #[error(
-        "surface.corners_px: the {} corner is {distance_px:.1} px from the line of two others, expected at least {limit_px:.1} \
-         ({} times corner_sigma_px)",
-        corner_name(*.corner), COLLINEAR_SIGMAS
+        "surface.corners_px: the {} corner is {distance_px:.1} px from the line of two others, expected at least {limit_px:.1}{}",
+        corner_name(*.corner), reason_for_limit(*.sigmas)
     )]
     Collinear {
         /// The corner as labelled, from 0.
@@ -108,6 +108,8 @@ pub enum SolveError {
         distance_px: f64,
         /// The least distance.
         limit_px: f64,
+        /// How many `corner_sigma_px` that is; 0 if it does not depend on them.
+        sigmas: f64,
     },
     /// The corners are in another order than required
     /// ([`CornerOrder::Strict`](super::CornerOrder::Strict)).
@@ -226,10 +228,9 @@ pub(crate) fn corner_name(corner: usize) -> &'static str {
 pub(crate) const MISFIT_CAUSES: &str = "wrong dimensions, corners of different rectangles, strong distortion, a cropped \
     picture, too small a corner_sigma_px, or an uncommon lens without EXIF data or camera.focal_px";
 
-/// Where the least distance of two corners comes from, if from their noise.
-fn reason_for_distance(limit_px: f64) -> String {
-    match limit_px > COINCIDENT_PX {
-        true => format!(" ({COINCIDENT_SIGMAS} times corner_sigma_px)"),
+fn reason_for_limit(sigmas: f64) -> String {
+    match sigmas > 0.0 {
+        true => format!(" ({sigmas} times corner_sigma_px)"),
         false => String::new(),
     }
 }

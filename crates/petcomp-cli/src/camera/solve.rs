@@ -213,11 +213,16 @@ pub(super) fn accepted(
     Ok(solution)
 }
 
-/// The warnings that do not merely repeat that no camera fits.
+/// The warnings that do not repeat that no camera fits, and are not about the camera found.
 fn causes_of_misfit(solution: &Solution) -> impl Iterator<Item = &Diagnostic> {
-    let repeated = [Code::PoorFit, Code::SidesSwapped];
+    let others = [
+        Code::PoorFit,
+        Code::SidesSwapped,
+        Code::PoseAmbiguous,
+        Code::HeightUncertain,
+    ];
     let warnings = solution.warnings.iter();
-    warnings.filter(move |warning| !repeated.contains(&warning.code))
+    warnings.filter(move |warning| !others.contains(&warning.code))
 }
 
 fn needs_force(label: &Path, why: Error) -> Error {
