@@ -41,7 +41,6 @@ MOST_DETECTIONS = 100
 
 def main(path):
     training = json.loads(path.read_text())
-    torch.set_num_threads(training["threads"])
     torch.backends.cudnn.benchmark = True
     cv2.setNumThreads(1)
     began = time.process_time()
@@ -202,6 +201,8 @@ def trainer(training, folder):
 
     class Trainer(balanced.WeightedLoss, DetectionTrainer):
         def get_model(self, cfg=None, weights=None, verbose=True):
+            # Ultralytics, which leaves one processor idle, has just set it.
+            torch.set_num_threads(training["threads"])
             model = Model(cfg, nc=self.data["nc"], ch=self.data["channels"], verbose=False)
             if weights:
                 model.load(weights)
