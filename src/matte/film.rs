@@ -335,34 +335,37 @@ impl<'a> FilmSolution<'a> {
         let clipped = bright::fill_glints(factors, object);
         claimed::make_opaque(factors, object.claims);
         watch.lap("glints");
-        let paint = self.see_through_paint(factors, samples, flat.into());
+        let light = self.see_through_light(factors, flat.into());
+        let paint = paint::see_through(&light, samples, object);
+        // Paint lets nothing through.
+        let tint = match self.options.flat.is_none() && paint::is_matt(&light, object) {
+            true => uncertainty.max(most),
+            false => uncertainty,
+        };
         watch.lap("see-through paint");
         ColorUncertainty {
             keyed_away,
             screen_hue,
             clipped,
             guessed,
-            tint: uncertainty,
+            tint,
             paint,
         }
     }
 
-    /// The share of the object that is as bright as paint and was left see-through. On a grey
-    /// screen all that is see-through is guessed, and said to be.
-    fn see_through_paint(
-        &self,
-        factors: &Image<Factor>,
-        samples: &TintSamples,
-        flat: LinearRgb,
-    ) -> f32 {
+    /// Light that see-through pixels reflect, 0 elsewhere. None counts where a person says that it
+    /// is see-through, or on a grey screen: all that is see-through is guessed there, and said to
+    /// be.
+    fn see_through_light(&self, factors: &Image<Factor>, flat: LinearRgb) -> Image<f32> {
         if !self.is_keyable {
-            return 0.0;
+            return factors.map(|_| 0.0);
         }
         let plate = &self.object.plate.image;
-        let reflected = factors.zip3_map(&self.calm, plate, |f, p, k| {
+        let mut reflected = factors.zip3_map(&self.calm, plate, |f, p, k| {
             paint::reflected(p, k, f.transmittance(flat), self.key)
         });
-        paint::see_through(reflected, samples, self.object)
+        claimed::clear_paint(&mut reflected, self.object.claims);
+        reflected
     }
 
     /// What a transmittance leaves of the photo's light.

@@ -135,7 +135,8 @@ struct CaptureArgs {
 #[derive(clap::Args)]
 #[group(required = true, multiple = false)]
 struct ScaleArgs {
-    /// Length of the object's longest side, metres, 0.005 to 5, measured with a tape
+    /// Longer side of the smallest rectangle around the object, metres, 0.005 to 5, measured with a
+    /// tape
     #[arg(long, value_name = "METRES")]
     length: Option<f64>,
     /// Or: width and height of the object, metres

@@ -1,13 +1,15 @@
-//! Paint that was left see-through: what reflects more than plastic does and yet passes light.
+//! Paint that was left see-through: what reflects more than plastic, or alike everywhere, and yet
+//! passes light.
 
-use super::object::{interior, share, side_px};
-use super::tint::{MAX_SCATTERED, TintSamples};
+use super::FilmInput;
+use super::object::{area, interior, share, side_px};
+use super::tint::{MAX_SCATTERED, TintSamples, thinned};
 use super::uncertainty::{ColorUncertainty, OPAQUE_TRANSMITTANCE};
-use super::{FilmInput, claimed};
 use crate::filter;
 use crate::image::{Image, Mask};
 use crate::matte::screen::other_channels;
 use crate::pixel::{Coverage, LinearRgb};
+use crate::quantile::quantile;
 
 /// Reflected light over the screen's from which on an area is as bright as paint.
 const PAINT_REFLECTION: f32 = 0.66;
@@ -16,6 +18,14 @@ const PAINT_REFLECTION: f32 = 0.66;
 const GLINT_RADIUS: f64 = 0.015;
 /// The same in small pictures, pixels.
 const MIN_GLINT_RADIUS_PX: f64 = 1.0;
+/// What of the see-through pixels reflects least and most, without outliers.
+const REFLECTION_QUANTILES: [f64; 2] = [0.05, 0.95];
+/// Difference between the two, over the screen's light, from which on something glints. Of 24
+/// rendered bottles on two screens it is 0.36 and more, of matt paint 0.07 at most where it varies
+/// by 30 %, 0.13 where by 50 %.
+const MIN_GLINTS: f32 = 0.15;
+/// Pixels that are compared.
+const REFLECTION_SAMPLES: usize = 20_000;
 
 /// Light that a pixel of this transmittance reflects, in the channels that the screen has little
 /// of; 0 where it is opaque.
@@ -29,18 +39,16 @@ pub(super) fn reflected(pixel: LinearRgb, screen: LinearRgb, t: LinearRgb, key: 
 }
 
 /// The share of the object that is an area as bright as paint, 0 where it is no more than glints
-/// have; all of it where the pixels that show the plastic reflect more than it scatters. What a
-/// person says is see-through counts nowhere.
+/// have; all of it where the pixels that show the plastic reflect more than it scatters.
 ///
 /// `reflected` is what [`reflected`] gives of each pixel.
 pub(super) fn see_through(
-    mut reflected: Image<f32>,
+    reflected: &Image<f32>,
     samples: &TintSamples,
     object: FilmInput<'_>,
 ) -> f32 {
-    claimed::clear_paint(&mut reflected, object.claims);
     let screen = object.screen.max_channel();
-    if samples.median_of(&reflected) > MAX_SCATTERED * screen {
+    if samples.median_of(reflected) > MAX_SCATTERED * screen {
         return 1.0;
     }
     let painted = reflected.map(|r| r > PAINT_REFLECTION * screen);
@@ -55,6 +63,24 @@ pub(super) fn see_through(
         true => share,
         false => 0.0,
     }
+}
+
+/// Whether what is see-through reflects alike everywhere: plastic glints, but paint of the screen's
+/// hue, which looks as see-through, may be matt.
+pub(super) fn is_matt(reflected: &Image<f32>, object: FilmInput<'_>) -> bool {
+    let interior = interior(object.inside, object.longer_side);
+    let pixels = reflected.pixels().iter().zip(interior.pixels());
+    // 0 is opaque.
+    let seen = pixels.filter(|(light, inner)| **inner && **light != 0.0);
+    let light: Vec<f32> = seen.map(|(light, _)| *light).collect();
+    let least_seen = f64::from(ColorUncertainty::NEEDS_REVIEW.paint) * area(object.inside);
+    if (light.len() as f64) <= least_seen {
+        return false;
+    }
+    let light: Vec<f32> = thinned(light, REFLECTION_SAMPLES).collect();
+    let [least, most] = REFLECTION_QUANTILES
+        .map(|share| quantile(light.clone(), share, f32::total_cmp).unwrap_or_default());
+    most - least < MIN_GLINTS * object.screen.max_channel()
 }
 
 /// The mask opened by the radius of glints.

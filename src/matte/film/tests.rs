@@ -414,6 +414,27 @@ fn paint_that_is_left_see_through_is_told() {
     assert!(is_warned(&half, Code::TintUncertain));
 }
 
+/// What is the screen in some shade, or a little beside it, looks as plastic does, but for its
+/// glints.
+#[test]
+fn matt_paint_of_the_screens_hue_is_told() {
+    let shades = [0.2, 0.35, 0.5, 0.65];
+    let of_screen = |screen: LinearRgb| shades.map(|shade| (screen.scale(shade), screen));
+    let beside = [[0.03, 0.22, 0.055], [0.025, 0.2, 0.08], [0.02, 0.17, 0.1]];
+    let beside = beside.map(|paint| (paint.into(), GREEN));
+    let all = [of_screen(GREEN), of_screen(BLUE)].concat();
+    for (paint, screen) in all.into_iter().chain(beside) {
+        // Mottled.
+        let found = solved_columns(screen, |x| paint.scale(0.9 + 0.02 * (x % 11) as f32));
+        let sure = found.color_uncertainty.confidence();
+        assert!(
+            is_warned(&found, Code::TintUncertain) && sure < 0.2,
+            "{paint:?} on {screen:?}: {sure} {:?}",
+            found.diagnostics
+        );
+    }
+}
+
 #[test]
 fn glints_on_clear_plastic_are_no_paint() {
     let plastic = GREEN.scale(CLEAR_TRANSMITTANCE) + LinearRgb::grey(0.015);

@@ -271,7 +271,7 @@ fn darkest(mut pixels: Vec<ScreenPair>, key: usize, share: f64) -> Vec<ScreenPai
 }
 
 /// Items at equal steps, about `count` of them.
-fn thinned<T>(items: Vec<T>, count: usize) -> impl Iterator<Item = T> {
+pub(super) fn thinned<T>(items: Vec<T>, count: usize) -> impl Iterator<Item = T> {
     let step = (items.len() / count).max(1);
     items.into_iter().step_by(step)
 }
