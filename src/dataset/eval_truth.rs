@@ -134,28 +134,51 @@ impl EvalTruth {
     }
 
     /// Adds the pictures to a report's options, and the names of the classes if they have none.
-    pub fn describe(&self, options: &mut EvalReportOptions) {
+    ///
+    /// # Errors
+    /// [`Error::Value`] for more or fewer names of classes than the truth has.
+    pub fn describe(&self, options: &mut EvalReportOptions) -> Result<()> {
         options.pictures.clone_from(&self.pictures);
-        if options.classes.is_empty() {
-            options.classes = self.class_names();
+        if !options.classes.is_empty() {
+            return check_names(&options.classes, self.known_names());
+        }
+        options.classes = self.class_names();
+        Ok(())
+    }
+
+    /// The names of the classes that a `data.yaml` or a COCO document lists.
+    fn known_names(&self) -> &[String] {
+        match &self.boxes {
+            Boxes::Coco(truth) => &truth.classes,
+            Boxes::Yolo { names, .. } => names.as_deref().unwrap_or_default(),
         }
     }
 
     /// Empty if they are not known.
     fn class_names(&self) -> Vec<String> {
-        match &self.boxes {
-            Boxes::Coco(truth) => truth.classes.clone(),
-            Boxes::Yolo {
-                names: Ok(names), ..
-            } => names.clone(),
-            Boxes::Yolo {
-                names: Err(error), ..
-            } => {
-                log::warn!("{error}; classes are shown by number");
-                Vec::new()
-            }
+        if let Boxes::Yolo {
+            names: Err(error), ..
+        } = &self.boxes
+        {
+            log::warn!("{error}; classes are shown by number");
         }
+        self.known_names().to_vec()
     }
+}
+
+/// There must be a name for each class whose name is known.
+fn check_names(given: &[String], known: &[String]) -> Result<()> {
+    if known.is_empty() || given.len() == known.len() {
+        return Ok(());
+    }
+    let what = format!(
+        "{} ({}), expected a name for each of the truth's {}: {}",
+        given.len(),
+        given.join(", "),
+        known.len(),
+        known.join(", ")
+    );
+    Err(Error::value("classes", what))
 }
 
 /// Whether a folder has a `data.yaml` and no labels: it selects images from elsewhere.
@@ -248,12 +271,30 @@ mod tests {
             });
             assert_eq!(Vec::from_iter(counts), [("a", [1, 1]), ("b", [0, 0])]);
             let mut options = EvalReportOptions::default();
-            truth.describe(&mut options);
+            truth.describe(&mut options).unwrap();
             assert_eq!(
                 (options.classes, options.pictures.len()),
                 (vec!["cap".into()], 2)
             );
         }
+    }
+
+    #[test]
+    fn each_class_has_one_name() {
+        let root = set_and_choice();
+        let truth = EvalTruth::read(&root.path().join("choice"), None, None).unwrap();
+        let named = |names: &[&str]| {
+            let mut options = EvalReportOptions {
+                classes: names.iter().copied().map(String::from).collect(),
+                ..Default::default()
+            };
+            truth.describe(&mut options).map(|()| options.classes)
+        };
+        assert_eq!(named(&["lid"]).unwrap(), ["lid"]);
+        assert_eq!(
+            named(&["lid", "label"]).unwrap_err().to_string(),
+            "classes: 2 (lid, label), expected a name for each of the truth's 1: cap"
+        );
     }
 
     #[test]

@@ -39,6 +39,7 @@ struct CocoCategory {
 
 #[derive(Deserialize)]
 struct CocoAnnotation {
+    id: Option<i64>,
     image_id: i64,
     category_id: i64,
     bbox: [f64; 4],
@@ -97,6 +98,7 @@ pub(crate) fn sheets_of(truth: &str, found: &str) -> Result<Vec<EvalImage>> {
 
 impl CocoTruth {
     fn new(document: &CocoDocument) -> Result<Self> {
+        document.check_annotation_ids()?;
         let mut truth = Self::without_annotations(document)?;
         for (i, annotation) in document.annotations.iter().enumerate() {
             truth
@@ -216,10 +218,11 @@ fn stored_size(path: &Path) -> Option<[f64; 2]> {
     Some([header.width as f64, header.height as f64])
 }
 
-/// Positions in the document by id, in order of the ids.
-fn places(list: &str, ids: impl Iterator<Item = i64>) -> Result<BTreeMap<i64, usize>> {
+/// Positions in the document by id, in order of the ids; not those without an id.
+fn places(list: &str, ids: impl Iterator<Item = Option<i64>>) -> Result<BTreeMap<i64, usize>> {
     let mut places = BTreeMap::new();
     for (i, id) in ids.enumerate() {
+        let Some(id) = id else { continue };
         if let Some(first) = places.insert(id, i) {
             return Err(repeated_id(list, i, id, first));
         }
@@ -359,11 +362,16 @@ impl CocoDetection {
 
 impl CocoDocument {
     fn image_places(&self) -> Result<BTreeMap<i64, usize>> {
-        places("images", self.images.iter().map(|image| image.id))
+        places("images", self.images.iter().map(|image| Some(image.id)))
     }
 
     fn category_places(&self) -> Result<BTreeMap<i64, usize>> {
-        places("categories", self.categories.iter().map(|c| c.id))
+        places("categories", self.categories.iter().map(|c| Some(c.id)))
+    }
+
+    /// pycocotools would count the last annotation of an id in place of all others with it.
+    fn check_annotation_ids(&self) -> Result<()> {
+        places("annotations", self.annotations.iter().map(|a| a.id)).map(drop)
     }
 
     fn images_at<'a>(&self, places: impl Iterator<Item = &'a usize>) -> Vec<&ImageRecord> {
@@ -451,6 +459,10 @@ mod tests {
             truth("\"id\": 3,", "\"id\": 7,"),
             "images[1].id: 7, the same as images[0], expected a unique id"
         );
+        assert_eq!(
+            truth("\"id\": 2,", "\"id\": 1,"),
+            "annotations[1].id: 1, the same as annotations[0], expected a unique id"
+        );
         assert!(
             truth("[1, 2, 3, 4]", "[1, 2, -3, 4]")
                 .starts_with("annotations[0].bbox: [1.0, 2.0, -3.0, 4.0], expected x")
@@ -461,6 +473,13 @@ mod tests {
             truth("\"iscrowd\": 1", "\"iscrowd\": 256")
                 .contains("expected an integer from 0 to 255")
         );
+    }
+
+    #[test]
+    fn annotations_need_no_ids() {
+        let text = TRUTH.replace("\"id\": 1, ", "").replace("\"id\": 2, ", "");
+        let truth = CocoTruth::new(&io::parse_json(&text).unwrap()).unwrap();
+        assert!(truth.sheets.iter().all(|sheet| sheet.truth.len() == 1));
     }
 
     #[test]

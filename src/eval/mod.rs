@@ -66,7 +66,7 @@ pub use tag::{Tags, read_tags};
 #[doc(hidden)]
 pub use yolo::{YoloTruth, read_yolo_truth_of};
 pub(crate) use yolo::{is_class_list, is_image, label_of, sheet_of as yolo_sheet};
-pub(crate) use yolo::{read_pose_truth, read_pose_truth_of};
+pub(crate) use yolo::{parse_class, read_pose_truth, read_pose_truth_of};
 pub use yolo::{read_yolo_detections, read_yolo_truth};
 #[doc(hidden)]
 pub use yolov5::yolov5;

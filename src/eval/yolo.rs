@@ -536,9 +536,12 @@ fn has_track_id(numbers: &[f64]) -> bool {
     }
 }
 
-fn parse_class(text: &str) -> Parsed<u32> {
-    text.parse()
-        .map_err(|_| format!("class \"{text}\", expected 0, 1, .."))
+/// An integer, also as `numpy.savetxt` writes one: `0.000000000000000000e+00`.
+pub(crate) fn parse_class(text: &str) -> Parsed<u32> {
+    let number = text.parse::<f64>().ok();
+    let is_class = |n: &f64| n.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(n);
+    let class = number.filter(is_class).map(|n| n as u32);
+    class.ok_or_else(|| format!("class {text}, expected an integer from 0"))
 }
 
 fn parse_finite(word: &str) -> Parsed<f64> {
@@ -835,7 +838,7 @@ mod tests {
                 .to_string()
         };
         assert!(said("0 0.5 0.5 0.1\n").contains("a.txt: line 1: 3 numbers after the class"));
-        assert!(said("0 0.5 0.5 0.1 0.1\ncap 0 0 0 0\n").contains("line 2: class \"cap\""));
+        assert!(said("0 0.5 0.5 0.1 0.1\ncap 0 0 0 0\n").contains("line 2: class cap, expected"));
         assert!(said("0 0.5 NaN 0.1 0.1").contains("\"NaN\", expected a number"));
         assert!(said("0 0.5 1e999 0.1 0.1").contains("\"1e999\", expected a number"));
         assert!(
@@ -846,9 +849,19 @@ mod tests {
             said("0 0.5 0.5 -0.1 0.1")
                 .contains("a box of -0.1 x 0.1, expected sides of at least 0")
         );
-        assert!(
-            said("4294967296 0.5 0.5 0.1 0.1").contains("class \"4294967296\", expected 0, 1, ..")
-        );
+        for class in ["4294967296", "-1", "0.5", "inf"] {
+            let expected = format!("class {class}, expected an integer from 0");
+            assert!(said(&format!("{class} 0.5 0.5 0.1 0.1")).contains(&expected));
+        }
+    }
+
+    #[test]
+    fn a_class_may_be_written_as_a_float() {
+        for class in ["2", "2.0", "2.000000000000000000e+00"] {
+            let labels = folder(&[("a.txt", &format!("{class} 0.5 0.5 0.1 0.1"))]);
+            let truth = read_yolo_truth(labels.path(), None, Some([9, 9])).unwrap();
+            assert_eq!(truth.sheets[0].truth[0].class, 2);
+        }
     }
 
     #[test]

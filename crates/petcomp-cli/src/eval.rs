@@ -169,7 +169,7 @@ impl EvalArgs {
             let sheets = truth.with_detections(path)?;
             runs.push(Run { name, sheets });
         }
-        truth.describe(options);
+        truth.describe(options)?;
         Ok(runs)
     }
 }

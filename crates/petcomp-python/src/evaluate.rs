@@ -61,7 +61,7 @@ fn scores_of(
     }
     let truth = read_truth(truth_path, size)?;
     let sheets = truth.with_detections(predictions)?;
-    truth.describe(&mut options);
+    truth.describe(&mut options)?;
     let run = Run { name, sheets };
     let metrics = match output {
         Some(folder) => page::write(folder, slice::from_ref(&run), &options)?,

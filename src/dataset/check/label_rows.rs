@@ -2,7 +2,7 @@
 
 use crate::dataset::finding::Finding;
 use crate::diagnostic::Code;
-use crate::eval::KnownRows;
+use crate::eval::{KnownRows, parse_class};
 use crate::io;
 use std::path::Path;
 
@@ -103,10 +103,10 @@ impl RowFormat {
     }
 
     fn check_class(&self, text: &str) -> Result<(), String> {
-        let class = class_number(text)?;
+        let class = parse_class(text)? as usize;
         match self.class_count {
             Some(count) if class >= count => Err(format!(
-                "class {class}, but data.yaml has {count} classes, numbered from 0"
+                "class {class}, expected one of the {count} that data.yaml names, numbered from 0"
             )),
             _ => Ok(()),
         }
@@ -142,9 +142,4 @@ fn check_shares(row: &[&str], values: &[f64]) -> Result<(), String> {
         Some((text, _)) => Err(format!("{text}, expected a fraction of the image, 0 to 1")),
         None => Ok(()),
     }
-}
-
-fn class_number(text: &str) -> Result<usize, String> {
-    let class = text.parse();
-    class.map_err(|_| format!("class {text}, expected an integer from 0"))
 }
