@@ -640,7 +640,7 @@ fn a_check_finds_every_fault_and_its_place() {
     let found = faults(dir.path()).join("\n");
     for expected in [
         "labels/train/000001.txt:2: 4 columns, expected 5",
-        "labels/train/000001.txt:3: class 3, but data.yaml has 3 classes, numbered from 0",
+        "labels/train/000001.txt:3: class 3, expected one of the 3 that data.yaml names, numbered from 0",
         "labels/train/000001.txt:4: duplicates an earlier row [dataset.duplicate_label_row]",
         "labels/train/000002.txt:1: 1.1, expected a fraction of the image, 0 to 1",
         "labels/train/000002.txt:2: a box of 0 x 0.1, expected sides above 0",
@@ -960,6 +960,51 @@ fn a_byte_order_mark_is_a_fault_of_a_label_and_of_a_list() {
 }
 
 #[test]
+fn trainers_take_an_image_without_a_label_file_as_empty() {
+    let dir = made(12);
+    let label = dir.path().join("labels/train/000003.txt");
+    std::fs::remove_file(label).unwrap();
+    let [lost, unlisted] = faults(dir.path()).try_into().unwrap();
+    assert!(lost.starts_with("index.jsonl:") && unlisted.contains("000003.txt: missing, but"));
+    std::fs::remove_file(dir.path().join("index.jsonl")).unwrap();
+    let checked = check(dir.path()).unwrap();
+    assert_eq!((checked.findings.len(), checked.unlabelled), (0, 1));
+    let note = checked.notes()[0].to_string();
+    assert_eq!(
+        note,
+        "1 of 12 images have no label file: trainers take them as empty"
+    );
+    std::fs::remove_dir_all(dir.path().join("labels/train")).unwrap();
+    let checked = check(dir.path()).unwrap();
+    assert_eq!((checked.findings.len(), checked.unlabelled), (9, 0));
+}
+
+/// Trainers replace the last `images` of the whole path.
+#[test]
+fn labels_are_looked_for_by_the_whole_path() {
+    let dir = tempfile::tempdir().unwrap();
+    let set = dir.path().join("images/set");
+    make(&plan(&set, 12)).unwrap();
+    std::fs::remove_file(set.join("index.jsonl")).unwrap();
+    assert_eq!(faults(&set), [""; 0]);
+    for part in ["train", "val"] {
+        let place = set.join(part);
+        std::fs::rename(set.join("images").join(part), &place).unwrap();
+        for label in std::fs::read_dir(set.join("labels").join(part)).unwrap() {
+            let label = label.unwrap();
+            std::fs::rename(label.path(), place.join(label.file_name())).unwrap();
+        }
+    }
+    let yaml = "train: train\nval: val\nnames: [bottle]\n";
+    std::fs::write(set.join("data.yaml"), yaml).unwrap();
+    let found = faults(&set);
+    assert!(
+        found[0].starts_with("../../labels/set/train/000001.txt: missing, but train/000001.png"),
+        "{found:?}"
+    );
+}
+
+#[test]
 fn rows_may_end_as_on_any_system() {
     let dir = made(12);
     let label = dir.path().join("labels/train/000003.txt");
@@ -992,8 +1037,8 @@ fn labels_are_where_the_link_of_their_images_leads() {
     };
     let found = lead_to("photos");
     assert_eq!(found.len(), 9, "{found:?}");
-    let said = "../photos/000001.txt: missing or not text, but images/train/000001.png exists, \
-                whose folder is a link: trainers look for labels where it leads [dataset.missing_label]";
+    let said = "../photos/000001.txt: missing, but images/train/000001.png exists: trainers replace the last `images` of \
+                its absolute path, without links, by `labels` [dataset.missing_label]";
     assert!(found.contains(&said.to_owned()), "{found:?}");
     std::fs::create_dir_all(dir.path().join("far/labels")).unwrap();
     std::fs::rename(

@@ -370,8 +370,8 @@ impl Manifest {
         if self.classes.is_empty() && self.assets.iter().any(|asset| asset.role.is_object()) {
             return Err(Error::value("classes", "empty, expected at least one"));
         }
-        check_unique("classes", self.classes.iter().map(String::as_str))?;
         // Earlier versions took spaces around names.
+        check_unique("classes", self.classes.iter().map(|class| class.trim()))?;
         check_each(&self.classes, "classes", |class| check_class(class.trim()))?;
         let names = self.assets.iter().map(|asset| asset.name.as_str());
         check_unique("assets", names)?;

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::io::{self, Chroma, WriteOptions};
 use crate::pixel::{PremulRgba, Srgb8};
-use crate::scene::{Draws, Range};
+use crate::scene::{DrawLog, Drawn, Draws, Range};
 use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -67,12 +67,21 @@ impl Pictures {
         self.jpeg_quality.check_count("jpeg_quality", &bounds)
     }
 
-    fn write_options(&self, seed: u64, k: u64) -> WriteOptions {
+    fn write_options(&self, draws: &Draws<'_>) -> WriteOptions {
         WriteOptions {
-            jpeg_quality: self.quality(seed, k),
-            jpeg_chroma: self.chroma(seed, k),
+            jpeg_quality: self.quality(draws),
+            jpeg_chroma: self.chroma(draws),
             ..WriteOptions::default()
         }
+    }
+
+    /// What is drawn for picture `k` of a dataset.
+    pub(super) fn drawn(&self, seed: u64, k: u64) -> Vec<Drawn> {
+        let log = DrawLog::default();
+        if self.format == PictureFormat::Jpg {
+            self.write_options(&Draws::new(seed, k).logged(&log));
+        }
+        log.into_draws()
     }
 
     /// Picture `k` of a dataset as read from its file: 8-bit sRGB, on black where nothing is behind
@@ -85,7 +94,8 @@ impl Pictures {
         if self.format == PictureFormat::Png {
             return Ok(codes);
         }
-        let lossy = io::through_jpeg(&codes, self.quality(seed, k), self.chroma(seed, k));
+        let options = self.write_options(&Draws::new(seed, k));
+        let lossy = io::through_jpeg(&codes, options.jpeg_quality, options.jpeg_chroma);
         lossy.ok_or_else(|| {
             let (w, h) = codes.size();
             Error::value(
@@ -107,17 +117,15 @@ impl Pictures {
     }
 
     /// The quality of a picture of a dataset.
-    fn quality(&self, seed: u64, k: u64) -> u8 {
-        let draws = Draws::new(seed, k);
-        self.jpeg_quality
-            .draw_count(&draws, "pictures.jpeg_quality") as u8
+    fn quality(&self, draws: &Draws<'_>) -> u8 {
+        self.jpeg_quality.draw_count(draws, "pictures.jpeg_quality") as u8
     }
 
     /// The chroma subsampling of a picture of a dataset.
-    fn chroma(&self, seed: u64, k: u64) -> Chroma {
+    fn chroma(&self, draws: &Draws<'_>) -> Chroma {
         match self.jpeg_chroma.len() {
             0 => Chroma::default(),
-            n => self.jpeg_chroma[Draws::new(seed, k).choose("pictures.jpeg_chroma", n)],
+            n => self.jpeg_chroma[draws.choose("pictures.jpeg_chroma", n)],
         }
     }
 
@@ -125,7 +133,7 @@ impl Pictures {
         let path = entry.path("images", self.format.extension());
         let mut watch = Stopwatch::start();
         let displayed = entry.sample.frame.map(|p| p.color());
-        let options = self.write_options(entry.seed, entry.k);
+        let options = self.write_options(&Draws::new(entry.seed, entry.k));
         io::write_with(folder.join(&path), &displayed, &options)?;
         watch.lap("encode");
         watch.log(path.display());
@@ -170,9 +178,11 @@ mod tests {
             jpeg_quality: Range::new(80.0, 84.0),
             ..Pictures::default()
         };
-        let drawn: BTreeSet<u8> = (0..100).map(|k| pictures.quality(3, k)).collect();
+        let drawn: BTreeSet<u8> = (0..100)
+            .map(|k| pictures.quality(&Draws::new(3, k)))
+            .collect();
         assert_eq!(drawn, BTreeSet::from([80, 81, 82, 83, 84]));
-        assert_eq!(Pictures::default().quality(3, 0), 95);
+        assert_eq!(Pictures::default().quality(&Draws::new(3, 0)), 95);
     }
 
     #[test]
@@ -182,13 +192,28 @@ mod tests {
             jpeg_chroma: vec![Chroma::Full, Chroma::Quarter],
             ..Pictures::default()
         };
-        let quarters = (0..100).filter(|&k| mixed.chroma(3, k) == Chroma::Quarter);
+        let quarters = (0..100).filter(|&k| mixed.chroma(&Draws::new(3, k)) == Chroma::Quarter);
         assert!((30..70).contains(&quarters.count()));
         let of_quality = Pictures {
             jpeg_chroma: vec![],
             ..mixed.clone()
         };
-        assert!((0..100).all(|k| mixed.quality(3, k) == of_quality.quality(3, k)));
+        let of_both = |k| [&mixed, &of_quality].map(|p| p.quality(&Draws::new(3, k)));
+        assert!((0..100).map(of_both).all(|[a, b]| a == b));
+        let drawn = Pictures {
+            format: PictureFormat::Jpg,
+            ..mixed.clone()
+        };
+        let drawn = drawn.drawn(3, 7).into_iter().map(|d| (d.path, d.value));
+        let quality = f64::from(mixed.quality(&Draws::new(3, 7)));
+        let chroma = f64::from(mixed.chroma(&Draws::new(3, 7)) == Chroma::Quarter);
+        assert_eq!(
+            Vec::from_iter(drawn),
+            [
+                ("pictures.jpeg_quality".to_owned(), quality),
+                ("pictures.jpeg_chroma".to_owned(), chroma)
+            ]
+        );
         let text = serde_json::to_string(&Pictures::default()).unwrap();
         assert!(!text.contains("chroma"), "identities stay: {text}");
     }
@@ -224,7 +249,7 @@ mod tests {
             ..Pictures::default()
         };
         for k in 0..4 {
-            io::write_with(&path, &displayed, &jpg.write_options(3, k)).unwrap();
+            io::write_with(&path, &displayed, &jpg.write_options(&Draws::new(3, k))).unwrap();
             let read: Image<LinearRgb> = io::read(&path).unwrap();
             assert_eq!(jpg.shown(&frame, 3, k).unwrap(), to_srgb8(&read));
         }

@@ -360,9 +360,10 @@ impl Pipeline {
         loop {
             let first = self.config.scene.place_in_sequence(k).first;
             let scene_seed = redraw_seed(seed, first, rejected.len());
-            let (scene, draws) = self.explain(scene_seed, k)?;
+            let (scene, mut draws) = self.explain(scene_seed, k)?;
             match self.take_within(scene, &allowance) {
                 Ok(sample) => {
+                    draws.extend(self.config.pictures.drawn(seed, k));
                     let provenance = sample.provenance.map(|provenance| Provenance {
                         rejected,
                         draws,

@@ -52,6 +52,20 @@ impl DataYaml {
             .map_or_else(|| folder.to_path_buf(), |path| folder.join(path))
     }
 
+    /// The message about a folder or list of images that does not exist.
+    pub(crate) fn why_missing(&self) -> &'static str {
+        match self
+            .path
+            .as_deref()
+            .is_some_and(|path| Path::new(path).is_relative())
+        {
+            true => {
+                "no such folder or list: a relative `path` is taken from the folder of data.yaml"
+            }
+            false => "no such folder or list",
+        }
+    }
+
     /// Number of classes that have a name, even if it is only a number, whatever `nc` is; none
     /// without names.
     pub(crate) fn class_count(&self) -> Option<usize> {

@@ -59,11 +59,21 @@ impl Checked {
         sides
     }
 
-    /// Notes on what is not wrong but worth knowing: classes with few or no labels, very small
-    /// boxes.
+    /// Notes on what is not wrong but worth knowing: images without a label file, classes with few
+    /// or no labels, very small boxes.
     pub fn notes(&self) -> Vec<Diagnostic> {
         let classes = (0..self.classes.len()).flat_map(|class| self.class_notes(class));
-        classes.chain(self.tiny_boxes()).collect()
+        let images = self.unlabelled_images().into_iter();
+        images.chain(classes).chain(self.tiny_boxes()).collect()
+    }
+
+    fn unlabelled_images(&self) -> Option<Diagnostic> {
+        (self.unlabelled > 0).then(|| {
+            let (count, all) = (self.unlabelled, self.images);
+            let message =
+                format!("{count} of {all} images have no label file: trainers take them as empty");
+            Diagnostic::note(Code::MissingLabel, message)
+        })
     }
 
     fn class_notes(&self, class: usize) -> impl Iterator<Item = Diagnostic> {

@@ -30,6 +30,8 @@ pub(super) struct CheckedImage {
     pub(super) rows: Vec<LabelRow>,
     /// Whether it has a label file without rows.
     pub(super) is_empty: bool,
+    /// Whether it has no label file.
+    pub(super) is_unlabelled: bool,
     /// None if the image cannot be read.
     thumbnail: Option<Thumbnail>,
     /// From its label file, for comparison; none if there is no file or a row is bad.
@@ -53,6 +55,7 @@ impl CheckedImage {
             findings: Vec::new(),
             rows: Vec::new(),
             is_empty: false,
+            is_unlabelled: false,
             thumbnail: None,
             boxes: None,
             checksum,
@@ -87,12 +90,18 @@ impl CheckedImage {
     }
 
     fn read_labels(&mut self, folder: &Path, class_count: Option<usize>) {
-        let Ok((text, is_marked)) = io::read_marked_text(&folder.join(&self.label)) else {
-            // A missing image is reported already.
-            if folder.join(&self.path).exists() {
-                self.findings.push(self.missing_label());
+        let path = folder.join(&self.label);
+        let (text, is_marked) = match io::read_marked_text(&path) {
+            Ok(read) => read,
+            Err(e) if path.exists() => {
+                let finding = Finding::unreadable(folder, &self.label, &e);
+                return self.findings.push(finding);
             }
-            return;
+            Err(_) => {
+                // A missing image is reported already.
+                self.is_unlabelled = folder.join(&self.path).exists();
+                return;
+            }
         };
         if is_marked {
             let message = "a byte order mark, which is part of the class to trainers";
@@ -106,10 +115,10 @@ impl CheckedImage {
         self.findings.extend(findings);
     }
 
-    fn missing_label(&self) -> Finding {
-        let mut message = format!("missing or not text, but {} exists", self.path.display());
+    pub(super) fn missing_label(&self) -> Finding {
+        let mut message = format!("missing, but {} exists", self.path.display());
         if self.label != YoloSet::label_of(&self.path) {
-            message += ", whose folder is a link: trainers look for labels where it leads";
+            message += ": trainers replace the last `images` of its absolute path, without links, by `labels`";
         }
         Finding::in_file(&self.label, Code::MissingLabel, message)
     }

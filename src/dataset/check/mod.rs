@@ -40,6 +40,8 @@ pub struct Checked {
     pub classes: Vec<String>,
     /// Whether the dataset should have YOLO labels; if petcomp wrote none, no image was checked.
     pub has_yolo: bool,
+    /// Number of images without a label file, which trainers take as empty, where that is no error.
+    pub unlabelled: usize,
     /// The part that has no images because the dataset was generated with none there.
     pub empty_part: Option<Part>,
 }
@@ -64,8 +66,9 @@ pub struct CheckedBox {
 ///   unless both show nothing;
 /// * no validation image looks like a training image ([`NEAR_DUPLICATE_RMS`]) whose label file shows
 ///   the same, or is a training image that was saved again, unless both show nothing;
-/// * every image has a label file and every label file an image; if a folder of images is a link,
-///   trainers look for labels where it leads;
+/// * every label file has an image; every image has a label file if petcomp wrote the dataset, and
+///   one of each part has in any other; trainers look for labels where the absolute path of the
+///   images without links leads;
 /// * label files and lists have no byte order mark;
 /// * rows have 5 columns (or, in files of outlines, 7 or more, an odd number), an integer class
 ///   below `nc`, shares in 0..1, sides above 0, and no duplicate in the same file;
@@ -86,6 +89,7 @@ pub fn check(folder: &Path) -> Result<Checked> {
     let folder = &whole_path(folder)?;
     let mut checker = Checker {
         folder,
+        real: &io::real_path(folder),
         findings: Vec::new(),
         may_be_empty: part_without_share(folder),
     };
@@ -95,6 +99,7 @@ pub fn check(folder: &Path) -> Result<Checked> {
         false => DataYaml::default(),
     };
     let images = checker.read_images(&yaml);
+    let unlabelled = checker.find_missing_labels(&images);
     checker.find_duplicates(&images);
     checker.find_leaks(&images);
     checker.find_orphan_labels(&images, &yaml);
@@ -105,6 +110,7 @@ pub fn check(folder: &Path) -> Result<Checked> {
     let has_images = |part: &Part| images.iter().any(|image| image.part == *part);
     Ok(Checked {
         has_yolo,
+        unlabelled,
         empty_part: checker.may_be_empty.filter(|part| !has_images(part)),
         ..Checked::new(checker.findings, &images, &yaml)
     })
@@ -168,6 +174,8 @@ impl Checked {
 /// The findings so far.
 struct Checker<'a> {
     folder: &'a Path,
+    /// The same without links.
+    real: &'a Path,
     findings: Vec<Finding>,
     /// The part that may be empty.
     may_be_empty: Option<Part>,
@@ -181,13 +189,11 @@ fn boxes_of(image: &CheckedImage) -> impl Iterator<Item = CheckedBox> {
     })
 }
 
-/// The label files of a folder of images below the dataset's; empty if they cannot be listed.
-fn list_labels(dataset: &Path, images: &Path) -> Vec<PathBuf> {
-    let label = dataset.join(YoloSet::label_of(&images.join("x")));
+/// The label files of a folder of images; empty if they cannot be listed.
+fn list_labels(images: &Path) -> Vec<PathBuf> {
+    let label = YoloSet::label_of(&images.join("x"));
     let is_label = |path: &Path| is_list(path) && !is_class_list(path);
-    let labels = io::files_below(folder_of(&label), is_label, usize::MAX);
-    let labels = labels.unwrap_or_default().into_iter();
-    labels.map(|path| io::relative(&path, dataset)).collect()
+    io::files_below(folder_of(&label), is_label, usize::MAX).unwrap_or_default()
 }
 
 impl Checker<'_> {
@@ -236,7 +242,7 @@ impl Checker<'_> {
         let mut images = Vec::new();
         for part in Part::ALL {
             for place in self.places(yaml, part) {
-                images.extend(self.list_images_in(&place, part));
+                images.extend(self.list_images_in(&place, part, yaml));
             }
         }
         images
@@ -250,11 +256,14 @@ impl Checker<'_> {
     }
 
     /// An image in a list may be elsewhere.
-    fn list_images_in(&mut self, place: &Path, part: Part) -> Vec<ListedImage> {
+    fn list_images_in(&mut self, place: &Path, part: Part, yaml: &DataYaml) -> Vec<ListedImage> {
         let found = images_in(place).unwrap_or_default();
         if found.is_empty() && self.may_be_empty != Some(part) {
-            let place = io::relative(place, self.folder);
-            self.add(place, Code::NoImages, "no images, expected at least one");
+            let message = match place.exists() {
+                true => "no images, expected at least one",
+                false => yaml.why_missing(),
+            };
+            self.add(io::relative(place, self.folder), Code::NoImages, message);
         }
         if is_list(place) && io::read_marked_text(place).is_ok_and(|(_, is_marked)| is_marked) {
             let place = io::relative(place, self.folder);
@@ -262,22 +271,43 @@ impl Checker<'_> {
             let finding = Finding::in_line(place, 1, Code::UnreadableFile, message);
             self.findings.push(finding);
         }
-        let trained = self.trained_place(place);
+        let trained = trained_place(place);
         let listed = found.iter().map(|image| {
-            let path = io::relative(image, self.folder);
             let below = image.strip_prefix(place).map(|below| trained.join(below));
-            let label = YoloSet::label_of(below.as_ref().unwrap_or(&path));
-            ListedImage { path, label, part }
+            let label = YoloSet::label_of(below.as_ref().unwrap_or(image));
+            ListedImage {
+                path: io::relative(image, self.folder),
+                label: self.name_of(&label),
+                part,
+            }
         });
         listed.collect()
     }
 
-    /// A folder of images as trainers know it, which follow links; a list as it is.
-    fn trained_place(&self, place: &Path) -> PathBuf {
-        match is_list(place) {
-            true => io::relative(place, self.folder),
-            false => io::relative(&io::real_path(place), &io::real_path(self.folder)),
+    /// The path of a file as seen from the dataset's folder.
+    fn name_of(&self, file: &Path) -> PathBuf {
+        match file.starts_with(self.folder) {
+            true => io::relative(file, self.folder),
+            false => io::relative(file, self.real),
         }
+    }
+
+    /// Images without a label file: the number of them where trainers take them as empty. It is an
+    /// error if petcomp, which writes all of them, made the dataset, or if no image of a part has
+    /// one.
+    fn find_missing_labels(&mut self, images: &[CheckedImage]) -> usize {
+        let mut empty = 0;
+        for part in Part::ALL {
+            let images = images.iter().filter(|image| image.part == part);
+            let (missing, labelled): (Vec<_>, Vec<_>) = images.partition(|i| i.is_unlabelled);
+            if labelled.is_empty() || has_journal(self.folder) {
+                let findings = missing.into_iter().map(CheckedImage::missing_label);
+                self.findings.extend(findings);
+            } else {
+                empty += missing.len();
+            }
+        }
+        empty
     }
 
     /// Images with the same bytes as an earlier one, which is a training image if any of them is;
@@ -320,7 +350,8 @@ impl Checker<'_> {
             .flat_map(|part| self.places(yaml, part));
         let folders: Vec<PathBuf> = places.filter(|place| !is_list(place)).collect();
         for folder in folders {
-            for label in list_labels(self.folder, &self.trained_place(&folder)) {
+            for label in list_labels(&trained_place(&folder)) {
+                let label = self.name_of(&label);
                 if !wanted.contains(&label) {
                     self.add(label, Code::OrphanLabel, "no image with this name");
                 }
@@ -400,11 +431,20 @@ impl Checker<'_> {
     }
 }
 
+/// A folder of images as trainers know it, which follow links; a list as it is.
+fn trained_place(place: &Path) -> PathBuf {
+    match is_list(place) {
+        true => place.to_owned(),
+        false => io::real_path(place),
+    }
+}
+
 /// The finding about an image that has the same bytes as another, or is listed again.
 fn twin_message(image: &CheckedImage, twin: &CheckedImage) -> (Code, String) {
     let message = format!("the same bytes as {}", twin.path.display());
     match (image.part == twin.part, image.path == twin.path) {
-        (true, _) => (Code::DuplicateImage, message),
+        (true, false) => (Code::DuplicateImage, message),
+        (true, true) => (Code::DuplicateImage, "listed again".into()),
         (false, false) => (Code::Leak, format!("leak: {message}")),
         (false, true) => {
             let message = "leak: validation image is also used for training";

@@ -246,7 +246,7 @@ impl SampleRows<'_> {
         match picked.get(3).map_or(0, |&a| self.count_transparent(a)) {
             0 => Ok(()),
             count => Err(format!(
-                "{count} pixels with alpha below 1, expected an opaque picture (put it over a background first)"
+                "{count} pixels with alpha below 1 or outside an EXR's data window, expected an opaque picture (put it over a background first)"
             )),
         }
     }
