@@ -30,6 +30,7 @@ use crate::filter;
 use crate::image::Image;
 use crate::pixel::{Coverage, Film, LinearRgb};
 use crate::stopwatch::Stopwatch;
+use paint::NO_LIGHT;
 use serde::{Deserialize, Serialize};
 use solve::{Factor, Solver};
 use std::borrow::Cow;
@@ -353,18 +354,18 @@ impl<'a> FilmSolution<'a> {
         }
     }
 
-    /// Light that see-through pixels reflect, 0 elsewhere. None counts where a person says that it
-    /// is see-through, or on a grey screen: all that is see-through is guessed there, and said to
-    /// be.
+    /// Light that see-through pixels reflect, [`NO_LIGHT`] elsewhere. None counts where a person
+    /// says that it is see-through, or on a grey screen: all that is see-through is guessed there,
+    /// and said to be.
     fn see_through_light(&self, factors: &Image<Factor>, flat: LinearRgb) -> Image<f32> {
         if !self.is_keyable {
-            return factors.map(|_| 0.0);
+            return factors.map(|_| NO_LIGHT);
         }
         let plate = &self.object.plate.image;
         let mut reflected = factors.zip3_map(&self.calm, plate, |f, p, k| {
             paint::reflected(p, k, f.transmittance(flat), self.key)
         });
-        claimed::clear_paint(&mut reflected, self.object.claims);
+        claimed::set_see_through(&mut reflected, self.object.claims, NO_LIGHT);
         reflected
     }
 

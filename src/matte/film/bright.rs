@@ -34,7 +34,7 @@ pub(super) fn make_opaque(
     }
     let interior = interior(object.inside, object.longer_side);
     let mut paint = softened(&painted.zip_map(&interior, |p, i| p && i));
-    claimed::clear_paint(&mut paint, object.claims);
+    claimed::set_see_through(&mut paint, object.claims, 0.0);
     cover_with_paint(factors, &paint);
     let of_hue = paint
         .pixels()

@@ -15,11 +15,11 @@ pub(super) fn make_opaque(factors: &mut Image<Factor>, claims: Option<&Claims>) 
     }
 }
 
-/// Takes paint away where a person says that the plastic is see-through.
-pub(super) fn clear_paint(paint: &mut Image<f32>, claims: Option<&Claims>) {
-    for (paint, claim) in claimed(paint, claims) {
+/// Sets a picture to a value where a person says that the plastic is see-through.
+pub(super) fn set_see_through(image: &mut Image<f32>, claims: Option<&Claims>, value: f32) {
+    for (pixel, claim) in claimed(image, claims) {
         if claim == Some(true) {
-            *paint = 0.0;
+            *pixel = value;
         }
     }
 }

@@ -26,7 +26,7 @@ pub(super) fn ramp(value: f32, range: &RangeInclusive<f32>) -> f32 {
 }
 
 /// Area of the object, pixels.
-pub(super) fn area(inside: &Image<Coverage>) -> f64 {
+fn area(inside: &Image<Coverage>) -> f64 {
     inside.pixels().iter().map(|c| f64::from(c.0)).sum()
 }
 

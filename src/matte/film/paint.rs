@@ -2,7 +2,7 @@
 //! passes light.
 
 use super::FilmInput;
-use super::object::{area, interior, share, side_px};
+use super::object::{interior, share, side_px};
 use super::tint::{MAX_SCATTERED, TintSamples, thinned};
 use super::uncertainty::{ColorUncertainty, OPAQUE_TRANSMITTANCE};
 use crate::filter;
@@ -24,14 +24,20 @@ const REFLECTION_QUANTILES: [f64; 2] = [0.05, 0.95];
 /// rendered bottles on two screens it is 0.36 and more, of matt paint 0.07 at most where it varies
 /// by 30 %, 0.13 where by 50 %.
 const MIN_GLINTS: f32 = 0.15;
+/// Share of the object's interior that is see-through from which on it is compared: where dark
+/// plastic glints, it counts as opaque.
+const MIN_SEE_THROUGH: f64 = 0.5;
 /// Pixels that are compared.
 const REFLECTION_SAMPLES: usize = 20_000;
 
+/// Less than any light: of what is not seen through.
+pub(super) const NO_LIGHT: f32 = f32::NEG_INFINITY;
+
 /// Light that a pixel of this transmittance reflects, in the channels that the screen has little
-/// of; 0 where it is opaque.
+/// of; [`NO_LIGHT`] where it is opaque.
 pub(super) fn reflected(pixel: LinearRgb, screen: LinearRgb, t: LinearRgb, key: usize) -> f32 {
     if t.channels()[key] <= OPAQUE_TRANSMITTANCE {
-        return 0.0;
+        return NO_LIGHT;
     }
     let (pixel, through) = (pixel.channels(), (t * screen).channels());
     let (a, b) = other_channels(std::array::from_fn(|c| pixel[c] - through[c]), key);
@@ -70,11 +76,10 @@ pub(super) fn see_through(
 pub(super) fn is_matt(reflected: &Image<f32>, object: FilmInput<'_>) -> bool {
     let interior = interior(object.inside, object.longer_side);
     let pixels = reflected.pixels().iter().zip(interior.pixels());
-    // 0 is opaque.
-    let seen = pixels.filter(|(light, inner)| **inner && **light != 0.0);
+    let seen = pixels.filter(|(light, inner)| **inner && **light != NO_LIGHT);
     let light: Vec<f32> = seen.map(|(light, _)| *light).collect();
-    let least_seen = f64::from(ColorUncertainty::NEEDS_REVIEW.paint) * area(object.inside);
-    if (light.len() as f64) <= least_seen {
+    let inner = interior.pixels().iter().filter(|inner| **inner).count();
+    if light.is_empty() || (light.len() as f64) < MIN_SEE_THROUGH * inner as f64 {
         return false;
     }
     let light: Vec<f32> = thinned(light, REFLECTION_SAMPLES).collect();
