@@ -618,6 +618,11 @@ fn a_check_finds_every_fault_and_its_place() {
         "labels/train/000003.txt",
         &format!("{row}\n0 0.1 0.1 0.2 0.2 0.3 0.3\n0 0.1 0.1 0.1 0.2 0.1 0.3\n"),
     );
+    // Trainers know an outline by the box around it.
+    write(
+        "labels/train/000008.txt",
+        "0 0.1 0.1 0.3 0.1 0.3 0.3\n0 0.1 0.3 0.1 0.1 0.3 0.3\n",
+    );
     write("labels/train/000099.txt", "");
     std::fs::remove_file(dir.path().join("labels/train/000004.txt")).unwrap();
     let whole = std::fs::read(dir.path().join("images/val/000005.png")).unwrap();
@@ -649,6 +654,7 @@ fn a_check_finds_every_fault_and_its_place() {
         "labels/train/000002.txt:5: class -1, expected an integer from 0",
         "labels/train/000003.txt:1: 5 columns, expected a class and at least 3 pairs",
         "labels/train/000003.txt:3: an outline of 0 x ",
+        "labels/train/000008.txt:2: duplicates an earlier row",
         "labels/train/000004.txt: missing",
         "labels/train/000099.txt: no image with this name",
         "images/val/000005.png: ",

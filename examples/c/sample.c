@@ -16,6 +16,13 @@ static void check(petcomp_status status)
     }
 }
 
+/* What petcomp notes on its way, such as a photo that is not used. */
+static void print_message(petcomp_log_level level, const char *message)
+{
+    if (level <= PETCOMP_LOG_LEVEL_WARNING)
+        fprintf(stderr, "%s: %s\n", level == PETCOMP_LOG_LEVEL_ERROR ? "error" : "warning", message);
+}
+
 static void *memory(size_t bytes)
 {
     void *place = malloc(bytes);
@@ -80,6 +87,7 @@ int main(int count, char **words)
     petcomp_sample sample;
     if (count != 6)
         return 5;
+    check(petcomp_log_to(print_message));
     printf("petcomp %s\n", petcomp_version());
     key_a_pixel();
     solve_a_camera();

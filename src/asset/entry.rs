@@ -37,7 +37,7 @@ pub struct PhotoEntry {
         skip_serializing_if = "Option::is_none"
     )]
     pub px_per_metre: Option<f64>,
-    /// Or: length of the object along its longest side, metres, 0.005 to 5.
+    /// Or: length of the object, the longer side of the smallest rectangle around it, metres, 0.005 to 5.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length: Option<f64>,
     /// And its width, metres: then both fix the scale, and contradict an outline of other

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 pub enum Scale {
     /// Pixels of the photo per metre.
     PxPerMetre(f64),
-    /// Length of the object along its longest side, metres.
+    /// Length of the object, the longer side of the smallest rectangle around it, metres.
     Length(f64),
     /// Length and width of the object, longest first, metres.
     Size([f64; 2]),

@@ -327,6 +327,7 @@ impl<'a> ArchiveRun<'a> {
 
     /// Packs the samples of an archive in order of number, stores it, and deletes their folder.
     fn pack(&self, number: u64, plan: &Plan) -> Result<()> {
+        let _claim = folder::reclaim(&plan.folder)?;
         let lines = lines_of(&plan.folder)?;
         let samples: Vec<Written> = lines.iter().map(|line| line.written()).collect();
         let mut packed = Vec::new();

@@ -5,7 +5,8 @@
     allow(dead_code, reason = "without physics nothing falls")
 )]
 
-use crate::error::Result;
+use crate::allowance::Allowance;
+use crate::error::{Error, Result};
 use crate::scene::{Grade, Placement, Scene, SettleOptions};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -19,8 +20,16 @@ pub(crate) struct Falls {
     known: Mutex<VecDeque<(String, Arc<Fall>)>>,
 }
 
-/// Where the objects of a scene came to rest; none until they have.
-type Fall = Mutex<Option<Vec<Placement>>>;
+/// How a scene fell; none until it has.
+type Fall = Mutex<Option<Outcome>>;
+
+#[derive(Debug)]
+enum Outcome {
+    /// Where its objects came to rest.
+    Rest(Vec<Placement>),
+    /// Why they did not, and the work that this took.
+    Unsettled(String, u64),
+}
 
 impl Falls {
     /// Remembers this many scenes.
@@ -35,6 +44,7 @@ impl Falls {
         &self,
         scene: Scene,
         options: &SettleOptions,
+        allowance: &Allowance,
         fall: impl FnOnce(Scene) -> Result<Scene>,
     ) -> Result<Scene> {
         if self.most == 0 {
@@ -42,18 +52,13 @@ impl Falls {
         }
         let known = self.fall_of(what_falls(&scene, options));
         let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(placements) = &*known {
-            return Ok(placed(scene, placements));
+        if let Some(outcome) = &*known {
+            return outcome.repeated(scene, allowance);
         }
-        let scene = fall(scene)?;
-        *known = Some(
-            scene
-                .objects
-                .iter()
-                .map(|object| object.placement)
-                .collect(),
-        );
-        Ok(scene)
+        let before = allowance.taken();
+        let fallen = fall(scene);
+        *known = Outcome::of(&fallen, allowance, before);
+        fallen
     }
 
     fn fall_of(&self, key: String) -> Arc<Fall> {
@@ -67,6 +72,35 @@ impl Falls {
         let fall = Arc::default();
         known.push_back((key, Arc::clone(&fall)));
         fall
+    }
+}
+
+impl Outcome {
+    /// What is the same whenever the scene falls: not that its work was more than was left.
+    fn of(fallen: &Result<Scene>, allowance: &Allowance, before: u64) -> Option<Self> {
+        match fallen {
+            Ok(scene) => {
+                let placements = scene.objects.iter().map(|object| object.placement);
+                Some(Self::Rest(placements.collect()))
+            }
+            Err(Error::Unsettled { what }) if !allowance.is_spent() => {
+                Some(Self::Unsettled(what.clone(), allowance.taken() - before))
+            }
+            Err(_) => None,
+        }
+    }
+
+    /// The same again, at the same cost where it counts: whether a picture is rejected must not
+    /// depend on what fell before.
+    fn repeated(&self, scene: Scene, allowance: &Allowance) -> Result<Scene> {
+        match self {
+            Self::Rest(placements) => Ok(placed(scene, placements)),
+            Self::Unsettled(what, work) => {
+                allowance.take(*work)?;
+                let what = what.clone();
+                Err(Error::Unsettled { what })
+            }
+        }
     }
 }
 
@@ -105,7 +139,8 @@ mod tests {
         let (options, count) = (SettleOptions::default(), Cell::new(0));
         let falls = Falls::of_last(1);
         let settled = |falls: &Falls, scene: &Scene| {
-            let rest = falls.settled(scene.clone(), &options, |mut scene| {
+            let allowance = Allowance::new(1);
+            let rest = falls.settled(scene.clone(), &options, &allowance, |mut scene| {
                 count.set(count.get() + 1);
                 scene.objects[0].placement = Placement::At(Pose::translation(0.0, 0.0, 0.005));
                 Ok(scene)
@@ -127,5 +162,30 @@ mod tests {
         settled(&Falls::default(), &scene);
         settled(&Falls::default(), &scene);
         assert_eq!(count.get(), 5);
+    }
+
+    #[test]
+    fn what_found_no_rest_costs_its_work_again_but_does_not_fall_again() {
+        let scene: Scene = toml::from_str(SCENE).unwrap();
+        let (falls, count) = (Falls::of_last(1), Cell::new(0));
+        let left_of = |most| {
+            let allowance = Allowance::new(most);
+            let options = SettleOptions::default();
+            let rest = falls.settled(scene.clone(), &options, &allowance, |_| {
+                count.set(count.get() + 1);
+                allowance.take(7)?;
+                let what = "something still moves".into();
+                Err(Error::Unsettled { what })
+            });
+            (rest.unwrap_err().to_string(), most - allowance.taken())
+        };
+        let (message, left) = left_of(7);
+        assert!(message.contains("something still moves") && left == 0);
+        // Nothing was left: with more work it may have come to rest.
+        let first = left_of(20);
+        assert_eq!((first.1, count.get()), (13, 2));
+        assert_eq!(left_of(20), first);
+        assert!(left_of(5).0.contains("no rest within the work"));
+        assert_eq!(count.get(), 2);
     }
 }

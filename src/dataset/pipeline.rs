@@ -528,7 +528,7 @@ impl Pipeline {
     #[cfg(feature = "settle")]
     fn rest(&self, scene: Scene, allowance: &Allowance) -> Result<Scene> {
         let options = &self.config.scene.settle;
-        self.falls.settled(scene, options, |scene| {
+        self.falls.settled(scene, options, allowance, |scene| {
             let (settled, _) = crate::settle::settle_within(scene, options, 0, allowance)?;
             settled.into_scene()
         })

@@ -27,7 +27,7 @@ use super::stroke::Claims;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, Film, LinearRgb};
 use crate::stopwatch::Stopwatch;
 use paint::NO_LIGHT;
@@ -242,6 +242,8 @@ struct FilmSolution<'a> {
     object: FilmInput<'a>,
     /// The photo that the transmittance is measured in.
     calm: Cow<'a, Image<LinearRgb>>,
+    /// The object without its rim.
+    interior: Mask,
     /// The screen's strongest channel.
     key: usize,
     is_keyable: bool,
@@ -253,6 +255,7 @@ impl<'a> FilmSolution<'a> {
         Self {
             object,
             calm: calmed(object.photo, object.plate.residual),
+            interior: object::interior(object.inside, object.longer_side),
             key: strongest_channel(object.screen),
             is_keyable: is_keyable(object.screen),
             options,
@@ -327,21 +330,23 @@ impl<'a> FilmSolution<'a> {
         samples: &TintSamples,
         watch: &mut Stopwatch,
     ) -> ColorUncertainty {
-        let (object, most) = (self.object, largest(flat));
+        let (object, interior, most) = (self.object, &self.interior, largest(flat));
         let spread = self.options.thickness_spread;
         let guessed = uncertainty::guessed(factors, object.inside, spread, most);
-        let screen_hue = bright::make_opaque(factors, &self.calm, object);
-        let keyed_away = uncertainty::keyed_away(factors, &self.calm, object, flat[self.key]);
+        let screen_hue = bright::make_opaque(factors, &self.calm, object, interior);
+        let keyed_away =
+            uncertainty::keyed_away(factors, &self.calm, object, interior, flat[self.key]);
         watch.lap("paint");
         let clipped = bright::fill_glints(factors, object);
         claimed::make_opaque(factors, object.claims);
         watch.lap("glints");
         let light = self.see_through_light(factors, flat.into());
-        let paint = paint::see_through(&light, samples, object);
+        let paint = paint::see_through(&light, samples, object, interior);
         // Paint lets nothing through.
-        let tint = match self.options.flat.is_none() && paint::is_matt(&light, object) {
-            true => uncertainty.max(most),
-            false => uncertainty,
+        let is_matt = paint::is_matt(&light, object.screen, interior);
+        let tint = match self.options.flat {
+            None if is_matt => uncertainty.max(most),
+            _ => uncertainty,
         };
         watch.lap("see-through paint");
         ColorUncertainty {

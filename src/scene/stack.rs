@@ -173,7 +173,10 @@ impl DropColumn<'_> {
     /// One of the level rotations at which the body fits, if there is any.
     fn draw_level_rotation(&self, half: &Vector3<f64>, path: &str) -> Option<UnitQuaternion<f64>> {
         let turns: Vec<_> = self.start.level_turns(self.surface.size, half).collect();
-        (!turns.is_empty()).then(|| turns[self.draws.choose(&format!("{path}.turn"), turns.len())])
+        (!turns.is_empty()).then(|| {
+            let turn = self.draws.choose(&format!("{path}.turn"), turns.len());
+            turns[turn] * self.draw_side(path)
+        })
     }
 
     /// Turned over or not, then rotated about the vertical by the `number`-th draw for this object,
@@ -437,10 +440,14 @@ mod tests {
     fn a_card_as_long_as_the_room_starts_level_and_along_it() {
         for k in 0..20 {
             // So wide that it does not fit along the diagonal, unlike a narrow one.
-            let objects = stacked(k, &DropRanges::default(), cards(3, [0.4, 0.28])).unwrap();
-            objects
-                .iter()
-                .for_each(|object| assert!((lying(object).x - 0.2).abs() < 1e-12));
+            let start = DropRanges {
+                face_down: 1.0,
+                ..DropRanges::default()
+            };
+            let objects = stacked(k, &start, cards(3, [0.4, 0.28])).unwrap();
+            for object in &objects {
+                assert!((lying(object).x - 0.2).abs() < 1e-12 && normal(object).z < 0.0);
+            }
             objects
                 .iter()
                 .flat_map(corners)

@@ -45,7 +45,12 @@ pub unsafe extern "C" fn petcomp_key(
         let packed = packed(floats, size, row_stride);
         let photo = ImageView::new(width, height, packed.as_ref());
         check_finite(photo)?;
-        let keyed = Keying::of_view(photo, Screen::Color(LinearRgb::from(screen))).run(&options)?;
+        let keying = Keying::of_view(photo, Screen::Color(LinearRgb::from(screen)));
+        if cutout.is_null() {
+            // SAFETY: promised by the caller.
+            return unsafe { store_picture("matte", &keying.matte(&options)?, matte) };
+        }
+        let keyed = keying.run(&options)?;
         // SAFETY: promised by the caller.
         unsafe {
             store_picture("matte", &keyed.matte, matte)?;

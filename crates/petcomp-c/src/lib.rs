@@ -12,12 +12,14 @@ mod camera;
 mod handles;
 mod key;
 mod memory;
+mod messages;
 mod pipeline;
 mod sample;
 mod status;
 
 pub use camera::{CameraModel, petcomp_camera_solve};
 pub use key::petcomp_key;
+pub use messages::{LogFunction, LogLevel, petcomp_log_to};
 pub use pipeline::{PipelineHandle, petcomp_pipeline_close, petcomp_pipeline_open};
 pub use sample::{
     SampleHandle, petcomp_sample_free, petcomp_sample_labels, petcomp_sample_linear,

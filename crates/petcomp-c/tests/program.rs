@@ -39,13 +39,28 @@ fn write_recipe(folder: &Path, more: &str) -> PathBuf {
     std::fs::write(folder.join("photos.csv"), list).unwrap();
     let (list, assets) = (folder.join("photos.csv"), folder.join("assets"));
     asset::build(list, assets, &|_, _| {}, &AtomicBool::new(false)).unwrap();
+    let backgrounds = write_backgrounds(folder, &samples);
     let recipe = format!(
         "assets = \"assets\"\nbackgrounds = {:?}\n[scene]\nimage = [160, 120]\nobjects = [2, 3]\n\
          [labels]\nobstructed = \"keep\"\n{more}[render]\nsubsamples = 1\nambient_samples = 8\n",
-        samples.join("backgrounds")
+        backgrounds
     );
     std::fs::write(folder.join("recipe.toml"), recipe).unwrap();
     folder.join("recipe.toml")
+}
+
+/// One photo with its label, and one without.
+fn write_backgrounds(folder: &Path, samples: &Path) -> PathBuf {
+    let backgrounds = folder.join("backgrounds");
+    std::fs::create_dir(&backgrounds).unwrap();
+    for name in ["bg0000.jpg", "bg0000.label.json", "bg0001.jpg"] {
+        std::fs::copy(
+            samples.join("backgrounds").join(name),
+            backgrounds.join(name),
+        )
+        .unwrap();
+    }
+    backgrounds
 }
 
 /// As somebody types it.
@@ -106,8 +121,9 @@ fn run_checked(folder: &Path, recipe: &Path) -> Output {
     run(valgrind, folder, recipe)
 }
 
-/// A sample by the program in C, and a dataset of the same recipe; returns what the former said.
-fn make_both(folder: &Path, more: &str) -> String {
+/// A sample by the program in C, and a dataset of the same recipe; returns what the former said, and
+/// what it warned of.
+fn make_both(folder: &Path, more: &str) -> [String; 2] {
     install(folder);
     let recipe = write_recipe(folder, more);
     generate(&recipe, &folder.join("set"));
@@ -116,24 +132,23 @@ fn make_both(folder: &Path, more: &str) -> String {
     compile(folder, "cc", &source, &program);
 
     let done = run_checked(folder, &recipe);
-    let (out, err) = (
-        String::from_utf8_lossy(&done.stdout),
-        String::from_utf8_lossy(&done.stderr),
-    );
-    assert!(done.status.success(), "{out}{err}");
-    out.into_owned()
+    let said = [done.stdout, done.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert!(done.status.success(), "{said:?}");
+    said
 }
 
 #[test]
 fn c_program_makes_the_programs_sample() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let out = make_both(folder, "");
+    let [out, warned] = make_both(folder, "");
     let version = env!("CARGO_PKG_VERSION");
     assert!(
         out.starts_with(&format!("petcomp {version}\nmatte 0.")),
         "{out}"
     );
+    let warning = "1 of 2 photos has no label and is not used (bg0001.jpg)";
+    assert!(warned.contains(warning), "{warned}");
     assert_same_picture(folder, "png");
     assert_eq!(own_labels(folder), program_labels(folder, "amodal_mask"));
 }

@@ -8,8 +8,9 @@ use numpy::ndarray::Array2;
 use numpy::{PyArray2, PyReadonlyArray2};
 use petcomp::camera::{self, CameraFile, Label, Solution};
 use petcomp::geom::{Point2, Point3};
-use petcomp::{Error, Result};
+use petcomp::{Error, Result, io};
 use pyo3::prelude::*;
+use std::path::PathBuf;
 
 /// A pinhole camera without distortion.
 #[pyclass(frozen, eq, module = "petcomp._petcomp")]
@@ -165,6 +166,24 @@ pub(crate) fn solve_camera(py: Python<'_>, label: &str, force: bool) -> PyResult
     let label: Label = parse("label", label).map_err(to_python)?;
     let (camera, record) = work::run(py, move || solved(&label, force))?;
     Ok((Camera(camera), record))
+}
+
+/// A label and what the file of its photo says of the camera, as JSON.
+#[pyfunction]
+pub(crate) fn read_label(py: Python<'_>, path: PathBuf) -> PyResult<String> {
+    work::run(py, move || text(&camera::read_label(path)?))
+}
+
+/// The camera of a camera file.
+#[pyfunction]
+pub(crate) fn read_camera(py: Python<'_>, path: PathBuf) -> PyResult<Camera> {
+    let camera = work::run(py, move || {
+        let file: CameraFile = io::read_json(&path)?;
+        let camera = file.camera();
+        crate::scene::check_camera(&camera).map_err(|e| e.in_file(&path))?;
+        Ok(camera)
+    })?;
+    Ok(Camera(camera))
 }
 
 fn solved(label: &Label, force: bool) -> Result<(petcomp::Camera, String)> {

@@ -38,28 +38,37 @@ pub(crate) fn evaluate_files(
     predictions: PathBuf,
     truth: PathBuf,
     size: Option<[u32; 2]>,
+    images: Option<PathBuf>,
     output: Option<PathBuf>,
     question: Question,
 ) -> PyResult<String> {
     work::run(py, move || {
-        let (options, output) = (options_of(question)?, output.as_deref());
-        scores_of(&predictions, &truth, size, output, options)
+        let truth = TruthFiles {
+            path: &truth,
+            images: images.as_deref(),
+            size,
+        };
+        scores_of(
+            &predictions,
+            &truth,
+            output.as_deref(),
+            options_of(question)?,
+        )
     })
 }
 
 fn scores_of(
     predictions: &Path,
-    truth_path: &Path,
-    size: Option<[u32; 2]>,
+    truth_files: &TruthFiles<'_>,
     output: Option<&Path>,
     mut options: EvalReportOptions,
 ) -> Result<String> {
     let name = page::run_name(predictions);
     if let Some(folder) = output {
-        let inputs = [predictions, truth_path];
+        let inputs = [predictions, truth_files.path];
         page::check_inputs_stay(inputs, folder, slice::from_ref(&name))?;
     }
-    let truth = read_truth(truth_path, size)?;
+    let truth = truth_files.read()?;
     let sheets = truth.with_detections(predictions)?;
     truth.describe(&mut options)?;
     let run = Run { name, sheets };
@@ -67,16 +76,27 @@ fn scores_of(
         Some(folder) => page::write(folder, slice::from_ref(&run), &options)?,
         None => vec![Metrics::of(&run, &options)],
     };
-    page::warn_of_empty_truth(truth_path, &metrics);
+    page::warn_of_empty_truth(truth_files.path, &metrics);
     metrics_json(&metrics[0], &options)
 }
 
-fn read_truth(path: &Path, size: Option<[u32; 2]>) -> Result<EvalTruth> {
-    if size.is_some() && EvalTruth::is_coco(path) {
-        let what = "given without a folder of YOLO labels as truth: COCO files contain the sizes";
-        return Err(Error::value("size", what));
+/// Where the truth is, and what YOLO labels need: the folder of their images, or the size of all.
+struct TruthFiles<'a> {
+    path: &'a Path,
+    images: Option<&'a Path>,
+    size: Option<[u32; 2]>,
+}
+
+impl TruthFiles<'_> {
+    fn read(&self) -> Result<EvalTruth> {
+        let Self { path, images, size } = *self;
+        if (size.is_some() || images.is_some()) && EvalTruth::is_coco(path) {
+            let what =
+                "given without a folder of YOLO labels as truth: COCO files contain the sizes";
+            return Err(Error::value("size, images", what));
+        }
+        EvalTruth::read(path, images, size)
     }
-    EvalTruth::read(path, None, size)
 }
 
 fn metrics_json(metrics: &Metrics, options: &EvalReportOptions) -> Result<String> {

@@ -9,6 +9,8 @@ use crate::work::{self, Stop};
 use petcomp::dataset::{self, DatasetConfig, Plan, Progress, SampleRange, Shard, Sidecar, Writer};
 use petcomp::{Error, Result};
 use pyo3::prelude::*;
+use serde::Serialize;
+use serde_json::{Map, Value};
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
@@ -92,7 +94,11 @@ pub(crate) fn generate_from(
 }
 
 /// How a dataset of a function's pictures is written: tables of a recipe, checked as those are.
-struct DatasetLayout(DatasetConfig);
+struct DatasetLayout {
+    config: DatasetConfig,
+    /// The table of labels as it was given, without defaults.
+    given: Map<String, Value>,
+}
 
 impl DatasetLayout {
     fn new([labels, pictures, split]: &[String; 3]) -> Result<Self> {
@@ -103,16 +109,17 @@ impl DatasetLayout {
             ..Default::default()
         };
         config.check()?;
-        Ok(Self(config))
+        let given = parse("labels", labels)?;
+        Ok(Self { config, given })
     }
 
     fn plan(&self, classes: &[String], target: Target) -> Result<Plan> {
         let (folder, count, seed, only, shard) = target;
-        let (range, obstructed) = (range_of(only, shard)?, self.0.labels.obstructed);
+        let (range, obstructed) = (range_of(only, shard)?, self.config.labels.obstructed);
         Ok(Plan {
             range,
             seed,
-            split: self.0.split,
+            split: self.config.split,
             obstructed,
             writers: self.writers(),
             ..Plan::new(
@@ -126,7 +133,7 @@ impl DatasetLayout {
     /// Refuses a sample whose labels no file would hold: an archive takes them from what other
     /// writers write, and a [`Sidecar`] is only of samples with a scene.
     fn checked(&self, sample: dataset::Sample, k: u64) -> Result<dataset::Sample> {
-        if sample.provenance.is_some() || self.0.labels.archives().is_none() {
+        if sample.provenance.is_some() || self.config.labels.archives().is_none() {
             return Ok(sample);
         }
         let what = format!(
@@ -135,10 +142,30 @@ impl DatasetLayout {
         Err(Error::value("labels.formats", what))
     }
 
+    /// Refuses a sample whose labels were made by another policy than the default, unless the
+    /// caller chose one.
+    fn check_policy(&self, sample: &Sample, k: u64) -> PyResult<()> {
+        if !sample.has_policy() {
+            return Ok(());
+        }
+        let (own, labels) = (sample.policy(), &self.config.labels);
+        if !self.is_given("obstructed") {
+            check_same("labels.obstructed", own.obstructed, labels.obstructed, k)?;
+        }
+        if !(self.is_given("yolo") || self.is_given("coco")) {
+            check_same("labels.yolo.boxes", own.extent, labels.extent(), k)?;
+        }
+        Ok(())
+    }
+
+    fn is_given(&self, key: &str) -> bool {
+        self.given.contains_key(key)
+    }
+
     fn writers(&self) -> Vec<Arc<dyn Writer>> {
         let mut writers: Vec<Arc<dyn Writer>> =
-            vec![Arc::new(self.0.pictures.clone()), Arc::new(Sidecar)];
-        writers.extend(self.0.labels.writers(&self.0.pictures));
+            vec![Arc::new(self.config.pictures.clone()), Arc::new(Sidecar)];
+        writers.extend(self.config.labels.writers(&self.config.pictures));
         writers
     }
 }
@@ -159,10 +186,26 @@ pub(crate) fn generate_with(
     let mut beside = |py: Python<'_>| steps.deliver(py, progress.as_ref());
     let made = work::run_beside(py, Stop::of_caller(), &mut beside, move |stop| {
         let plan = layout.plan(&classes, target)?;
-        let sample = |k| layout.checked(keep.sample(&make, &classes, k)?, k);
+        let check = |sample: &Sample, k: u64| {
+            check_class_names(sample, &classes, k)?;
+            layout.check_policy(sample, k)
+        };
+        let sample = |k| layout.checked(keep.sample(&make, &check, k)?, k);
         own.generate(&plan, sample, stop)
     });
     raised.or_else(made)
+}
+
+fn check_same<T: PartialEq + Serialize>(at: &str, own: T, default: T, k: u64) -> PyResult<()> {
+    if own == default {
+        return Ok(());
+    }
+    let [own, default] = [text(&own), text(&default)].map(|text| text.map_err(to_python));
+    let what = format!(
+        "not given, so {}, but sample {k} was made with {}: give the one that you want",
+        default?, own?
+    );
+    Err(wrong_value(at, what))
 }
 
 /// Refuses a sample whose numbers of classes mean others than those of the dataset.
@@ -177,6 +220,9 @@ fn check_class_names(sample: &Sample, classes: &[String], k: u64) -> PyResult<()
     Err(wrong_value("classes", what))
 }
 
+/// Refuses a sample that does not suit the dataset.
+type CheckSample<'a> = &'a dyn Fn(&Sample, u64) -> PyResult<()>;
+
 /// The exception of the sample with the lowest number.
 #[derive(Clone, Default)]
 struct Raised(Arc<Mutex<Option<(u64, PyErr)>>>);
@@ -190,7 +236,7 @@ impl Raised {
         }
     }
 
-    fn sample(&self, make: &Py<PyAny>, classes: &[String], k: u64) -> Result<dataset::Sample> {
+    fn sample(&self, make: &Py<PyAny>, check: CheckSample<'_>, k: u64) -> Result<dataset::Sample> {
         let made = Python::attach(|py| {
             let sample = make.bind(py).call1((k,))?;
             let sample = sample.cast::<Sample>().map_err(|_| {
@@ -198,7 +244,7 @@ impl Raised {
                 wrong_type("make", &format!("returned {found}, expected a Sample"))
             })?;
             let sample = sample.get();
-            check_class_names(sample, classes, k)?;
+            check(sample, k)?;
             sample.to_dataset_sample(py)
         });
         made.map_err(|error| self.keep(k, error))

@@ -29,7 +29,7 @@ mod _petcomp {
     #[pymodule_export]
     use crate::{
         asset::{build_assets, is_class_name, list_assets},
-        camera::{Camera, solve_camera},
+        camera::{Camera, read_camera, read_label, solve_camera},
         evaluate::{evaluate_boxes, evaluate_files},
         generate::{generate_from, generate_with},
         picture::{cut_out, key, read_picture, write_picture},

@@ -98,6 +98,11 @@ impl Sample {
         &self.facts.policy
     }
 
+    /// Whether its labels were made by a policy that somebody chose, not from masks.
+    pub(crate) fn has_policy(&self) -> bool {
+        self.facts.provenance.is_some() || self.facts.deep.width() > 0
+    }
+
     /// Whether these begin with its objects' classes: then its numbers mean the same.
     pub(crate) fn is_of(&self, classes: &[String]) -> bool {
         classes.starts_with(self.policy().object_classes())
@@ -105,29 +110,33 @@ impl Sample {
 
     /// What the library's writers take.
     pub(crate) fn to_dataset_sample(&self, py: Python<'_>) -> PyResult<dataset::Sample> {
-        Ok(dataset::Sample {
-            deep: self.facts.deep.clone(),
-            provenance: self.facts.provenance.clone(),
-            ..dataset::Sample::new(self.frame_again(py)?, self.facts.labels.clone())
-        })
+        let linear = locked(&self.frame).linear.clone();
+        let frame = match linear {
+            Some(linear) => py.detach(|| Image::clone(&linear)),
+            None => self.changed_frame(py)?,
+        };
+        let facts = &self.facts;
+        Ok(py.detach(|| dataset::Sample {
+            deep: facts.deep.clone(),
+            provenance: facts.provenance.clone(),
+            ..dataset::Sample::new(frame, facts.labels.clone())
+        }))
     }
 
-    /// The picture, as whoever has its array may have changed it.
-    fn frame_again(&self, py: Python<'_>) -> PyResult<Image<PremulRgba>> {
-        let frame = locked(&self.frame);
-        match (&frame.linear, &frame.array) {
-            (Some(linear), _) => Ok(Image::clone(linear)),
-            (None, Some(array)) => {
-                let array = array.bind(py).clone().into_any();
-                drop(frame);
-                let pixels = Given::from_argument("image_linear", &array)?;
-                let pixels = pixels.decoded("image_linear").map_err(to_python)?;
-                let pixels = pixels.into_premul();
-                check_sound("image_linear", &pixels).map_err(to_python)?;
-                Ok(pixels)
-            }
-            (None, None) => Err(internal("a sample without a picture")),
-        }
+    /// The picture in its array, as whoever has that may have changed it.
+    fn changed_frame(&self, py: Python<'_>) -> PyResult<Image<PremulRgba>> {
+        let array = locked(&self.frame)
+            .array
+            .as_ref()
+            .map(|array| array.bind(py).clone().into_any());
+        let array = array.ok_or_else(|| internal("a sample without a picture"))?;
+        let pixels = Given::from_argument("image_linear", &array)?;
+        let checked = py.detach(|| {
+            let pixels = pixels.decoded("image_linear")?.into_premul();
+            check_sound("image_linear", &pixels)?;
+            Ok(pixels)
+        });
+        checked.map_err(to_python)
     }
 }
 

@@ -207,8 +207,13 @@ fn give_back(pool: Arc<IdlePool>) {
     }
 }
 
+/// One with as many threads as are set; for what a job of several samples calls, which has one of
+/// them, with as many as that has.
 fn idle_pool() -> PyResult<IdlePool> {
-    let threads = THREADS.load(Ordering::Relaxed);
+    let threads = match rayon::current_thread_index() {
+        Some(_) => rayon::current_num_threads(),
+        None => THREADS.load(Ordering::Relaxed),
+    };
     match take_idle_pool(std::process::id(), threads) {
         Some(pool) => Ok(pool),
         None => new_pool(threads),

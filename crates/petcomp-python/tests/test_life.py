@@ -413,10 +413,35 @@ def test_a_dead_worker_does_not_end_the_process(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-def dpx(width, height):
+# In each child the parent's worker is idle too, and serves the parent alone.
+READ_FORKED = """
+import multiprocessing, sys, petcomp
+first = petcomp.io.read(sys.argv[1])
+paths = sys.argv[1:] * 3
+with multiprocessing.get_context("fork").Pool(4) as pool:
+    seen = pool.map(petcomp.io.read, paths)
+assert len({image[0, 0, 0] for image in seen[: len(sys.argv) - 1]}) == len(sys.argv) - 1
+assert all((image == petcomp.io.read(path)).all() for path, image in zip(paths, seen))
+"""
+
+
+def test_workers_of_a_parent_do_not_serve_its_forks(tmp_path):
+    worker = ROOT / "target/release/petcomp-oiio-worker"
+    paths = [tmp_path / f"{code}.dpx" for code in (40, 90, 140, 190)]
+    for path in paths:
+        path.write_bytes(dpx(640, 480, int(path.stem)))
+    environment = {**os.environ, "PETCOMP_OIIO_WORKER": str(worker)}
+    words = [sys.executable, "-c", READ_FORKED, *paths]
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=120)
+    if "built without OpenImageIO" in done.stderr:
+        pytest.skip("built without OpenImageIO")
+    assert done.returncode == 0, done.stderr
+
+
+def dpx(width, height, code=128):
     """A film scan of 8-bit grey, linear, by SMPTE 268M: which only OpenImageIO reads."""
     header = bytearray(b"\xff" * 2048)
     struct.pack_into(">4sI8sI", header, 0, b"SDPX", 2048, b"V1.0", 2048 + 3 * width * height)
     struct.pack_into(">HHII", header, 768, 0, 1, width, height)
     struct.pack_into(">IIfIfBBBBHHIII", header, 780, 0, 0, 0.0, 255, 1.0, 50, 2, 2, 8, 0, 0, 2048, 0, 0)
-    return bytes(header) + b"\x80" * (3 * width * height)
+    return bytes(header) + bytes([code]) * (3 * width * height)

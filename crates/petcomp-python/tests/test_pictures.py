@@ -288,6 +288,10 @@ def test_evaluation_in_memory_is_that_of_files(tmp_path, program):
     metrics = json.loads((tmp_path / "theirs/metrics.json").read_text())
     assert files.to_dict() == (metrics[0] if isinstance(metrics, list) else metrics)
     assert (tmp_path / "page/eval.html").exists()
+    (tmp_path / "photos").mkdir()
+    for i in range(6):
+        petcomp.io.write(tmp_path / f"photos/{i:06}.png", np.zeros((100, 100, 3), np.uint8))
+    assert petcomp.evaluate(labels, tmp_path / "truth", images=tmp_path / "photos").map == files.map
     memory = petcomp.evaluate(found, truth)
     assert abs(memory.map - files.map) < 1e-3 and 0 < memory.map < 1
     for few in (petcomp.evaluate(found, truth, rounds=39), petcomp.evaluate(found[:1], truth[:1])):

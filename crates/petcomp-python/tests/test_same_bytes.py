@@ -2,10 +2,12 @@
 
 import hashlib
 import json
+import shutil
 
 import numpy as np
 import petcomp
 import pytest
+from conftest import SAMPLES
 
 COUNT = 4
 
@@ -169,6 +171,25 @@ def test_own_samples_become_a_dataset(tmp_path, program):
     program("dataset", "check", tmp_path / "set")
 
 
+def test_a_policy_of_the_samples_is_not_lost(recipe, tmp_path):
+    changes = {"labels.obstructed": "keep", "labels.yolo.boxes": "visible"}
+    pipeline = petcomp.Pipeline(recipe, set=changes)
+
+    def make(folder, **labels):
+        return petcomp.generate(lambda k: pipeline[k], 2, tmp_path / folder, classes=pipeline.classes, labels=labels)
+
+    says = 'labels.obstructed: not given, so "drop", but sample 0 was made with "keep"'
+    with pytest.raises(ValueError, match=says):
+        make("a")
+    with pytest.raises(ValueError, match='labels.yolo.boxes: not given, so "amodal"'):
+        make("b", obstructed="keep")
+    assert make("c", obstructed="drop", yolo={"boxes": "amodal"}).policy == "drop"
+    make("d", obstructed="keep", yolo={"boxes": "visible"})
+    petcomp.generate(recipe, 2, tmp_path / "e", set=changes)
+    rows = [{path.name: path.read_text() for path in (tmp_path / f).glob("labels/*/*.txt")} for f in "de"]
+    assert rows[0] == rows[1] and any(rows[0].values())
+
+
 def test_classes_of_own_samples_are_those_of_the_dataset(tmp_path):
     def make(names):
         image, mask = np.zeros((24, 32, 3), np.uint8), np.ones((24, 32), bool)
@@ -178,6 +199,19 @@ def test_classes_of_own_samples_are_those_of_the_dataset(tmp_path):
     with pytest.raises(ValueError, match=says):
         petcomp.generate(make(["can", "bottle"]), 1, tmp_path / "wrong", classes=["bottle", "can"])
     assert petcomp.generate(make(["a", "b"]), 1, tmp_path / "set", classes=["a", "b"]).images == 1
+
+
+def test_a_label_file_is_solved_as_by_the_program(tmp_path, program):
+    for name in ("bg0000.jpg", "bg0000.label.json"):
+        shutil.copy(SAMPLES / "backgrounds" / name, tmp_path)
+    label = tmp_path / "bg0000.label.json"
+    solution = petcomp.camera.solve(label)
+    program("camera", "solve", label)
+    written = label.with_name("bg0000.camera.json")
+    assert solution.file == json.loads(written.read_text())
+    assert petcomp.Camera.read(written) == solution.camera
+    with pytest.raises(petcomp.errors.FileError, match="none.json"):
+        petcomp.Camera.read(tmp_path / "none.json")
 
 
 def test_shards_are_merged_to_the_whole(recipe, written, tmp_path, program):

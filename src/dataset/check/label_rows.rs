@@ -78,7 +78,7 @@ impl RowFormat {
     /// The numbers of a row that does not repeat an earlier one.
     fn parse_new(&self, row: &[&str], known: &mut KnownRows) -> Result<Vec<f64>, (Code, String)> {
         let values = self.parse(row).map_err(|what| (Code::BadLabelRow, what))?;
-        match known.insert(values.iter().copied()) {
+        match known.insert(self.identity(&values)) {
             true => Ok(values),
             false => Err((Code::DuplicateLabelRow, "duplicates an earlier row".into())),
         }
@@ -118,17 +118,29 @@ impl RowFormat {
 
     /// Width and height of a row's box: trainers take that around an outline.
     fn sides(&self, values: &[f64]) -> [f64; 2] {
-        if !self.outlines {
-            return [values[3], values[4]];
+        match self.outlines {
+            false => [values[3], values[4]],
+            true => ends(values).map(|[low, high]| high - low),
         }
-        [1, 2].map(|first| {
-            let places = values.iter().skip(first).step_by(2);
-            let [low, high] = places.fold([1.0, 0.0], |[low, high], &place| {
-                [place.min(low), place.max(high)]
-            });
-            high - low
-        })
     }
+
+    /// What trainers tell a row from others by: the class and the box, also of an outline.
+    fn identity(&self, values: &[f64]) -> Vec<f64> {
+        match self.outlines {
+            false => values.to_vec(),
+            true => [&values[..1], ends(values).as_flattened()].concat(),
+        }
+    }
+}
+
+/// Where an outline begins and ends, along x and y.
+fn ends(values: &[f64]) -> [[f64; 2]; 2] {
+    [1, 2].map(|first| {
+        let places = values.iter().skip(first).step_by(2);
+        places.fold([1.0, 0.0], |[low, high], &place| {
+            [place.min(low), place.max(high)]
+        })
+    })
 }
 
 fn parse_number(text: &str) -> Result<f64, String> {

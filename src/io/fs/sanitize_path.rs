@@ -4,6 +4,7 @@ use super::listing::entries;
 use super::open::reason;
 use crate::error::{Error, Result};
 use std::fs::{DirEntry, Metadata};
+use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
 
 /// Joins a path from a document to a folder; the path itself must stay below the folder.
@@ -110,7 +111,10 @@ pub(crate) fn refuse_links(folder: impl AsRef<Path>) -> Result<()> {
 
 fn refuse_linked_entry(folder: &Path, entry: &DirEntry) -> Result<()> {
     let path = entry.path();
-    let kind = entry.file_type().map_err(|e| Error::file(folder, e))?;
+    let kind = match entry.file_type() {
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
+        kind => kind.map_err(|e| Error::file(folder, e))?,
+    };
     if kind.is_symlink() && path.is_dir() {
         return Err(Error::file(
             path,
@@ -118,9 +122,14 @@ fn refuse_linked_entry(folder: &Path, entry: &DirEntry) -> Result<()> {
         ));
     }
     if kind.is_dir() {
-        return refuse_links(path);
+        return refuse_links(&path).or_else(|e| if is_gone(&path) { Ok(()) } else { Err(e) });
     }
     Ok(())
+}
+
+/// Another shard deletes the folders of archives that it has packed.
+fn is_gone(folder: &Path) -> bool {
+    std::fs::symlink_metadata(folder).is_err_and(|e| e.kind() == ErrorKind::NotFound)
 }
 
 #[cfg(test)]
@@ -136,6 +145,16 @@ mod tests {
         for bad in ["", ".", "../a.jpg", "/etc/passwd", "a/../../b"] {
             assert!(below("labels", bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn a_folder_that_another_run_deletes_meanwhile_leads_nowhere() {
+        let dir = tempfile::tempdir().unwrap();
+        let packed = dir.path().join("packed");
+        std::fs::create_dir(&packed).unwrap();
+        let listed = entries(dir.path()).unwrap();
+        std::fs::remove_dir(&packed).unwrap();
+        assert!(refuse_linked_entry(dir.path(), &listed[0]).is_ok());
     }
 
     #[cfg(unix)]

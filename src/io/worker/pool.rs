@@ -150,7 +150,13 @@ impl WorkerPool {
     }
 
     fn idle(&self) -> MutexGuard<'_, Vec<Worker>> {
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
+        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        let process = std::process::id();
+        if idle.iter().any(|worker| worker.process != process) {
+            // They serve the process that this one was forked from; dropping them would kill them.
+            idle.drain(..).for_each(std::mem::forget);
+        }
+        idle
     }
 }
 
@@ -162,6 +168,8 @@ fn timed_out(library: &str, timeout: Duration) -> Refusal {
 /// A running worker program, killed when dropped.
 struct Worker {
     child: Child,
+    /// The process that it serves.
+    process: u32,
     to: TimedStream,
     from: BufReader<TimedStream>,
     limits: Limits,
@@ -206,6 +214,7 @@ impl Worker {
         let _ = rustix::pipe::fcntl_setpipe_size(&stdout, PIPE_BYTES);
         Ok(Self {
             child,
+            process: std::process::id(),
             to: TimedStream::new(to.into())?,
             from: BufReader::new(TimedStream::new(stdout.into())?),
             limits: limits.clone(),

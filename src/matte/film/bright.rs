@@ -1,6 +1,6 @@
 //! Pixels that are not bare plastic: paint, and glints that hide what is behind them.
 
-use super::object::{interior, ramp, share, side_px};
+use super::object::{ramp, share, side_px};
 use super::solve::Factor;
 use super::{FilmInput, claimed};
 use crate::filter;
@@ -26,14 +26,14 @@ pub(super) fn make_opaque(
     factors: &mut Image<Factor>,
     photo: &Image<LinearRgb>,
     object: FilmInput<'_>,
+    interior: &Mask,
 ) -> f32 {
     let bright = brighter_than_screen(factors, photo, &object.plate.image);
     let painted = factors.zip_map(&bright, |f, bright| bright || f.coloured && !f.is_bare());
     if !painted.pixels().contains(&true) {
         return 0.0;
     }
-    let interior = interior(object.inside, object.longer_side);
-    let mut paint = softened(&painted.zip_map(&interior, |p, i| p && i));
+    let mut paint = softened(&painted.zip_map(interior, |p, i| p && i));
     claimed::set_see_through(&mut paint, object.claims, 0.0);
     cover_with_paint(factors, &paint);
     let of_hue = paint

@@ -2,8 +2,8 @@
 //! passes light.
 
 use super::FilmInput;
-use super::object::{interior, share, side_px};
-use super::tint::{MAX_SCATTERED, TintSamples, thinned};
+use super::object::{share, side_px};
+use super::tint::{MAX_SCATTERED, OBJECT_SAMPLES, TintSamples, thinned};
 use super::uncertainty::{ColorUncertainty, OPAQUE_TRANSMITTANCE};
 use crate::filter;
 use crate::image::{Image, Mask};
@@ -27,8 +27,6 @@ const MIN_GLINTS: f32 = 0.15;
 /// Share of the object's interior that is see-through from which on it is compared: where dark
 /// plastic glints, it counts as opaque.
 const MIN_SEE_THROUGH: f64 = 0.5;
-/// Pixels that are compared.
-const REFLECTION_SAMPLES: usize = 20_000;
 
 /// Less than any light: of what is not seen through.
 pub(super) const NO_LIGHT: f32 = f32::NEG_INFINITY;
@@ -52,6 +50,7 @@ pub(super) fn see_through(
     reflected: &Image<f32>,
     samples: &TintSamples,
     object: FilmInput<'_>,
+    interior: &Mask,
 ) -> f32 {
     let screen = object.screen.max_channel();
     if samples.median_of(reflected) > MAX_SCATTERED * screen {
@@ -61,8 +60,7 @@ pub(super) fn see_through(
     if !painted.pixels().contains(&true) {
         return 0.0;
     }
-    let interior = interior(object.inside, object.longer_side);
-    let painted = painted.zip_map(&interior, |painted, inner| painted && inner);
+    let painted = painted.zip_map(interior, |painted, inner| painted && inner);
     let areas = without_glints(&painted, object.inside);
     let share = share(areas.pixels().iter().copied(), object.inside);
     match share > ColorUncertainty::NEEDS_REVIEW.paint {
@@ -73,19 +71,22 @@ pub(super) fn see_through(
 
 /// Whether what is see-through reflects alike everywhere: plastic glints, but paint of the screen's
 /// hue, which looks as see-through, may be matt.
-pub(super) fn is_matt(reflected: &Image<f32>, object: FilmInput<'_>) -> bool {
-    let interior = interior(object.inside, object.longer_side);
+///
+/// `screen` is its mean light.
+pub(super) fn is_matt(reflected: &Image<f32>, screen: LinearRgb, interior: &Mask) -> bool {
     let pixels = reflected.pixels().iter().zip(interior.pixels());
-    let seen = pixels.filter(|(light, inner)| **inner && **light != NO_LIGHT);
-    let light: Vec<f32> = seen.map(|(light, _)| *light).collect();
-    let inner = interior.pixels().iter().filter(|inner| **inner).count();
-    if light.is_empty() || (light.len() as f64) < MIN_SEE_THROUGH * inner as f64 {
+    let inner: Vec<f32> = pixels
+        .filter_map(|(light, inner)| inner.then_some(*light))
+        .collect();
+    let sampled: Vec<f32> = thinned(inner, OBJECT_SAMPLES).collect();
+    let seen = sampled.iter().copied().filter(|light| *light != NO_LIGHT);
+    let seen: Vec<f32> = seen.collect();
+    if seen.is_empty() || (seen.len() as f64) < MIN_SEE_THROUGH * sampled.len() as f64 {
         return false;
     }
-    let light: Vec<f32> = thinned(light, REFLECTION_SAMPLES).collect();
     let [least, most] = REFLECTION_QUANTILES
-        .map(|share| quantile(light.clone(), share, f32::total_cmp).unwrap_or_default());
-    most - least < MIN_GLINTS * object.screen.max_channel()
+        .map(|share| quantile(seen.clone(), share, f32::total_cmp).unwrap_or_default());
+    most - least < MIN_GLINTS * screen.max_channel()
 }
 
 /// The mask opened by the radius of glints.

@@ -53,8 +53,8 @@ const DYE_AMOUNTS: [f32; 3] = [0.3, 5.0, 0.1];
 const MIN_KEY_TRANSMITTANCE: f32 = 0.005;
 /// Share of the object that reflects least, and shows its tint.
 pub(super) const DARKEST_SHARE: f64 = 0.25;
-/// Pixels that are sampled to find the darkest.
-const OBJECT_SAMPLES: usize = 20_000;
+/// Pixels of the object that are sampled.
+pub(super) const OBJECT_SAMPLES: usize = 20_000;
 /// Pixels among the darkest that are sampled for the tint.
 const TINT_SAMPLES: usize = 400;
 /// Share of the screen's strongest channel from which on, in the screen's shade, a pixel is bare

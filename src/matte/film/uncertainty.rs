@@ -1,10 +1,10 @@
 //! How certain the colour and the transmittance of a film are.
 
 use super::FilmInput;
-use super::object::{interior, share};
+use super::object::share;
 use super::solve::Factor;
 use crate::diagnostic::{Code, Diagnostic, Severity};
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::matte::screen::screen_shade;
 use crate::pixel::{Coverage, LinearRgb};
 
@@ -173,6 +173,7 @@ pub(super) fn keyed_away(
     factors: &Image<Factor>,
     photo: &Image<LinearRgb>,
     object: FilmInput<'_>,
+    interior: &Mask,
     flat: f32,
 ) -> f32 {
     let inside = object.inside;
@@ -187,8 +188,7 @@ pub(super) fn keyed_away(
     if !gone.pixels().contains(&true) {
         return 0.0;
     }
-    let interior = interior(inside, object.longer_side);
-    let gone = gone.zip_map(&interior, |gone, inner| gone && inner);
+    let gone = gone.zip_map(interior, |gone, inner| gone && inner);
     share(gone.pixels().iter().copied(), inside)
 }
 

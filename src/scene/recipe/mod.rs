@@ -296,6 +296,8 @@ impl Recipe {
     fn check_objects(&self) -> Result<()> {
         self.objects.check("objects", &OBJECT_COUNT)?;
         self.distractors.check("distractors", &OBJECT_COUNT)?;
+        let most = self.objects.max() + self.distractors.max();
+        check_count(most, "objects and distractors", MAX_OBJECTS)?;
         SHARE.check("negatives", self.negatives)?;
         self.scale.check("scale", &SCALE)?;
         self.start.check()?;

@@ -75,9 +75,7 @@ fn print_rejected(provenance: &Provenance) {
     }
     if !provenance.rejected.is_empty() {
         let seed = provenance.scene_seed;
-        print::line(format_args!(
-            "# the values below were drawn with seed {seed}"
-        ));
+        print::line(format_args!("# the scene was drawn with seed {seed}"));
     }
 }
 

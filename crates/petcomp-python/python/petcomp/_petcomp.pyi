@@ -27,6 +27,8 @@ __all__ = [
     "is_class_name",
     "key",
     "list_assets",
+    "read_camera",
+    "read_label",
     "read_picture",
     "read_scene",
     "render_shot",
@@ -114,6 +116,7 @@ def evaluate_files(
     predictions: str,
     truth: str,
     size: Sequence[int] | None,
+    images: str | None,
     output: str | None,
     question: _Question,
 ) -> str: ...

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _petcomp
-from ._documents import check_array, dumped, loaded, numbers_in
+from ._documents import check_array, dumped, loaded, numbers_in, path_of
 from ._show import table
 from .errors import InvalidValueError
 
@@ -121,6 +122,11 @@ class Camera:
     def from_dict(cls, document: Mapping[str, Any]) -> Camera:
         """Create a camera from plain data in the format of scene files."""
         return cls(_petcomp.Camera.from_json(dumped("camera", document)))
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Camera:
+        """Read the camera of a camera file, ``NAME.camera.json``, without its lens distortion."""
+        return cls(_petcomp.read_camera(path_of("path", path)))
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data in the format of scene files."""
@@ -235,14 +241,19 @@ class Solution:
     file: dict[str, Any]
 
 
-def solve(label: Mapping[str, Any], force: bool = False) -> Solution:
-    """Solve the camera of a label, which is plain data in the format of ``NAME.label.json``.
+def solve(label: Mapping[str, Any] | str | os.PathLike[str], force: bool = False) -> Solution:
+    """Solve the camera of a label: a file, or plain data in the format of ``NAME.label.json``.
+
+    The result for a file is that of ``petcomp camera solve``, which also reads the focal length in the photo's EXIF
+    data. Plain data are taken as they are.
 
     Raises ``CameraError``, or ``InvalidValueError`` for a size that is not in metres, a camera too far away to
     see objects and a lens that folds the corners of the image over. ``force`` accepts these three, and a
     camera that does not fit its label.
     """
-    camera, text = _petcomp.solve_camera(dumped("label", label), force)
+    is_file = isinstance(label, (str, os.PathLike))
+    text = _petcomp.read_label(path_of("label", label)) if is_file else dumped("label", label)
+    camera, text = _petcomp.solve_camera(text, force)
     record = loaded(text)
     record["size"] = tuple(record["size"])
     return Solution(Camera(camera), **record)

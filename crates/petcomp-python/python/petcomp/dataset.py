@@ -103,7 +103,8 @@ def generate(
     A function requires ``classes``, which start with those of its samples. ``labels``, ``pictures`` and
     ``split`` are then the tables of a recipe, without the keys that act when labels are made:
     ``overlap_iou``, ``min_visible``, ``max_truncation``, ``amodal``, ``outline`` and (except for layers)
-    ``alpha_threshold`` belong to the recipe or the ``Shot`` of the samples.
+    ``alpha_threshold`` belong to the recipe or the ``Shot`` of the samples. If those have another ``obstructed``
+    or other ``yolo.boxes`` than the default, ``labels`` must say which the dataset has.
 
     ``only`` generates just that image. ``shard=(i, n)`` generates every ``n``-th image starting with the
     ``i``-th (1 to ``n``), in a subfolder. ``progress`` is called in the calling thread, at the start and after

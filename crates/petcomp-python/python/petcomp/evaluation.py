@@ -71,6 +71,7 @@ def evaluate(
     *,
     classes: Sequence[str] = (),
     size: tuple[int, int] | None = None,
+    images: str | os.PathLike[str] | None = None,
     output: str | os.PathLike[str] | None = None,
     rounds: int = 200,
     seed: int = 0,
@@ -79,8 +80,8 @@ def evaluate(
 
     Files: both are folders of YOLO labels or COCO JSON files. The truth may also be a list of images (``.txt``), or
     a folder with a ``data.yaml`` and no labels, which stands for its validation images. ``size`` (width and height,
-    pixels) applies to YOLO labels only, which need it if their images are missing. ``output`` is a folder for the
-    full report.
+    pixels) applies to YOLO labels only, which need it if their images are missing; ``images`` is the folder of
+    those images if they are elsewhere. ``output`` is a folder for the full report.
 
     Boxes in memory: both are lists with one mapping per image: ``boxes`` (n x 4: left, top, right, bottom, pixels)
     and ``classes`` (n); for predictions ``scores`` (n, 0 to 1); for the truth optionally ``ignored`` (n, as of a
@@ -92,12 +93,13 @@ def evaluate(
     if isinstance(predictions, (str, os.PathLike)) and isinstance(truth, (str, os.PathLike)):
         shape = None if size is None else _pixels("size", size)
         place = None if output is None else folder_of("output", output)
+        photos = None if images is None else path_of("images", images)
         paths = path_of("predictions", predictions), path_of("truth", truth)
-        text = _petcomp.evaluate_files(*paths, shape, place, question)
+        text = _petcomp.evaluate_files(*paths, shape, photos, place, question)
     else:
         sheets = _sheets(predictions, truth)
-        if size is not None or output is not None:
-            raise InvalidValueError("size, output: only for files, expected none for boxes in memory")
+        if size is not None or images is not None or output is not None:
+            raise InvalidValueError("size, images, output: only for files, expected none for boxes in memory")
         text = _petcomp.evaluate_boxes(sheets, question)
     record = loaded(text)
     return Metrics(record["metrics"], record["classes"])

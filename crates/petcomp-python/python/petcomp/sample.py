@@ -60,7 +60,9 @@ class Sample:
     def image(self) -> npt.NDArray[np.uint8]:
         """The image for display, over black: height x width x 3, uint8, sRGB.
 
-        For ``Pipeline[k]`` it equals the program's decoded file, with JPEG's losses if the recipe writes JPEG.
+        For ``Pipeline[k]`` it equals the program's decoded file, with JPEG's losses if the recipe writes JPEG. The
+        array is kept: copy it before you draw on it. Changes to it do not reach ``generate``; those to
+        ``image_linear`` do.
         """
         return self._native.image()
 

@@ -101,7 +101,7 @@ class Shot:
 
     def with_ambient(self, ambient: float | Sequence[float]) -> Shot:
         """Return the shot with a constant environment of this radiance."""
-        color = (ambient,) * 3 if isinstance(ambient, (int, float)) else ambient
+        color = (ambient,) * 3 if isinstance(ambient, (int, float, np.number)) else ambient
         red, green, blue = _floats("ambient", color, (3,))
         return replace(self, ambient=(red, green, blue))
 
