@@ -317,17 +317,18 @@ impl DeepImage {
     }
 
     /// The same picture with more or less light from behind some objects: `extra` gives it for an
-    /// object at a column and row, attenuated by the object and all in front of it. No more is
-    /// subtracted than is visible there, over this plate.
+    /// object at a column and row, attenuated by the object and all in front of it, within these
+    /// columns and rows. No more is subtracted than is visible there, over this plate.
     ///
     /// The plate's part of it is recorded for [`displaced_plate`](Self::displaced_plate).
     pub(crate) fn with_light_from_behind(
         mut self,
         plate: Option<&Image<LinearRgb>>,
+        [columns, rows]: [Range<usize>; 2],
         extra: impl Fn(ObjectId, usize, usize) -> Option<SeenBehind>,
     ) -> Self {
-        for y in 0..self.height() {
-            for x in 0..self.width() {
+        for y in rows {
+            for x in columns.clone() {
                 let changed = |s: &DeepSample| extra(s.object, x, y).is_some();
                 if self.at(x, y).iter().any(changed) {
                     self.add_from_behind([x, y], plate, |s| extra(s.object, x, y));
@@ -446,8 +447,7 @@ pub(crate) fn less(all: LinearRgb, part: LinearRgb) -> LinearRgb {
 
 /// `a / b` per channel; 0 where `b` is.
 fn ratio(a: LinearRgb, b: LinearRgb) -> LinearRgb {
-    let of = |a: f32, b: f32| if b > 0.0 { a / b } else { 0.0 };
-    LinearRgb::new(of(a.r, b.r), of(a.g, b.g), of(a.b, b.b))
+    a.zip_map(b, |a, b| if b > 0.0 { a / b } else { 0.0 })
 }
 
 /// A change of some light, limited so that no channel becomes negative.
@@ -557,7 +557,7 @@ mod tests {
             light: LinearRgb::grey(-0.2),
             plate: LinearRgb::grey(-0.4),
         };
-        let bent = straight.with_light_from_behind(Some(&plate), |object, _, _| {
+        let bent = straight.with_light_from_behind(Some(&plate), [0..1, 0..1], |object, _, _| {
             (object == ObjectId(1)).then_some(change)
         });
         for (coverage, depth) in [(0.0, 0.0), (0.25, 0.5), (0.25, 2.0), (1.0, 0.5)] {

@@ -1,6 +1,6 @@
 //! Lines, boxes and text on display-encoded pictures.
 
-use crate::geom::{BBox, Point2};
+use crate::geom::{BBox, Point2, sides};
 use crate::image::Image;
 use crate::pixel::Srgb8;
 use noto_sans_mono_bitmap::{
@@ -130,8 +130,8 @@ fn pixel_within(at: f64, length: usize) -> isize {
 /// A closed antialiased line through points, one pixel wide, with a halo.
 pub(crate) fn outline(canvas: &mut Image<Srgb8>, ring: &[Point2<f64>], color: Srgb8) {
     for (radius, color, alpha) in [(1.5, HALO, HALO_ALPHA), (0.5, color, 1.0)] {
-        for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-            for (x, y, coverage) in Segment::new(*a, *b, radius).pixels(canvas.size()) {
+        for [a, b] in sides(ring) {
+            for (x, y, coverage) in Segment::new(a, b, radius).pixels(canvas.size()) {
                 blend(canvas, x, y, color, alpha * coverage);
             }
         }

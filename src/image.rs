@@ -342,6 +342,12 @@ impl<P: Copy> Image<P> {
         }
     }
 
+    /// The pixels where a mask is set, row by row.
+    pub(crate) fn pixels_in(&self, mask: &Mask) -> impl Iterator<Item = P> {
+        let pixels = self.pixels.iter().zip(&mask.pixels);
+        pixels.filter_map(|(p, set)| set.then_some(*p))
+    }
+
     /// A copy of a region.
     ///
     /// # Panics

@@ -224,6 +224,24 @@ impl LinearRgb {
         Self::new(f(self.r), f(self.g), f(self.b))
     }
 
+    /// Applies a function to each channel of two colours.
+    #[inline(always)]
+    pub(crate) fn zip_map(self, o: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        Self::new(f(self.r, o.r), f(self.g, o.g), f(self.b, o.b))
+    }
+
+    /// The colour with a share of it replaced by another.
+    #[inline(always)]
+    pub(crate) fn mixed(self, o: Self, share: f32) -> Self {
+        self.scale(1.0 - share).add_scaled(share, o)
+    }
+
+    /// The mean of the channels.
+    #[inline(always)]
+    pub(crate) fn mean(self) -> f32 {
+        (self.r + self.g + self.b) / 3.0
+    }
+
     /// Every channel times `k`.
     #[inline(always)]
     pub fn scale(self, k: f32) -> Self {
@@ -375,8 +393,8 @@ impl Film {
     /// The same with one alpha for all channels, their mean, for programs that do not support film.
     #[inline(always)]
     pub fn to_rgba(self) -> PremulRgba {
-        let LinearRgb { r, g, b } = self.opacity;
-        let a = if self.is_grey() { r } else { (r + g + b) / 3.0 };
+        let o = self.opacity;
+        let a = if self.is_grey() { o.r } else { o.mean() };
         PremulRgba::new(self.color.r, self.color.g, self.color.b, a)
     }
 

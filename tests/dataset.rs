@@ -13,11 +13,11 @@ use petcomp::dataset::{
     Writer, Yolo, YoloSet, YoloTask, check, contact_sheet_of, generate, merge, repair,
     repair_archives,
 };
-use petcomp::eval::read_yolo_truth_of;
+use petcomp::eval::{label_of, read_yolo_truth_of};
 use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
 use petcomp::label::{Labels, ObjectLabel, RleMask};
-use petcomp::scene::{CameraSource, EdgeTreatment, Exposure, Grade, Object, Placement, Surface};
+use petcomp::scene::{CameraSource, EdgeTreatment, Exposure, Object, Placement, Surface};
 use petcomp::{Coverage, Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -753,19 +753,7 @@ fn a_dataset_without_labels_for_yolo_is_compared_with_its_journal() {
 
 /// A card that fell, one that fell on it, and one that its sidecar file has so far up.
 fn with_a_card_up_at(k: u64, height: f64) -> Sample {
-    let card = |placement| Object {
-        role: Default::default(),
-        asset: "bottle".into(),
-        photo: 0,
-        back: None,
-        size: [0.2, 0.08],
-        thickness: 0.005,
-        outline: vec![],
-        mass: 0.03,
-        placement,
-        grade: Grade::default(),
-        bend: Default::default(),
-    };
+    let card = |placement| Object::new("bottle", [0.2, 0.08], 0.005, 0.03, placement);
     let mut sample = sample(k).unwrap();
     let falls = |i: usize| {
         card(Placement::Drop {
@@ -854,7 +842,7 @@ fn readers_of_records_see_the_labels_that_were_written() {
         assert_eq!(counts.labelled, labels.sum::<usize>() as u64, "{policy:?}");
         let index = DatasetIndex::open(dir.path()).unwrap();
         for (row, sample) in summary.glances.iter().enumerate() {
-            let label = YoloSet::label_of(&dir.path().join(&sample.files[0]));
+            let label = label_of(&dir.path().join(&sample.files[0]));
             let text = std::fs::read_to_string(label).unwrap();
             let class = |line: &str| line.split(' ').next().unwrap().parse().unwrap();
             let written = sorted(text.lines().map(class));
@@ -877,7 +865,7 @@ fn readers_of_records_see_the_labels_that_were_written() {
 
 /// Rows of the label files of images.
 fn rows_of(images: &[PathBuf]) -> usize {
-    let labels = images.iter().map(|image| YoloSet::label_of(image));
+    let labels = images.iter().map(|image| label_of(image));
     labels
         .map(|label| std::fs::read_to_string(label).unwrap().lines().count())
         .sum()
@@ -933,7 +921,7 @@ fn a_split_and_the_check_take_empty_pictures_for_no_look_alikes() {
     for i in [0, 1] {
         let [from, to] = [&split.train[i], &split.val[i]];
         std::fs::copy(from, to).unwrap();
-        std::fs::copy(YoloSet::label_of(from), YoloSet::label_of(to)).unwrap();
+        std::fs::copy(label_of(from), label_of(to)).unwrap();
     }
     let leakage = split.leakage(NEAR_DUPLICATE_RMS).unwrap();
     let alike: Vec<_> = leakage.near_duplicates.iter().map(|n| &n.val).collect();

@@ -5,7 +5,7 @@
 
 use geo::Contains;
 use petcomp::camera::Camera;
-use petcomp::geom::{BBox, Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
+use petcomp::geom::{BBox, Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3, doubled_area};
 use petcomp::label::{
     AmodalBox, DepthRange, LabelOptions, Labels, ObjectLabel, ObstructionRule, OutlineKind,
     cyclic_overlaps, label,
@@ -165,16 +165,8 @@ fn flat_card(id: u32) -> impl Strategy<Value = Card> {
 }
 
 fn area(rings: &[Vec<Point2<f64>>]) -> f64 {
-    let ring = |r: &Vec<Point2<f64>>| {
-        let next = r.iter().cycle().skip(1);
-        0.5 * r
-            .iter()
-            .zip(next)
-            .map(|(a, b)| a.x * b.y - b.x * a.y)
-            .sum::<f64>()
-            .abs()
-    };
-    rings.iter().map(ring).sum()
+    let areas = rings.iter().map(|ring| 0.5 * doubled_area(ring).abs());
+    areas.sum()
 }
 
 /// How far a convex outline may reach beyond the outermost pixels that rays hit, pixels.

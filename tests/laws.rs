@@ -12,19 +12,12 @@ use proptest::prelude::*;
 use rayon::prelude::*;
 
 fn tray() -> Background {
-    Background {
-        k1: 0.0,
-        shown_share: 1.0,
-        albedo: None,
-        wall: None,
-        name: "tray".into(),
-        size: [0.6, 0.4],
-        camera: CameraSource::Rectangle {
-            corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
-            photo: [60, 40],
-            focal_px: None,
-        },
-    }
+    let camera = CameraSource::Rectangle {
+        corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
+        photo: [60, 40],
+        focal_px: None,
+    };
+    Background::new("tray", [0.6, 0.4], camera)
 }
 
 /// Crushed bottles: 16 to 28 cm long, 6 to 10 cm wide, 4 to 20 mm thick.
@@ -261,10 +254,6 @@ fn nothing_at_rest_lies_in_another() {
 fn tight(times: f64, narrow: f64) -> Background {
     let longest = 0.28 * recipe(Range::fixed(1.0)).scale.max;
     Background {
-        k1: 0.0,
-        shown_share: 1.0,
-        albedo: None,
-        wall: None,
         size: [longest * times, longest * times * narrow],
         ..tray()
     }
@@ -362,10 +351,6 @@ fn a_tray_smaller_than_the_longest_card_is_refused_with_both_named() {
     let trays = [
         tray(),
         Background {
-            k1: 0.0,
-            shown_share: 1.0,
-            albedo: None,
-            wall: None,
             name: "box".into(),
             ..tight(0.99, 0.5)
         },

@@ -353,12 +353,13 @@ mod tests {
     }
 
     /// A build that nobody stops.
-    fn build(
-        list: impl AsRef<Path>,
-        folder: impl AsRef<Path>,
-        progress: &(dyn Fn(usize, usize) + Sync),
-    ) -> Result<Built> {
-        super::build(list, folder, progress, &AtomicBool::new(false))
+    fn build(list: impl AsRef<Path>, folder: impl AsRef<Path>) -> Result<Built> {
+        super::build(list, folder, &|_, _| (), &AtomicBool::new(false))
+    }
+
+    /// The list in a folder, and the folder of its assets.
+    fn paths(folder: &tempfile::TempDir) -> [std::path::PathBuf; 2] {
+        ["photos.toml", "out"].map(|name| folder.path().join(name))
     }
 
     fn folder_with(list: &str) -> tempfile::TempDir {
@@ -372,8 +373,8 @@ mod tests {
 
     fn built(list: &str) -> Result<Library> {
         let folder = folder_with(list);
-        let out = folder.path().join("out");
-        let built = build(folder.path().join("photos.toml"), &out, &|_, _| ())?.library;
+        let [list, out] = paths(&folder);
+        let built = build(list, &out)?.library;
         let read = Library::open(out)?;
         assert_eq!(in_brief(&built), in_brief(&read));
         Ok(read)
@@ -403,7 +404,7 @@ mod tests {
     #[test]
     fn a_folder_without_a_list_is_told_what_is_expected_in_it() {
         let folder = tempfile::tempdir().unwrap();
-        let error = build(folder.path(), folder.path().join("out"), &|_, _| ())
+        let error = build(folder.path(), folder.path().join("out"))
             .unwrap_err()
             .to_string();
         assert!(
@@ -415,10 +416,10 @@ mod tests {
     #[test]
     fn a_contact_sheet_of_other_cut_outs_goes() {
         let folder = folder_with(TWO);
-        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        let [list, out] = paths(&folder);
         let pages = [CONTACT_SHEET, "contact_sheet_2.png"].map(|name| out.join(name));
         let left = || {
-            build(&list, &out, &|_, _| ()).unwrap();
+            build(&list, &out).unwrap();
             pages.each_ref().map(|page| page.exists())
         };
         // Where no cut-out was, they are somebody's own.
@@ -462,8 +463,8 @@ mod tests {
         for name in ["one.png", "two.png"] {
             io::write(folder.path().join(name), &cut).unwrap();
         }
-        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
-        let built = build(&list, &out, &|_, _| ()).unwrap();
+        let [list, out] = paths(&folder);
+        let built = build(&list, &out).unwrap();
         let [one, two] = &built.library.assets[0].photos[..] else {
             panic!("two photos")
         };
@@ -488,11 +489,11 @@ mod tests {
         let first = TWO.replacen("0.3\n", "0.3\nthickness = 0.06\nmass = 0.04\n", 1);
         assert_eq!(body(&built(&first).unwrap()), [0.06, 0.04]);
         let folder = folder_with(&first);
-        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
-        build(&list, &out, &|_, _| ()).unwrap();
+        let [list, out] = paths(&folder);
+        build(&list, &out).unwrap();
         let later = TWO.replacen("0.3\n", "0.3\nmass = 0.05\n", 1);
         std::fs::write(&list, later).unwrap();
-        let built = build(&list, &out, &|_, _| ()).unwrap();
+        let built = build(&list, &out).unwrap();
         assert_eq!(body(&built.library), [0.06, 0.05]);
         let file = folder.path().join("two.png");
         let entry = PhotoEntry::new(file, "a", "cap", Scale::Length(0.3));
@@ -503,14 +504,10 @@ mod tests {
     #[test]
     fn building_twice_changes_nothing() {
         let folder = folder_with(TWO);
+        let [list, out] = paths(&folder);
         let manifest = || {
-            build(
-                folder.path().join("photos.toml"),
-                folder.path().join("out"),
-                &|_, _| (),
-            )
-            .unwrap();
-            std::fs::read(folder.path().join("out").join(MANIFEST)).unwrap()
+            build(&list, &out).unwrap();
+            std::fs::read(out.join(MANIFEST)).unwrap()
         };
         assert_eq!(manifest(), manifest());
     }
@@ -518,8 +515,8 @@ mod tests {
     #[test]
     fn what_a_person_said_of_a_photo_holds_whenever_it_is_built() {
         let folder = folder_with(TWO);
-        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
-        let built = || build(&list, &out, &|_, _| ());
+        let [list, out] = paths(&folder);
+        let built = || build(&list, &out);
         let review = |review: Review| {
             std::fs::write(folder.path().join("one.review.json"), review.to_json()).unwrap();
         };
@@ -573,19 +570,19 @@ mod tests {
     #[test]
     fn a_list_whose_last_photos_are_rejected_leaves_nothing_in_the_folder() {
         let folder = folder_with(TWO);
-        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
-        build(&list, &out, &|_, _| ()).unwrap();
+        let [list, out] = paths(&folder);
+        build(&list, &out).unwrap();
         for name in ["one", "two"] {
             reject(&folder, name);
         }
-        let built = build(&list, &out, &|_, _| ()).unwrap();
+        let built = build(&list, &out).unwrap();
         assert_eq!((built.photos, built.rejected), (0, 2));
         assert!(Library::open(&out).unwrap().assets.is_empty());
         assert_eq!(std::fs::read_dir(out.join("a")).unwrap().count(), 0);
         let empty = Image::filled(120, 80, LinearRgb::new(0.04, 0.4, 0.08));
         io::write(folder.path().join("two.png"), &empty).unwrap();
         std::fs::remove_file(folder.path().join("two.review.json")).unwrap();
-        let told = build(&list, &out, &|_, _| ()).unwrap_err().to_string();
+        let told = build(&list, &out).unwrap_err().to_string();
         assert!(told.contains("no photo gave a cut-out"), "{told}");
     }
 
@@ -606,15 +603,15 @@ mod tests {
     #[test]
     fn a_photo_that_gives_no_cut_out_any_more_keeps_its_earlier_one() {
         let folder = folder_with(TWO);
-        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
-        build(&list, &out, &|_, _| ()).unwrap();
+        let [list, out] = paths(&folder);
+        build(&list, &out).unwrap();
         let kept = |name: &str| {
             let both = ["a/one.exr", "a/two.exr"];
             assert_eq!(cut_outs(&Library::open(&out).unwrap()), both, "{name}");
         };
         let stays = "; the earlier cut-out a/two.exr is kept";
         std::fs::write(&list, TWO.replace("= 100.0", "= 2.0")).unwrap();
-        let refused = build(&list, &out, &|_, _| ()).unwrap().refused;
+        let refused = build(&list, &out).unwrap().refused;
         assert!(refused[0].ends_with(stays), "{refused:?}");
         kept("a scale that is wrong");
         let two = folder.path().join("two.png");
@@ -627,7 +624,7 @@ mod tests {
         let empty = Image::filled(120, 80, LinearRgb::new(0.04, 0.4, 0.08));
         io::write(&two, &empty).unwrap();
         std::fs::write(&list, TWO).unwrap();
-        let refused = build(&list, &out, &|_, _| ()).unwrap().refused;
+        let refused = build(&list, &out).unwrap().refused;
         assert!(refused[0].ends_with(stays), "{refused:?}");
         kept("a photo of nothing");
     }
@@ -660,7 +657,7 @@ mod tests {
             ..io::WriteOptions::default()
         };
         io::write_with(folder.path().join("one.exr"), &slab(), &options).unwrap();
-        let refused = build(folder.path(), folder.path().join("out"), &|_, _| ()).unwrap_err();
+        let refused = build(folder.path(), folder.path().join("out")).unwrap_err();
         let told = refused.to_string();
         assert!(
             told.contains("one.exr: pixels are 2 times as wide as high, expected square ones"),
@@ -672,13 +669,9 @@ mod tests {
     fn mistakes_in_a_list_are_named_before_any_work() {
         let printed = |list: &str| {
             let folder = folder_with(list);
-            let error = build(
-                folder.path().join("photos.toml"),
-                folder.path().join("out"),
-                &|_, _| (),
-            )
-            .unwrap_err();
-            assert!(!folder.path().join("out").exists());
+            let [list, out] = paths(&folder);
+            let error = build(list, &out).unwrap_err();
+            assert!(!out.exists());
             error.to_string()
         };
         let declared = |classes: &str| format!("classes = {classes}\n{TWO}");
@@ -712,19 +705,15 @@ mod tests {
         let [toml, csv] =
             ["photos.toml", "photos.csv"].map(|name| List::read(folder.path().join(name)).unwrap());
         assert_eq!(toml, csv);
-        let both = build(folder.path(), folder.path().join("out"), &|_, _| ()).unwrap_err();
+        let both = build(folder.path(), folder.path().join("out")).unwrap_err();
         let both = both.to_string();
         assert!(
             both.contains("photos.toml and photos.csv, expected only one"),
             "{both}"
         );
         std::fs::remove_file(folder.path().join("photos.toml")).unwrap();
-        assert_eq!(
-            build(folder.path(), folder.path().join("out"), &|_, _| ())
-                .unwrap()
-                .photos,
-            2
-        );
+        let built = build(folder.path(), folder.path().join("out")).unwrap();
+        assert_eq!(built.photos, 2);
         std::fs::write(
             folder.path().join("photos.csv"),
             "file,class\none.png,cap\n",
@@ -746,9 +735,8 @@ mod tests {
             .replacen("\"cap\"", "\"see-through bag\"", 1);
         let folder = folder_with(&three);
         let list = folder.path().join("photos.toml");
-        let classes = |out: &str| {
-            build(&list, folder.path().join(out), &|_, _| ()).map(|built| built.library.classes)
-        };
+        let classes =
+            |out: &str| build(&list, folder.path().join(out)).map(|built| built.library.classes);
         assert_eq!(classes("met").unwrap(), ["see-through bag", "cap"]);
         let declared = format!("classes = [\"cap\", \"jar\", \"see-through bag\"]\n{three}");
         std::fs::write(&list, declared).unwrap();
@@ -767,10 +755,10 @@ mod tests {
     #[test]
     fn what_a_corrected_list_leaves_in_the_folder_is_reported() {
         let folder = folder_with(TWO);
-        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        let [list, out] = paths(&folder);
         let built = |text: &str| {
             std::fs::write(&list, text).unwrap();
-            build(&list, &out, &|_, _| ())
+            build(&list, &out)
         };
         assert!(built(TWO).unwrap().unlisted.is_empty());
         let one = &TWO[..TWO.rfind("[[photos]]").unwrap()];
@@ -812,8 +800,8 @@ mod tests {
     #[test]
     fn a_scale_that_is_wrong_for_one_photo_does_not_stop_the_others() {
         let folder = folder_with(&TWO.replace("px_per_metre = 100.0", "px_per_metre = 2.0"));
-        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
-        let built = build(&list, &out, &|_, _| ()).unwrap();
+        let [list, out] = paths(&folder);
+        let built = build(&list, &out).unwrap();
         assert_eq!(cut_outs(&built.library), ["a/one.exr"]);
         let [told] = &built.refused[..] else {
             panic!("one photo is refused")
@@ -833,10 +821,7 @@ mod tests {
         let list = folder.path().join("photos.toml");
         let entry = PhotoEntry::new(&photo, "a", "cap", Scale::Length(0.3));
         let added = add_photo(folder.path(), &entry, &[], &CutOutOptions::default());
-        for told in [
-            build(&list, folder.path(), &|_, _| ()).unwrap_err(),
-            added.unwrap_err(),
-        ] {
+        for told in [build(&list, folder.path()).unwrap_err(), added.unwrap_err()] {
             let told = told.to_string();
             assert!(
                 told.contains("is an input and would be overwritten"),
@@ -850,13 +835,8 @@ mod tests {
     #[test]
     fn a_photo_is_found_by_its_name_in_capitals_and_by_either_spelling_of_jpeg() {
         let folder = folder_with(&TWO.replace("one.png", "ONE.PNG"));
-        let list = folder.path().join("photos.toml");
-        assert_eq!(
-            build(&list, folder.path().join("out"), &|_, _| ())
-                .unwrap()
-                .photos,
-            2
-        );
+        let [list, out] = paths(&folder);
+        assert_eq!(build(list, out).unwrap().photos, 2);
     }
 
     #[test]
@@ -870,20 +850,11 @@ mod tests {
             folder.path().join("\u{fc}.png"),
         )
         .unwrap();
-        build(
-            folder.path().join("photos.toml"),
-            folder.path().join("out"),
-            &|_, _| (),
-        )
-        .unwrap();
-        assert!(
-            folder
-                .path()
-                .join("out/Flasche_gr\u{fc}n/\u{fc}.exr")
-                .exists()
-        );
+        let [list, out] = paths(&folder);
+        build(list, &out).unwrap();
+        assert!(out.join("Flasche_gr\u{fc}n/\u{fc}.exr").exists());
         assert_eq!(
-            Library::open(folder.path().join("out")).unwrap().assets[0].name,
+            Library::open(out).unwrap().assets[0].name,
             "Flasche_gr\u{fc}n"
         );
     }
@@ -893,12 +864,8 @@ mod tests {
         let folder = folder_with(TWO);
         let empty = Image::filled(120, 80, LinearRgb::new(0.04, 0.4, 0.08));
         io::write(folder.path().join("two.png"), &empty).unwrap();
-        let built = build(
-            folder.path().join("photos.toml"),
-            folder.path().join("out"),
-            &|_, _| (),
-        )
-        .unwrap();
+        let [list, out] = paths(&folder);
+        let built = build(list, out).unwrap();
         assert_eq!(
             (built.photos, built.refused.len(), built.rejected),
             (1, 1, 0)
@@ -922,8 +889,8 @@ mod tests {
         let list = TWO.replace("px_per_metre", "matte = \"outline\"\npx_per_metre");
         let folder = folder_with(&list);
         io::write(folder.path().join("two.png"), &on_grey_board()).unwrap();
-        let out = folder.path().join("out");
-        build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap();
+        let [list, out] = paths(&folder);
+        build(list, &out).unwrap();
         let [one, two] = &Library::open(&out).unwrap().assets[0].photos[..] else {
             panic!("two photos")
         };
@@ -963,8 +930,8 @@ mod tests {
     fn a_guess_on_a_grey_board_is_told_kept_and_shown() {
         let folder = folder_with(TWO);
         io::write(folder.path().join("two.png"), &on_grey_board()).unwrap();
-        let out = folder.path().join("out");
-        let built = build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap();
+        let [list, out] = paths(&folder);
+        let built = build(list, &out).unwrap();
         assert!(
             built
                 .needs_review
@@ -1051,8 +1018,8 @@ mod tests {
         ];
         for (from, to) in missing {
             let folder = folder_with(&TWO.replace(from, to));
-            let out = folder.path().join("out");
-            let error = build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap_err();
+            let [list, out] = paths(&folder);
+            let error = build(list, &out).unwrap_err();
             assert!(
                 error.to_string().contains("three.png: no such file"),
                 "{error}"
@@ -1064,7 +1031,7 @@ mod tests {
     #[test]
     fn what_killed_runs_left_is_deleted_after_a_day() {
         let folder = folder_with(TWO);
-        let out = folder.path().join("out");
+        let [list, out] = paths(&folder);
         std::fs::create_dir_all(out.join("a")).unwrap();
         let left = |name: &str, hours: u64| {
             let file = std::fs::File::create(out.join(name)).unwrap();
@@ -1081,7 +1048,7 @@ mod tests {
         for (name, hours) in names {
             left(name, hours);
         }
-        build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap();
+        build(list, &out).unwrap();
         let stays = names.map(|(name, _)| out.join(name).exists());
         assert_eq!(stays, [false, false, true, true]);
     }
@@ -1089,8 +1056,8 @@ mod tests {
     #[test]
     fn a_cut_out_that_the_manifest_does_not_tell_of_is_noticed() {
         let folder = folder_with(TWO);
-        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
-        let built = build(&list, &out, &|_, _| ()).unwrap().library;
+        let [list, out] = paths(&folder);
+        let built = build(&list, &out).unwrap().library;
         let photo = &built.assets[0].photos[0];
         let file = out.join(&photo.record.file);
         let crc32 = crc32fast::hash(&std::fs::read(&file).unwrap());
@@ -1108,14 +1075,14 @@ mod tests {
         let older: Vec<_> = lines.collect();
         std::fs::write(out.join(MANIFEST), older.join("\n")).unwrap();
         Library::open(&out).unwrap();
-        build(&list, &out, &|_, _| ()).unwrap();
+        build(&list, &out).unwrap();
         Library::open(&out).unwrap();
     }
 
     #[test]
     fn a_build_that_was_stopped_is_resumed() {
         let folder = folder_with(TWO);
-        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        let [list, out] = paths(&folder);
         let stop = AtomicBool::new(false);
         let after_one = |done: usize, _: usize| stop.store(done == 1, Ordering::Relaxed);
         let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build();
@@ -1132,7 +1099,7 @@ mod tests {
         assert_eq!([built.photos, built.kept], [2, 1]);
         let manifest = io::read_text(out.join(MANIFEST)).unwrap();
         let anew = folder.path().join("anew");
-        build(&list, &anew, &|_, _| ()).unwrap();
+        build(&list, &anew).unwrap();
         assert_eq!(io::read_text(anew.join(MANIFEST)).unwrap(), manifest);
         // A lost file, another length: these are cut out again.
         std::fs::remove_file(out.join("a/two.exr")).unwrap();
@@ -1145,14 +1112,14 @@ mod tests {
     #[test]
     fn what_was_cut_out_beside_an_unreadable_photo_is_in_the_manifest() {
         let folder = folder_with(TWO);
-        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
-        build(&list, &out, &|_, _| ()).unwrap();
+        let [list, out] = paths(&folder);
+        build(&list, &out).unwrap();
         // The slab without its right third.
         let slab = slab();
         let shorter = Image::from_fn(120, 80, |x, y| slab[(if x < 70 { x } else { 0 }, y)]);
         io::write(folder.path().join("one.png"), &shorter).unwrap();
         std::fs::write(folder.path().join("two.png"), "no picture").unwrap();
-        let told = build(&list, &out, &|_, _| ()).unwrap_err().to_string();
+        let told = build(&list, &out).unwrap_err().to_string();
         assert!(told.contains("two.png: not a picture"), "{told}");
         let library = Library::open(&out).unwrap();
         assert_eq!(cut_outs(&library), ["a/one.exr", "a/two.exr"]);

@@ -39,7 +39,7 @@ pub(super) fn write(path: &Path, flow: &Flow) -> Result<()> {
     let samples = planes.iter().map(Vec::as_slice);
     let channels = CHANNELS.into_iter().zip(samples);
     let channels: Vec<_> = channels.chain([(KNOWN, known.pixels())]).collect();
-    io::exr::write_half_channels(path, flow.paths.size(), &channels, &[])
+    io::exr::write_half_channels(path, flow.paths.size(), &channels)
 }
 
 /// The file of a record's flow, where it has one.
@@ -171,7 +171,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.flow.exr");
         let told = |channels: &[(&str, &[f32])]| {
-            io::exr::write_half_channels(&path, (2, 1), channels, &[]).unwrap();
+            io::exr::write_half_channels(&path, (2, 1), channels).unwrap();
             read(folder.path(), &record(), (2, 1))
                 .unwrap_err()
                 .to_string()

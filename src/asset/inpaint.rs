@@ -105,15 +105,13 @@ impl<'a, S: Fn(f64, f64) -> LinearRgb> CoonsPatch<'a, S> {
         let side = self.side;
         let (s, t) = (place.x as f32, place.y as f32);
         let [top_left, top_right, bottom_left, bottom_right] = self.corners;
-        let across = mix(side(0.0, place.y), side(1.0, place.y), s);
-        let down = mix(side(place.x, 0.0), side(place.x, 1.0), t);
-        let (top, bottom) = (
-            mix(top_left, top_right, s),
-            mix(bottom_left, bottom_right, s),
-        );
+        let across = side(0.0, place.y).mixed(side(1.0, place.y), s);
+        let down = side(place.x, 0.0).mixed(side(place.x, 1.0), t);
+        let top = top_left.mixed(top_right, s);
+        let bottom = bottom_left.mixed(bottom_right, s);
         across
             .add_scaled(1.0, down)
-            .add_scaled(-1.0, mix(top, bottom, t))
+            .add_scaled(-1.0, top.mixed(bottom, t))
     }
 }
 
@@ -121,10 +119,6 @@ impl<'a, S: Fn(f64, f64) -> LinearRgb> CoonsPatch<'a, S> {
 fn seen_at(picture: &Image<LinearRgb>, square: &SeenSquare, s: f64, t: f64) -> LinearRgb {
     let at = square.picture_from_square.map(Point2::new(s, t));
     sample_bilinear_clamped(picture, at.x, at.y)
-}
-
-fn mix(a: LinearRgb, b: LinearRgb, share: f32) -> LinearRgb {
-    a.scale(1.0 - share).add_scaled(share, b)
 }
 
 #[cfg(test)]

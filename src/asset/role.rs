@@ -38,10 +38,7 @@ impl FromStr for Role {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self, Error> {
-        by_name(&Self::ALL, name).ok_or_else(|| {
-            let what = format!("\"{name}\", expected object or distractor");
-            Error::value("role", what)
-        })
+        by_name("role", &Self::ALL, name)
     }
 }
 
@@ -57,6 +54,6 @@ mod tests {
             assert_eq!(role.to_string(), name);
         }
         let told = "cap".parse::<Role>().unwrap_err().to_string();
-        assert_eq!(told, "role: \"cap\", expected object or distractor");
+        assert_eq!(told, "role: \"cap\", expected one of object, distractor");
     }
 }

@@ -1,6 +1,6 @@
 //! The size of an outline, however it is turned.
 
-use crate::geom::{Point2, Vector2};
+use crate::geom::{Point2, Vector2, sides};
 
 /// Length and width, longest first, of the rectangle of least area around a convex polygon; 0 for
 /// no polygon.
@@ -9,9 +9,8 @@ use crate::geom::{Point2, Vector2};
 /// One side of that rectangle lies on a side of the polygon (Freeman and Shapira 1975), so every
 /// side is tried.
 pub(crate) fn oriented_size(hull: &[Point2<f64>]) -> [f64; 2] {
-    let next = hull.iter().cycle().skip(1);
-    let sides = hull.iter().zip(next).map(|(a, b)| b - a);
-    let boxes = sides
+    let boxes = sides(hull)
+        .map(|[a, b]| b - a)
         .filter(|side| side.norm() > 0.0)
         .map(|side| size_along(hull, side.normalize()));
     let [a, b] = boxes

@@ -1,5 +1,10 @@
 //! Solution files (`NAME.camera.json`): a solved camera with everything known about it.
 
+#![allow(
+    missing_docs,
+    reason = "the fields of Solution, in the words of the file format"
+)]
+
 use super::exchange::{BlenderCamera, OpencvCamera, matrix_rows};
 use super::focal::FocalSource;
 use super::label::{Framing, Label, LabelImage, version_one};
@@ -105,10 +110,6 @@ pub struct FoundCamera {
 /// Intrinsics in our pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(
-    missing_docs,
-    reason = "the fields of Solution, in the words of the file format"
-)]
 pub struct Model {
     pub f_px: f64,
     pub principal_point_px: [f64; 2],
@@ -118,10 +119,6 @@ pub struct Model {
 /// Sides of the rectangle as fitted, metres.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(
-    missing_docs,
-    reason = "the fields of Solution, in the words of the file format"
-)]
 pub struct FittedSurface {
     pub width_m: f64,
     pub height_m: f64,
@@ -130,10 +127,6 @@ pub struct FittedSurface {
 /// The prior of the focal length: pixels, and relative standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(
-    missing_docs,
-    reason = "the fields of Solution, in the words of the file format"
-)]
 pub struct FocalPrior {
     pub px: f64,
     pub sigma: Option<f64>,
@@ -142,10 +135,6 @@ pub struct FocalPrior {
 /// Standard deviations; `null` where nothing is known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(
-    missing_docs,
-    reason = "the fields of Solution, in the words of the file format"
-)]
 pub struct SigmaRecord {
     pub ln_f: Option<f64>,
     pub tilt_deg: Option<f64>,
@@ -162,10 +151,6 @@ pub struct SigmaRecord {
 /// How well the label fits.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(
-    missing_docs,
-    reason = "the fields of Solution, in the words of the file format"
-)]
 pub struct FitRecord {
     pub chi2: f64,
     pub dof: usize,

@@ -3,7 +3,6 @@
 use super::recognise::refused;
 use super::solve::BlackAndWhite;
 use super::stack::DIFFERENCE_BLUR_PX;
-use super::view::{grey, where_set};
 use crate::bounds::above;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -106,9 +105,9 @@ const REFUSED_BANDS: f64 = 0.05;
 /// # Errors
 /// [`Error::Photo`](crate::Error::Photo) where the white frame is far from smooth.
 pub(super) fn bands(frames: &BlackAndWhite<'_>, free: &Mask) -> Result<Option<Diagnostic>> {
-    let ratio = frames
-        .white
-        .zip_map(frames.empty_white, |p, e| grey(p) / grey(e).max(1e-6) - 1.0);
+    let ratio = frames.white.zip_map(frames.empty_white, |p, e| {
+        p.mean() / e.mean().max(1e-6) - 1.0
+    });
     let deviation = deviation_of_blocks(&ratio, free);
     if deviation <= MAX_BANDS {
         return Ok(None);
@@ -169,8 +168,8 @@ pub(super) fn color_change(empty_white: &Image<LinearRgb>, free: &Mask) -> Optio
 
 /// The largest over the smallest value where a mask is set, less 1.
 fn change_where(image: &Image<f32>, mask: &Mask) -> f32 {
-    let [low, high] =
-        where_set(image, mask).fold([f32::MAX, 0.0], |[low, high], v| [v.min(low), v.max(high)]);
+    let values = image.pixels_in(mask);
+    let [low, high] = values.fold([f32::MAX, 0.0], |[low, high], v| [v.min(low), v.max(high)]);
     high / low.max(f32::MIN_POSITIVE) - 1.0
 }
 
@@ -183,7 +182,7 @@ const MAX_PASSED: f32 = 1.03;
 pub(super) fn exchange(frames: &BlackAndWhite<'_>, coverage: &Image<Coverage>) -> Result<()> {
     let object = coverage.map(|c| c.0 > 0.5);
     let brighter = passed(frames).zip3_map(&frames.light(), &object, |passed, light, inside| {
-        inside && passed > MAX_PASSED * grey(light)
+        inside && passed > MAX_PASSED * light.mean()
     });
     if 2 * brighter.count() <= object.count() {
         return Ok(());
@@ -215,7 +214,7 @@ pub(super) fn black_without_object(
         return Ok(());
     }
     let object = coverage.map(|c| c.0 > 0.5);
-    let least = MIN_DIFFERENCE * median_where(&frames.light().map(grey), free);
+    let least = MIN_DIFFERENCE * median_where(&frames.light().map(LinearRgb::mean), free);
     // How much each differs from the empty display inside the object, in units of what it does
     // around it.
     let all = photos.iter().map(|(name, black)| {
@@ -239,22 +238,24 @@ pub(super) fn black_without_object(
 
 /// How much a black photo differs from the empty display, without noise.
 fn difference(black: &Image<f32>, frames: &BlackAndWhite<'_>) -> Image<f32> {
-    let off = black.zip_map(frames.empty_black, |p, e| p - grey(e));
+    let off = black.zip_map(frames.empty_black, |p, e| p - e.mean());
     filter::gaussian_blur(&off, DIFFERENCE_BLUR_PX).map(f32::abs)
 }
 
 fn median_where(image: &Image<f32>, mask: &Mask) -> f32 {
-    median(where_set(image, mask), f32::total_cmp).unwrap_or_default()
+    median(image.pixels_in(mask), f32::total_cmp).unwrap_or_default()
 }
 
 fn mean_where(image: &Image<f32>, mask: &Mask) -> f32 {
-    let sum: f64 = where_set(image, mask).map(f64::from).sum();
+    let sum: f64 = image.pixels_in(mask).map(f64::from).sum();
     (sum / mask.count().max(1) as f64) as f32
 }
 
 /// What is seen more of white than of black.
 fn passed(frames: &BlackAndWhite<'_>) -> Image<f32> {
-    frames.white.zip_map(frames.black, |w, k| grey(w) - grey(k))
+    frames
+        .white
+        .zip_map(frames.black, |w, k| w.mean() - k.mean())
 }
 
 /// Motion of the camera that leaves double edges, pixels of the photo.
@@ -304,11 +305,11 @@ fn change_of_stripes(
     free: &Mask,
 ) -> f64 {
     let passed = passed(frames);
-    let above = stripes.zip_map(frames.black, |mean, k| mean - grey(k));
+    let above = stripes.zip_map(frames.black, |mean, k| mean - k.mean());
     let share = ratio_where(&above, &passed, free);
     let light = frames
         .light()
-        .map(|light| grey(light).max(f32::MIN_POSITIVE));
+        .map(|light| light.mean().max(f32::MIN_POSITIVE));
     let off = above.zip3_map(&passed, &light, |above, passed, light| {
         (above - share * passed) / light
     });
@@ -317,14 +318,14 @@ fn change_of_stripes(
 
 fn root_mean_square(image: &Image<f32>, coverage: &Image<Coverage>) -> f64 {
     let inside = coverage.map(|c| c.0 > 0.5);
-    let (sum, count) =
-        where_set(image, &inside).fold((0.0, 0.0), |(sum, n), v| (sum + f64::from(v * v), n + 1.0));
+    let values = image.pixels_in(&inside);
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, n), v| (sum + f64::from(v * v), n + 1.0));
     (sum / f64::max(count, 1.0)).sqrt()
 }
 
 /// Sum of one picture over that of another, where a mask is set.
 fn ratio_where(a: &Image<f32>, b: &Image<f32>, mask: &Mask) -> f32 {
-    let [sum_a, sum_b] = [a, b].map(|v| where_set(v, mask).map(f64::from).sum::<f64>());
+    let [sum_a, sum_b] = [a, b].map(|v| v.pixels_in(mask).map(f64::from).sum::<f64>());
     (sum_a / sum_b.max(1e-9)) as f32
 }
 

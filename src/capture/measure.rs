@@ -9,12 +9,12 @@ use super::recognise::{FramePhoto, refused};
 use super::solve::{BlackAndWhite, FilmInput, NoiseModel};
 use super::stack::{Alignment, Photos, Stack};
 use super::stripes::SeenStripes;
-use super::view::{View, grey, where_set};
+use super::view::View;
 use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
-use crate::matte::{Outline, PlateOptions, ScreenPlate};
+use crate::matte::{Outline, PlateOptions, ScreenPlate, mean_color};
 use crate::pixel::{Coverage, Film, LinearRgb};
 
 /// An object as it was measured, over the whole display seen from above.
@@ -180,7 +180,7 @@ impl<'a> CaptureScene<'a> {
         let frames = self.frames();
         let mut noise = frames.noise(&self.free);
         if self.empty_stack.is_some() {
-            noise.empty = noise.of_white(grey(mean_where(frames.empty_white, &self.free)));
+            noise.empty = noise.of_white(mean_where(frames.empty_white, &self.free).mean());
         }
         noise
     }
@@ -207,13 +207,13 @@ impl<'a> CaptureScene<'a> {
         let frames = self.frames();
         diagnostics.extend(check::object_motion(
             &frames,
-            &self.stack.stripes.mean.map(grey),
+            &self.stack.stripes.mean.map(LinearRgb::mean),
             &self.object.coverage,
             &self.free,
         ));
         let light = frames.light();
         // Grey last: a mean of products is not the product of means.
-        let passed = film.zip_map(&light, |film, light| grey(film.transmittance() * light));
+        let passed = film.zip_map(&light, |film, light| (film.transmittance() * light).mean());
         let input = BendInput {
             display: self.display,
             view: self.view,
@@ -221,8 +221,8 @@ impl<'a> CaptureScene<'a> {
             empty: empty.as_ref(),
             free: &self.free,
             coverage: &self.object.coverage,
-            transmittance: &film.map(|film| grey(film.transmittance())),
-            light: &light.map(grey),
+            transmittance: &film.map(|film| film.transmittance().mean()),
+            light: &light.map(LinearRgb::mean),
             passed: &passed,
         };
         Some(input.solve())
@@ -277,17 +277,11 @@ fn fitted(photo: &Image<LinearRgb>, free: &Mask) -> Result<Image<LinearRgb>> {
 }
 
 fn mean_where(image: &Image<LinearRgb>, mask: &Mask) -> LinearRgb {
-    let pixels = where_set(image, mask);
-    let (sum, count) = pixels.fold(([0.0_f64; 3], 0.0), |(sum, n), p| {
-        let p = p.channels();
-        ([0, 1, 2].map(|c: usize| sum[c] + f64::from(p[c])), n + 1.0)
-    });
-    LinearRgb::from(sum.map(|s| (s / f64::max(count, 1.0)) as f32))
+    mean_color(image.pixels_in(mask)).unwrap_or_default()
 }
 
 fn unevenness(light: &Image<LinearRgb>, mask: &Mask) -> f32 {
-    let ends = where_set(light, mask).fold([f32::MAX, 0.0], |[low, high], p| {
-        [low.min(grey(p)), high.max(grey(p))]
-    });
+    let light = light.pixels_in(mask).map(LinearRgb::mean);
+    let ends = light.fold([f32::MAX, 0.0], |[low, high], v| [low.min(v), high.max(v)]);
     (1.0 - ends[0] / ends[1].max(1e-6)).clamp(0.0, 1.0)
 }

@@ -1,7 +1,6 @@
 //! Where the object is: where the display differs from the empty one.
 
 use super::recognise::refused;
-use super::view::{grey, where_set};
 use crate::bounds::above;
 use crate::error::{Error, Result};
 use crate::filter;
@@ -49,10 +48,10 @@ pub(super) fn evidence(
     [empty_black, empty_white]: [&Image<LinearRgb>; 2],
 ) -> Image<f32> {
     let in_white = white.zip_map(empty_white, |p, e| {
-        (grey(p) - grey(e)).abs() / grey(e).max(f32::MIN_POSITIVE)
+        (p.mean() - e.mean()).abs() / e.mean().max(f32::MIN_POSITIVE)
     });
     let in_black = black.zip3_map(empty_black, empty_white, |p, e, w| {
-        (grey(p) - grey(e)).abs() / grey(w).max(f32::MIN_POSITIVE)
+        (p.mean() - e.mean()).abs() / w.mean().max(f32::MIN_POSITIVE)
     });
     let strongest = in_white.zip_map(&in_black, f32::max);
     filter::gaussian_blur(&strongest, EVIDENCE_BLUR_PX)
@@ -66,7 +65,7 @@ impl Object {
     /// something is larger than the area.
     pub(super) fn find(evidence: &Image<f32>, free: &Mask) -> Result<Self> {
         let threshold = threshold(evidence, free);
-        let strongest = local_maximum(evidence, EDGE_REACH_PX);
+        let strongest = filter::largest_around(evidence, EDGE_REACH_PX);
         let rough = evidence.zip3_map(&strongest, free, |e, most, free| {
             free && most > threshold && e >= 0.5 * most
         });
@@ -104,7 +103,7 @@ impl Object {
         // Dirt and reflections are large, but faint.
         // By how much a piece changes the display's light, all its pixels together.
         let [faint, strong] =
-            [&other, &object].map(|piece| where_set(evidence, piece).map(f64::from).sum::<f64>());
+            [&other, &object].map(|piece| evidence.pixels_in(piece).map(f64::from).sum::<f64>());
         if is_speck || faint < share * strong {
             return Ok(());
         }
@@ -118,7 +117,7 @@ impl Object {
 }
 
 fn threshold(evidence: &Image<f32>, free: &Mask) -> f32 {
-    let typical = median(where_set(evidence, free), f32::total_cmp).unwrap_or_default();
+    let typical = median(evidence.pixels_in(free), f32::total_cmp).unwrap_or_default();
     MIN_EVIDENCE.max(EVIDENCE_MEDIANS * typical)
 }
 
@@ -135,22 +134,6 @@ fn nothing_found(threshold: f32) -> Error {
          (expected at most {most:.1} %); also photograph it empty, from the same place and in the same light (--empty)",
         above(typical, most)
     ))
-}
-
-/// The largest value around each pixel.
-fn local_maximum(image: &Image<f32>, reach: usize) -> Image<f32> {
-    let (w, h) = image.size();
-    let reach = reach as isize;
-    let along_x = Image::from_fn(w, h, |x, y| {
-        (-reach..=reach)
-            .map(|d| image.nearest(x as isize + d, y as isize))
-            .fold(0.0, f32::max)
-    });
-    Image::from_fn(w, h, |x, y| {
-        (-reach..=reach)
-            .map(|d| along_x.nearest(x as isize, y as isize + d))
-            .fold(0.0, f32::max)
-    })
 }
 
 /// A mask without gaps and holes.

@@ -9,7 +9,7 @@
 //!
 //! [Smith and Blinn 1996]: https://doi.org/10.1145/237170.237263
 
-use super::view::{clipped, where_set};
+use super::view::clipped;
 use crate::filter::{self, Pyramid, sample_bilinear_clamped};
 use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, Film, LinearRgb, Mix, PremulRgba};
@@ -39,7 +39,7 @@ impl BlackAndWhite<'_> {
     /// Light of the display's brightest channel, where it is free.
     fn brightest(&self, free: &Mask) -> f32 {
         let light = self.light().map(LinearRgb::max_channel);
-        let middle = median(where_set(&light, free), f32::total_cmp);
+        let middle = median(light.pixels_in(free), f32::total_cmp);
         middle.unwrap_or(1.0).max(DARKEST)
     }
 
@@ -204,7 +204,7 @@ impl FilmInput<'_> {
                 [0, 1, 2].map(|c: usize| (mean[c] - black[c]) / light[c].max(self.least_light))
             });
         let of = |channel: usize| {
-            let values = where_set(&above, self.free).map(|above| above[channel]);
+            let values = above.pixels_in(self.free).map(|above| above[channel]);
             median(values, f32::total_cmp).unwrap_or(0.5)
         };
         LinearRgb::from([0, 1, 2].map(of))

@@ -5,7 +5,7 @@ use super::draw::PAPER_LIGHT;
 use super::frame::{Frame, SHIFTS, Stripes};
 use super::object::MIN_AREA;
 use super::recognise::{FramePhoto, map_in_front, refused};
-use super::view::{View, clipped, grey};
+use super::view::{View, clipped};
 use crate::bounds::above;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
@@ -85,7 +85,7 @@ impl StripeStack {
         let share = 1.0 / Stripes::COUNT as f32;
         self.mean = self.mean.zip_map(seen, |sum, p| sum.add_scaled(share, p));
         let axes = &mut self.light[usize::from(stripes.is_fine)];
-        axes[stripes.axis][stripes.shift] = seen.map(grey);
+        axes[stripes.axis][stripes.shift] = seen.map(LinearRgb::mean);
     }
 }
 
@@ -161,7 +161,7 @@ impl<'a> Alignment<'a> {
         let name = |i: usize| photos.sources.names[i].clone();
         let (first_seen, mask) = self.aligned(photos, first)?;
         let mut clipped = vec![(name(first), mask)];
-        let mut each = vec![(name(first), first_seen.map(grey))];
+        let mut each = vec![(name(first), first_seen.map(LinearRgb::mean))];
         let mut sum = first_seen.clone();
         for &other in others {
             let (seen, mask) = self.aligned(photos, other)?;
@@ -169,7 +169,7 @@ impl<'a> Alignment<'a> {
                 return Err(differing([first, other].map(|i| &*photos.sources.names[i])));
             }
             clipped.push((name(other), mask));
-            each.push((name(other), seen.map(grey)));
+            each.push((name(other), seen.map(LinearRgb::mean)));
             sum = sum.zip_map(&seen, |a, b| a + b);
         }
         let share = 1.0 / numbers.len() as f32;
@@ -182,7 +182,7 @@ impl<'a> Alignment<'a> {
 
     /// Two photos of a frame differ as with an object and without.
     fn differ(&self, a: &Image<LinearRgb>, b: &Image<LinearRgb>) -> bool {
-        let off = a.zip_map(b, |a, b| grey(a) - grey(b));
+        let off = a.zip_map(b, |a, b| a.mean() - b.mean());
         let most = MAX_DIFFERENCE * white_light(self.reference);
         // The edges of markers differ most where photos are aligned to half a pixel only.
         let free = self.view.free_area(self.display);
@@ -296,7 +296,7 @@ impl Photos<'_> {
 /// Grey light of the display's white, by the paper of its markers.
 fn white_light(photo: &FramePhoto) -> f32 {
     let papers = photo.paper.iter().flatten();
-    let (sum, count) = papers.fold((0.0, 0.0), |(sum, n), paper| (sum + grey(*paper), n + 1.0));
+    let (sum, count) = papers.fold((0.0, 0.0), |(sum, n), paper| (sum + paper.mean(), n + 1.0));
     sum / f32::max(count, 1.0) / PAPER_LIGHT
 }
 

@@ -79,18 +79,6 @@ impl View {
     }
 }
 
-/// The pixels of an image where a mask is set.
-pub(super) fn where_set<P: Copy>(image: &Image<P>, mask: &Mask) -> impl Iterator<Item = P> {
-    let pixels = image.pixels().iter().zip(mask.pixels());
-    pixels.filter_map(|(p, set)| set.then_some(*p))
-}
-
-/// The mean of the channels.
-#[inline]
-pub(super) fn grey(light: LinearRgb) -> f32 {
-    (light.r + light.g + light.b) / 3.0
-}
-
 /// A channel from here on is clipped, in photos that end at 1.
 const CLIPPED: f32 = 0.985;
 

@@ -60,10 +60,7 @@ impl FromStr for Aov {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        by_name(&Self::ALL, name).ok_or_else(|| {
-            let names = Self::ALL.map(|(n, _)| n).join(", ");
-            Error::value("aov", format!("\"{name}\", expected some of {names}"))
-        })
+        by_name("aov", &Self::ALL, name)
     }
 }
 
@@ -303,18 +300,11 @@ mod tests {
     use super::*;
     use crate::camera::Camera;
     use crate::composite;
-    use crate::geom::{Pose, Quad, UnitQuaternion, Vector2, Vector3};
+    use crate::geom::{Pose, Quad};
     use crate::render::{RenderOptions, render};
     use crate::scene::Bend;
 
     fn shot() -> Shot {
-        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-        let camera = Camera {
-            image: [32, 24],
-            focal_px: Vector2::new(40.0, 40.0),
-            principal_px: Point2::new(16.0, 12.0),
-            camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
-        };
         let card = |id, z: f64, alpha: f32| {
             let quad = Quad {
                 world_from_card: Pose::translation(0.02 * z, 0.0, z),
@@ -326,7 +316,7 @@ mod tests {
                 ..Card::new(ObjectId(id), quad, Image::filled(8, 8, texel))
             }
         };
-        Shot::new(camera)
+        Shot::new(Camera::looking_down(1.0, 40.0, [32, 24]))
             .with_card(card(3, 0.1, 0.5))
             .with_card(card(7, 0.2, 0.25))
             .with_ambient(LinearRgb::WHITE)

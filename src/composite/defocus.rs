@@ -278,7 +278,7 @@ impl Shadows {
             }),
             seen: Image::from_fn(width, height, |x, y| {
                 let (deep, x, y) = place(x, y);
-                mean(deep.flat(x, y).transmittance()) + HIDDEN_WEIGHT
+                deep.flat(x, y).transmittance().mean() + HIDDEN_WEIGHT
             }),
         }
     }
@@ -434,10 +434,10 @@ impl SoftSample<'_> {
             return self.sample(PixelEffect { light, hidden }, self.pixel.visible);
         }
         let behind = self.behind(through, at);
-        let seen = self.pixel.visible * (1.0 - apart) + mean(behind.hidden) * apart;
+        let seen = self.pixel.visible * (1.0 - apart) + behind.hidden.mean() * apart;
         let both = PixelEffect {
-            light: mixed(light, behind.light, apart),
-            hidden: mixed(hidden, behind.hidden, apart),
+            light: light.mixed(behind.light, apart),
+            hidden: hidden.mixed(behind.hidden, apart),
         };
         self.sample(both, seen)
     }
@@ -496,20 +496,12 @@ impl SoftSample<'_> {
     }
 }
 
-fn mixed(a: LinearRgb, b: LinearRgb, share: f32) -> LinearRgb {
-    a.scale(1.0 - share).add_scaled(share, b)
-}
-
 /// A colour scaled to a mean of 1; white for one that is practically black.
 fn hue_of(color: LinearRgb) -> LinearRgb {
-    match mean(color) {
+    match color.mean() {
         bright if bright > LEAST_ALPHA => color.scale(1.0 / bright),
         _ => LinearRgb::WHITE,
     }
-}
-
-fn mean(color: LinearRgb) -> f32 {
-    (color.r + color.g + color.b) / 3.0
 }
 
 #[cfg(test)]

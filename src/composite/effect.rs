@@ -25,17 +25,12 @@ impl Effect<'_> {
         }
     }
 
-    /// The frame over a plate, with everything except the plate blurred.
-    pub(super) fn blurred_frame(
-        &self,
-        plate: &Image<LinearRgb>,
-        sigma_px: f32,
-    ) -> Image<PremulRgba> {
-        let soft = match self {
+    /// The effect itself blurred, as films.
+    pub(super) fn blurred(&self, sigma_px: f32) -> Image<Film> {
+        match self {
             Self::Still(deep) => gaussian_blur(&films(deep), sigma_px),
             Self::Moved(films) => gaussian_blur(films, sigma_px),
-        };
-        soft.zip_map(plate, over)
+        }
     }
 
     /// The factor on the plate at a pixel.

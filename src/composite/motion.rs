@@ -13,7 +13,7 @@ use crate::deep::{DeepImage, HoldoutSample};
 use crate::filter::{self, sample_cubic_clamped};
 use crate::geom::{Plane, Point2, Point3, Vector2, Vector3};
 use crate::image::{Image, Mask};
-use crate::pixel::{Film, LinearRgb, Mix};
+use crate::pixel::{Film, Mix};
 use crate::render::{RenderOptions, render_beyond};
 use crate::scene::Shot;
 use crate::work::{self, Kind};
@@ -158,9 +158,10 @@ impl WideEffect {
             let way = along(center(x, y) + corner, ways[square]);
             let mean = mean(way, |p| sample_cubic_clamped(&self.films, p.x, p.y));
             // A cubic curve overshoots near edges.
+            let opacity = mean.opacity.zip_map(least.opacity, f32::max);
             Film {
-                color: larger(mean.color, least.color),
-                opacity: smaller(larger(mean.opacity, least.opacity), LinearRgb::WHITE),
+                color: mean.color.zip_map(least.color, f32::max),
+                opacity: opacity.map(|o| o.min(1.0)),
             }
         })
     }
@@ -218,17 +219,9 @@ fn along(middle: Point2<f64>, way: Vector2<f64>) -> impl ExactSizeIterator<Item 
 fn least(effect: &Image<Film>) -> Film {
     let films = effect.pixels().iter();
     films.fold(Film::default(), |least, film| Film {
-        color: smaller(least.color, film.color),
-        opacity: smaller(least.opacity, film.opacity),
+        color: least.color.zip_map(film.color, f32::min),
+        opacity: least.opacity.zip_map(film.opacity, f32::min),
     })
-}
-
-fn smaller(a: LinearRgb, b: LinearRgb) -> LinearRgb {
-    LinearRgb::new(a.r.min(b.r), a.g.min(b.g), a.b.min(b.b))
-}
-
-fn larger(a: LinearRgb, b: LinearRgb) -> LinearRgb {
-    LinearRgb::new(a.r.max(b.r), a.g.max(b.g), a.b.max(b.b))
 }
 
 /// Path in the picture, in pixels, of a point of the surface in the middle of each square; 0 where
@@ -263,7 +256,7 @@ mod tests {
     use super::*;
     use crate::composite::{Exposed, picture};
     use crate::geom::{Pose, Quad};
-    use crate::pixel::{ObjectId, PremulRgba};
+    use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
     use crate::quality::Quality;
     use crate::render::render;
     use crate::scene::{AreaLight, Blur, Card, PostProcess};

@@ -510,15 +510,7 @@ mod tests {
         io::write(&photo, &Image::from_fn(width, height, shade)).unwrap();
         let kept = Roi::middle_of(TAKEN.map(|side| side as u32), image);
         BackgroundPhoto {
-            background: Background {
-                name: name.into(),
-                size: [0.4, 0.3],
-                camera: CameraSource::Known(tilted_camera()),
-                k1: 0.0,
-                shown_share: 1.0,
-                albedo: None,
-                wall: None,
-            },
+            background: Background::new(name, [0.4, 0.3], CameraSource::Known(tilted_camera())),
             label: folder.join(name).with_extension("label.json"),
             kept,
             notes: Vec::new(),

@@ -6,8 +6,8 @@ use crate::dataset::listing::{images_in, is_list, whole_path};
 use crate::error::{Error, Result};
 use crate::eval::page::EvalReportOptions;
 use crate::eval::{
-    CocoTruth, EvalImage, Picture, YoloTruth, is_class_list, read_coco_results, read_coco_truth,
-    read_pose_truth, read_pose_truth_of, read_yolo_detections,
+    CocoTruth, EvalImage, Picture, YoloTruth, is_class_list, label_of, read_coco_results,
+    read_coco_truth, read_pose_truth, read_pose_truth_of, read_yolo_detections,
 };
 use crate::io;
 use std::path::{Path, PathBuf};
@@ -84,7 +84,7 @@ impl EvalTruth {
             return Err(Error::file(path, what));
         }
         let images = by_name(images);
-        let mut labels = images.iter().map(|image| YoloSet::label_of(image));
+        let mut labels = images.iter().map(|image| label_of(image));
         if !labels.any(|label| label.is_file()) {
             let what = "no label files for its images, expected NAME.txt in labels";
             return Err(Error::file(path, what));

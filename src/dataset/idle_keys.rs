@@ -191,16 +191,11 @@ mod tests {
 
     fn place(name: &str, wall: Option<f64>) -> Background {
         Background {
-            name: name.into(),
-            size: [0.6, 0.4],
-            k1: 0.0,
-            shown_share: 1.0,
-            albedo: None,
             wall: wall.map(|height| Wall {
                 height,
                 slope_deg: 0.0,
             }),
-            camera: CameraSource::Known(tilted_camera()),
+            ..Background::new(name, [0.6, 0.4], CameraSource::Known(tilted_camera()))
         }
     }
 

@@ -6,7 +6,7 @@ use crate::dataset::{Entry, Sample, Writer};
 use crate::deep::{DeepImage, DeepSample};
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::io::exr::write_owned_channels;
+use crate::io::{Canvas, exr::write_channels};
 use crate::label::LabelOptions;
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
 use crate::render::Cryptomatte;
@@ -82,8 +82,8 @@ impl Writer for Layers {
         }
         let mut notes = ids.metadata;
         notes.extend(provenance(entry));
-        let size = sample.frame.size();
-        write_owned_channels(folder.join(&path), size, channels, &notes)?;
+        let (size, canvas) = (sample.frame.size(), Canvas::default());
+        write_channels(folder.join(&path), size, canvas, channels, &notes)?;
         Ok(vec![path])
     }
 }

@@ -1,6 +1,6 @@
 //! Labels in MOTChallenge format: a folder for each sequence of pictures.
 
-use crate::dataset::paths::{create_part_folders, remove_file, remove_files};
+use crate::dataset::paths::{create_part_folders, remove_files};
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::{Error, Result};
 use crate::io;
@@ -212,7 +212,7 @@ fn is_number(name: &OsStr) -> bool {
 
 /// A second name for a file; a copy of it if there are no links.
 fn link(file: &Path, name: &Path) -> Result<()> {
-    remove_file(name)?;
+    io::remove_if_exists(name)?;
     let linked = std::fs::hard_link(file, name);
     let there = linked.or_else(|_| std::fs::copy(file, name).map(drop));
     there.map_err(|e| Error::file(name, e))

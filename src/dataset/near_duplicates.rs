@@ -1,9 +1,8 @@
 //! Images that look like others.
 
 use crate::color::to_srgb8;
-use crate::dataset::YoloSet;
 use crate::error::Result;
-use crate::eval::{GroundTruth, iou, yolo_sheet};
+use crate::eval::{GroundTruth, iou, label_of, yolo_sheet};
 use crate::filter::resize;
 use crate::image::Image;
 use crate::io;
@@ -89,7 +88,7 @@ pub(crate) struct Look {
 
 impl Look {
     fn read(image: &Path) -> Result<Self> {
-        let labels = io::read_text(YoloSet::label_of(image)).ok();
+        let labels = io::read_text(label_of(image)).ok();
         Ok(Self {
             thumbnail: Thumbnail::new(&io::read::<LinearRgb>(image)?),
             boxes: labels.and_then(|text| boxes_in(&text)),

@@ -1,9 +1,8 @@
 //! Paths that several parts of a dataset need.
 
 use crate::dataset::Part;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io;
-use std::io::ErrorKind;
 use std::path::Path;
 
 /// The folder of a file; empty for a bare name.
@@ -30,13 +29,5 @@ pub(super) fn remove_files(
     files: impl IntoIterator<Item = impl AsRef<Path>>,
 ) -> Result<()> {
     let mut files = files.into_iter();
-    files.try_for_each(|file| remove_file(&folder.join(file)))
-}
-
-/// Deletes a file if it exists.
-pub(super) fn remove_file(file: &Path) -> Result<()> {
-    match std::fs::remove_file(file) {
-        Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::file(file, e)),
-        _ => Ok(()),
-    }
+    files.try_for_each(|file| io::remove_if_exists(&folder.join(file)))
 }

@@ -109,11 +109,6 @@ impl YoloSet {
         }
     }
 
-    /// The label file of an image: its path with the last `images` replaced by `labels`.
-    pub fn label_of(image: &Path) -> PathBuf {
-        label_of(image)
-    }
-
     /// The same set with other images for training and validation.
     pub(super) fn with_parts(&self, [train, val]: [Vec<PathBuf>; 2]) -> Self {
         Self {
@@ -466,7 +461,7 @@ mod tests {
 
     #[test]
     fn the_last_images_of_a_path_becomes_labels() {
-        let label = YoloSet::label_of(Path::new("/images/set/images/train/a.b.png"));
+        let label = label_of(Path::new("/images/set/images/train/a.b.png"));
         assert_eq!(label, Path::new("/images/set/labels/train/a.b.txt"));
     }
 }

@@ -64,8 +64,8 @@ pub(crate) use picture::{MAX_CURVES, confusion_picture, f1_picture, precision_re
 #[doc(hidden)]
 pub use tag::{Tags, read_tags};
 #[doc(hidden)]
-pub use yolo::{YoloTruth, read_yolo_truth_of};
-pub(crate) use yolo::{is_class_list, is_image, label_of, sheet_of as yolo_sheet};
+pub use yolo::{YoloTruth, label_of, read_yolo_truth_of};
+pub(crate) use yolo::{is_class_list, is_image, sheet_of as yolo_sheet};
 pub(crate) use yolo::{parse_class, read_pose_truth, read_pose_truth_of};
 pub use yolo::{read_yolo_detections, read_yolo_truth};
 #[doc(hidden)]

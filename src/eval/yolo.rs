@@ -229,8 +229,8 @@ fn sequence_in(sidecar: &Path) -> Option<String> {
     Some(format!("{folder}/{}", belt.sequence))
 }
 
-/// Where YOLO expects the label of an image.
-pub(crate) fn label_of(image: &Path) -> PathBuf {
+/// Where YOLO expects the label of an image: its path with the last `images` replaced by `labels`.
+pub fn label_of(image: &Path) -> PathBuf {
     io::with_last_step(image, "images", "labels").with_extension("txt")
 }
 

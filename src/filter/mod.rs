@@ -21,7 +21,7 @@ pub use blur::{box_blur, gaussian_blur};
 pub use distance::depth;
 #[doc(hidden)]
 pub use morphology::dilate;
-pub(crate) use morphology::erode;
+pub(crate) use morphology::{erode, largest_around};
 pub use pyramid::Pyramid;
 #[doc(hidden)]
 pub use pyramid::{expand, halve, reduce};

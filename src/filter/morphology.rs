@@ -1,4 +1,4 @@
-//! Masks grown and shrunk by a disc.
+//! Masks grown and shrunk by a disc, and the largest values around pixels.
 
 use crate::image::{Image, Mask};
 use crate::work::{self, Kind};
@@ -94,6 +94,38 @@ fn mark_reached(row: &mut [bool], distances: &[u32], reach: &[usize]) {
     }
 }
 
+/// The largest value at most `reach` columns and rows away, for every pixel.
+pub(crate) fn largest_around(picture: &Image<f32>, reach: usize) -> Image<f32> {
+    let along = largest_along(picture, reach);
+    let height = picture.height();
+    let mut around = along.clone();
+    around.par_rows_mut().enumerate().for_each(|(y, row)| {
+        for near in y.saturating_sub(reach)..(y + reach + 1).min(height) {
+            raise(row, along.row(near));
+        }
+    });
+    around
+}
+
+/// The largest value at most `reach` columns away, for every pixel.
+fn largest_along(picture: &Image<f32>, reach: usize) -> Image<f32> {
+    let mut along = picture.clone();
+    along.par_rows_mut().enumerate().for_each(|(y, row)| {
+        for by in 1..=reach.min(picture.width()) {
+            raise(row, &picture.row(y)[by..]);
+            raise(&mut row[by..], picture.row(y));
+        }
+    });
+    along
+}
+
+/// Raises values to others, where those are larger.
+fn raise(row: &mut [f32], other: &[f32]) {
+    for (value, &other) in row.iter_mut().zip(other) {
+        *value = if other > *value { other } else { *value };
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -175,6 +207,22 @@ mod tests {
                 .zip(disc.pixels())
                 .all(|(&c, &d)| c >= d)
         );
+    }
+
+    #[test]
+    fn the_largest_around_a_pixel_is_found_up_to_the_border() {
+        let band = Image::from_fn(7, 5, |x, y| ((x * 7919 + y * 104_729) % 31) as f32);
+        for reach in [1, 2, 9] {
+            let found = largest_around(&band, reach);
+            for (x, y) in (0..35_usize).map(|i| (i % 7, i / 7)) {
+                let near = (0..35_usize)
+                    .filter(|i| x.abs_diff(i % 7) <= reach && y.abs_diff(i / 7) <= reach);
+                assert_eq!(
+                    found[(x, y)],
+                    near.map(|i| band.pixels()[i]).fold(0.0, f32::max)
+                );
+            }
+        }
     }
 
     #[test]

@@ -15,6 +15,7 @@ mod bbox;
 
 pub use bbox::BBox;
 pub use nalgebra::{Point2, Point3, UnitQuaternion, Vector2, Vector3};
+use std::ops::Index;
 
 /// A rigid placement: rotation, then translation in metres. Names say which frames it joins
 /// (`world_from_card`).
@@ -164,6 +165,19 @@ impl Line {
     }
 }
 
+/// The sides of a closed ring, the last one back to its first corner.
+#[doc(hidden)]
+pub fn sides<T: Copy>(ring: &[T]) -> impl Iterator<Item = [T; 2]> {
+    let next = ring.iter().cycle().skip(1);
+    ring.iter().zip(next).map(|(a, b)| [*a, *b])
+}
+
+/// Twice the area of a ring, by the shoelace formula; above 0 where it turns from x to y.
+#[doc(hidden)]
+pub fn doubled_area<P: Copy + Index<usize, Output = f64>>(ring: &[P]) -> f64 {
+    sides(ring).map(|[a, b]| a[0] * b[1] - b[0] * a[1]).sum()
+}
+
 /// The corners of a quadrangle whose sides are on these lines, starting between the last line and
 /// the first; none where neighbours are nearly parallel.
 pub(crate) fn corners_between(sides: &[Line; 4]) -> Option<[Point2<f64>; 4]> {
@@ -233,6 +247,16 @@ mod tests {
             direction: Vector3::x(),
         };
         assert_eq!(Plane::surface().intersect(&ray), None);
+    }
+
+    #[test]
+    fn a_ring_s_last_side_closes_it_and_its_turn_has_a_sign() {
+        let ring = [[1.0, 1.0], [4.0, 1.0], [1.0, 3.0]];
+        let last = sides(&ring).last();
+        assert_eq!((sides(&ring).count(), last), (3, Some([ring[2], ring[0]])));
+        assert_eq!(doubled_area(&ring), 6.0);
+        assert_eq!(doubled_area(&ring.map(|[x, y]| Point2::new(y, x))), -6.0);
+        assert_eq!((sides(&[0; 0]).count(), doubled_area(&ring[..1])), (0, 0.0));
     }
 
     #[test]

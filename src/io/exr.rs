@@ -13,90 +13,42 @@ use crate::error::{Error, Result};
 use crate::work::{self, Kind};
 use std::path::Path;
 
-/// Writes float channels under the given names, zip-compressed, with text attributes.
+/// Writes float channels under the given names, zip-compressed, with text attributes, for a picture
+/// placed on a canvas. The samples are not copied.
 ///
 /// `size` is width and height; every channel has `width * height` samples, row by row from the top.
 /// Names may include a layer: `diffuse.R`.
 ///
 /// # Errors
 /// [`Error::File`] for a channel of another size, a duplicate name, or a file that cannot be written.
-pub fn write_channels(
-    path: impl AsRef<Path>,
-    size: (usize, usize),
-    channels: &[(&str, &[f32])],
-    metadata: &[(String, String)],
-) -> Result<()> {
-    let planes = float_planes(channels);
-    write_encoded(path.as_ref(), encode(size, planes, metadata))
-}
-
-/// Like [`write_channels`], but takes ownership of the channels, so that many large ones are not
-/// copied.
-///
-/// # Errors
-/// Those of [`write_channels`].
-pub fn write_owned_channels(
-    path: impl AsRef<Path>,
-    size: (usize, usize),
-    channels: Vec<(String, Vec<f32>)>,
-    metadata: &[(String, String)],
-) -> Result<()> {
-    let (names, samples): (Vec<String>, Vec<Vec<f32>>) = channels.into_iter().unzip();
-    let samples = samples.into_iter().map(FlatSamples::F32);
-    let planes = names.iter().map(String::as_str).zip(samples).collect();
-    write_encoded(path.as_ref(), encode(size, planes, metadata))
-}
-
-/// Like [`write_channels`], for a picture placed on a canvas, without text attributes.
-///
-/// # Errors
-/// Those of [`write_channels`].
-pub fn write_channels_on(
+pub fn write_channels<N: AsRef<str>>(
     path: impl AsRef<Path>,
     size: (usize, usize),
     canvas: Canvas,
-    channels: &[(&str, &[f32])],
+    channels: Vec<(N, Vec<f32>)>,
+    metadata: &[(String, String)],
 ) -> Result<()> {
-    let planes = float_planes(channels);
-    let encoded = exr::encode(size, canvas, planes, exr::Compression::Zip, &[]);
+    let (names, samples): (Vec<N>, Vec<Vec<f32>>) = channels.into_iter().unzip();
+    let samples = samples.into_iter().map(FlatSamples::F32);
+    let planes = names.iter().map(N::as_ref).zip(samples).collect();
+    let encoded = exr::encode(size, canvas, planes, exr::Compression::Zip, metadata);
     write_encoded(path.as_ref(), encoded)
 }
 
-/// Like [`write_channels`], with half floats.
+/// Like [`write_channels`], with half floats, without canvas and text attributes.
 ///
 /// # Errors
 /// Those of [`write_channels`].
 pub fn write_half_channels(
     path: impl AsRef<Path>,
     size: (usize, usize),
-    channels: &[(&str, &[f32])],
-    metadata: &[(String, String)],
+    channels: &[(&str, impl AsRef<[f32]>)],
 ) -> Result<()> {
-    let planes = planes(channels, exr::half_samples);
-    write_encoded(path.as_ref(), encode(size, planes, metadata))
-}
-
-fn float_planes<'a>(channels: &[(&'a str, &[f32])]) -> Vec<(&'a str, FlatSamples)> {
-    planes(channels, |samples| FlatSamples::F32(samples.to_vec()))
-}
-
-fn planes<'a>(
-    channels: &[(&'a str, &[f32])],
-    stored: impl Fn(&[f32]) -> FlatSamples,
-) -> Vec<(&'a str, FlatSamples)> {
     let channels = channels.iter();
-    channels
-        .map(|&(name, samples)| (name, stored(samples)))
-        .collect()
-}
-
-fn encode(
-    size: (usize, usize),
-    planes: Vec<(&str, FlatSamples)>,
-    metadata: &[(String, String)],
-) -> std::result::Result<Vec<u8>, String> {
+    let planes = channels.map(|(name, samples)| (*name, exr::half_samples(samples.as_ref())));
     let (canvas, compression) = (Canvas::default(), exr::Compression::Zip);
-    exr::encode(size, canvas, planes, compression, metadata)
+    let encoded = exr::encode(size, canvas, planes.collect(), compression, &[]);
+    write_encoded(path.as_ref(), encoded)
 }
 
 /// Writes parts of the same size (width, height) to one EXR file, losslessly compressed; the same

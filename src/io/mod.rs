@@ -127,8 +127,8 @@ pub use fs::{
 };
 pub(crate) use fs::{
     Syncing, absolute_folder, files_below, is_apple_double, length_inside, natural_key, open_own,
-    real_path, refuse_foreign, refuse_links, stem_text, sweep, sync_file_system, with_last_step,
-    write_through,
+    or_working_folder, real_path, refuse_foreign, refuse_links, remove_if_exists, stem_text, sweep,
+    sync_file_system, with_last_step, write_through,
 };
 pub use header::Header;
 #[doc(hidden)]

@@ -12,7 +12,7 @@
 //! barrel cannot show, beyond its fold, is outside what it shows.
 
 use crate::camera::{Camera, RadialDistortion};
-use crate::geom::{BBox, Point2, Vector3};
+use crate::geom::{BBox, Point2, Vector3, sides};
 use crate::label::boolean::{intersection, unwound, unwound_within};
 use crate::scene::Card;
 use geo::{Area, BoundingRect, Coord, MapCoords, MultiPolygon, Polygon, Rect};
@@ -81,10 +81,8 @@ fn shown(ring: &[Vector3<f64>], camera: &Camera, lens: &RadialDistortion) -> Vec
 
 /// A ring of pinhole positions as a lens shows it.
 fn bent(ring: &[Coord<f64>], lens: &RadialDistortion) -> Vec<Coord<f64>> {
-    let ends = ring.iter().cycle().skip(1);
-    let sides = ring.iter().zip(ends);
-    sides
-        .flat_map(|(a, b)| points_along(*a, *b))
+    sides(ring)
+        .flat_map(|[a, b]| points_along(a, b))
         .map(|p| {
             let seen = lens.distort(Point2::new(p.x, p.y));
             Coord {
@@ -185,11 +183,10 @@ fn clip_to_half_space(
     side: impl Fn(&Vector3<f64>) -> f64,
 ) -> Vec<Vector3<f64>> {
     let mut kept = Vec::with_capacity(polygon.len() + 2);
-    let followers = polygon.iter().cycle().skip(1);
-    for (a, b) in polygon.iter().zip(followers) {
-        let (s, t) = (side(a), side(b));
+    for [a, b] in sides(&polygon) {
+        let (s, t) = (side(&a), side(&b));
         if s >= 0.0 {
-            kept.push(*a);
+            kept.push(a);
         }
         if (s >= 0.0) != (t >= 0.0) {
             kept.push(a + (b - a) * (s / (s - t)));
@@ -214,7 +211,7 @@ fn picture_corners(camera: &Camera) -> [Coord<f64>; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::{Pose, Quad, UnitQuaternion, Vector2};
+    use crate::geom::{Pose, Quad};
     use crate::image::Image;
     use crate::pixel::{ObjectId, PremulRgba};
     use geo::Contains;
@@ -230,13 +227,7 @@ mod tests {
     const SIDE: f64 = CELL * GRID as f64;
 
     fn camera() -> Camera {
-        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-        Camera {
-            image: [SIDE as u32; 2],
-            focal_px: Vector2::new(SIDE, SIDE),
-            principal_px: Point2::new(0.5 * SIDE, 0.5 * SIDE),
-            camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
-        }
+        Camera::looking_down(1.0, SIDE, [SIDE as u32; 2])
     }
 
     /// The part of the picture inside an outline on the grid.
@@ -269,18 +260,15 @@ mod tests {
     /// How many times an outline winds around a point, by crossings of the line to its right.
     fn winding(corners: &[[u32; 2]], p: Point2<f64>) -> i32 {
         let px = |&[x, y]: &[u32; 2]| Point2::new(CELL * f64::from(x), CELL * f64::from(y));
-        corners
-            .iter()
-            .zip(corners.iter().cycle().skip(1))
-            .fold(0, |n, (a, b)| {
-                let (a, b) = (px(a), px(b));
-                let is_right = (p.y - a.y) * (b.x - a.x) / (b.y - a.y) + a.x > p.x;
-                match (a.y <= p.y, b.y <= p.y) {
-                    (true, false) if is_right => n + 1,
-                    (false, true) if is_right => n - 1,
-                    _ => n,
-                }
-            })
+        sides(corners).fold(0, |n, [a, b]| {
+            let (a, b) = (px(&a), px(&b));
+            let is_right = (p.y - a.y) * (b.x - a.x) / (b.y - a.y) + a.x > p.x;
+            match (a.y <= p.y, b.y <= p.y) {
+                (true, false) if is_right => n + 1,
+                (false, true) if is_right => n - 1,
+                _ => n,
+            }
+        })
     }
 
     /// Points between pixel centres, away from every line through two points of the grid by more

@@ -10,7 +10,7 @@
 //! Clipping", 2002). Without a tolerance the area, by the shoelace formula, stays that of the mask.
 
 use super::simplify::{Ring, simplified};
-use crate::geom::{BBox, Point2};
+use crate::geom::{BBox, Point2, doubled_area, sides};
 use crate::label::RleMask;
 
 /// Steps to the right, down, left and up: each a right turn from the one before.
@@ -186,15 +186,6 @@ fn step([x, y]: [i64; 2], d: usize) -> [i64; 2] {
     [x + STEPS[d][0], y + STEPS[d][1]]
 }
 
-/// Twice the area; negative for a hole.
-fn doubled_area(ring: &Ring) -> f64 {
-    edges(ring).map(|(a, b)| a[0] * b[1] - b[0] * a[1]).sum()
-}
-
-fn edges(ring: &Ring) -> impl Iterator<Item = (&[f64; 2], &[f64; 2])> {
-    ring.iter().zip(ring.iter().cycle().skip(1))
-}
-
 /// From left to right, then from above.
 fn left_to_right(a: &[f64; 2], b: &[f64; 2]) -> std::cmp::Ordering {
     a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]))
@@ -237,8 +228,8 @@ struct BorderCrossing {
 fn next_border_to_the_left(parts: &[Ring], from: [f64; 2]) -> Option<BorderCrossing> {
     let mut nearest: Option<BorderCrossing> = None;
     for (part, ring) in parts.iter().enumerate() {
-        for (corner, (a, b)) in edges(ring).enumerate() {
-            let Some(x) = crossing_to_the_left(from, *a, *b) else {
+        for (corner, [a, b]) in sides(ring).enumerate() {
+            let Some(x) = crossing_to_the_left(from, a, b) else {
                 continue;
             };
             if nearest.as_ref().is_none_or(|n| n.x < x) {
@@ -283,21 +274,12 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn area(ring: &[Point2<f64>]) -> f64 {
-        0.5 * ring
-            .iter()
-            .zip(ring.iter().cycle().skip(1))
-            .map(|(a, b)| a.x * b.y - b.x * a.y)
-            .sum::<f64>()
-    }
-
     /// How many times a ring winds around the middle of a pixel.
     fn winding(ring: &[Point2<f64>], x: u32, y: u32) -> i32 {
         let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
-        let edges = ring.iter().zip(ring.iter().cycle().skip(1));
         // Edges along the axes and slits along rows or, between parts, slanted: the crossing with
         // the row decides.
-        edges.fold(0, |n, (a, b)| {
+        sides(ring).fold(0, |n, [a, b]| {
             let at = a.x + (y - a.y) * (b.x - a.x) / (b.y - a.y);
             match (a.y <= y, b.y <= y) {
                 (true, false) if at < x => n - 1,
@@ -314,8 +296,9 @@ mod tests {
         ) {
             let mask = RleMask::from_fn([12, 9], |x, y| bits[(x * 9 + y) as usize]);
             let (parts, whole) = (polygons(&mask, 0.0), polygon(&mask, 0.0));
-            prop_assert_eq!(parts.iter().map(|ring| area(ring)).sum::<f64>(), mask.area() as f64);
-            prop_assert_eq!(area(&whole), mask.area() as f64);
+            let doubled = 2.0 * mask.area() as f64;
+            prop_assert_eq!(parts.iter().map(|ring| doubled_area(ring)).sum::<f64>(), doubled);
+            prop_assert_eq!(doubled_area(&whole), doubled);
             for (x, y) in (0..12).flat_map(|x| (0..9).map(move |y| (x, y))) {
                 let inside = i32::from(bits[(x * 9 + y) as usize]);
                 prop_assert_eq!(parts.iter().map(|ring| winding(ring, x, y)).sum::<i32>(), inside);
@@ -330,13 +313,6 @@ mod tests {
             (p[1][0] - p[0][0]) * (q[1] - p[0][1]) - (p[1][1] - p[0][1]) * (q[0] - p[0][0])
         };
         side(a, b[0]) * side(a, b[1]) < 0.0 && side(b, a[0]) * side(b, a[1]) < 0.0
-    }
-
-    fn sides(ring: &Ring) -> Vec<[[f64; 2]; 2]> {
-        ring.iter()
-            .zip(ring.iter().cycle().skip(1))
-            .map(|(a, b)| [*a, *b])
-            .collect()
     }
 
     fn distance(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
@@ -356,14 +332,14 @@ mod tests {
             prop_assert_eq!(rings.len(), fewer.len());
             for (ring, fewer) in rings.iter().zip(&fewer) {
                 prop_assert!(fewer.len() >= 3 && doubled_area(ring) * doubled_area(fewer) > 0.0);
-                let off = |p: &[f64; 2]| sides(fewer).into_iter().map(|s| distance(*p, s)).fold(f64::INFINITY, f64::min);
+                let off = |p: &[f64; 2]| sides(fewer).map(|s| distance(*p, s)).fold(f64::INFINITY, f64::min);
                 prop_assert!(ring.iter().all(|p| off(p) <= tolerance + 1e-9));
             }
-            let all: Vec<_> = fewer.iter().flat_map(sides).collect();
+            let all: Vec<_> = fewer.iter().flat_map(|ring| sides(ring)).collect();
             prop_assert!(all.iter().enumerate().all(|(i, a)| all[..i].iter().all(|b| !cross(*a, *b))));
             let whole = polygon(&mask, tolerance);
-            let sum: f64 = fewer.iter().map(doubled_area).sum();
-            prop_assert!((2.0 * area(&whole) - sum).abs() < 1e-9, "slits have no area");
+            let sum: f64 = fewer.iter().map(|ring| doubled_area(ring)).sum();
+            prop_assert!((doubled_area(&whole) - sum).abs() < 1e-9, "slits have no area");
             let parts = polygons(&mask, tolerance);
             let both = [polygons(&mask, 0.0), parts.clone()];
             prop_assert_eq!(exact_and_simplified(&mask, tolerance), both);

@@ -182,11 +182,13 @@ fn ring_radius(shares: usize, n: usize) -> f64 {
 /// Nodes at the middles of equal steps of the sine of the angle under which `point` sees them, along
 /// either side of what the receiver's plane leaves of a light; none if equal pieces are short enough.
 ///
-/// Most light comes from where a large light is near, so there the nodes are.
+/// Most light comes from where a large light is near, so there the nodes are: as if `point` were as
+/// far away as the receiver's ends are, which have the light near elsewhere.
 fn pieces_near(
     light: &AreaLight,
     counts: [usize; 2],
     point: Point3<f64>,
+    reach: f64,
     horizon: &LightHorizon,
 ) -> Option<Vec<Node>> {
     let (frame, half) = (frame(light), half_sides(light));
@@ -194,13 +196,14 @@ fn pieces_near(
     let distance = frame.normal.dot(&way);
     let longest = (2.0 * half[0] / counts[0] as f64).max(2.0 * half[1] / counts[1] as f64);
     let is_seen = distance > 0.0 && horizon.middle > -horizon.highest_rise(light.shape);
-    if !is_seen || longest <= LONGEST_EQUAL_PIECE * distance {
+    let apart = distance.hypot(reach);
+    if !is_seen || longest <= LONGEST_EQUAL_PIECE * apart {
         return None;
     }
     let foot = [frame.x.dot(&way), frame.y.dot(&way)];
     let steps = |axis: usize, range: [f64; 2]| {
         let ends = range.map(|end| end * half[axis]);
-        sine_steps(ends, foot[axis], distance, counts[axis])
+        sine_steps(ends, foot[axis], apart, counts[axis])
     };
     let axes = horizon.axes_by_rise();
     let [outer, inner] = axes;
@@ -237,7 +240,8 @@ fn sine_steps(
     })
 }
 
-/// Sample points of the part of a light that is above the plane through `point` with unit `normal`:
+/// Sample points of the part of a light that is above the plane through `point` with unit `normal`,
+/// for a receiver that reaches so far around it, metres:
 /// those of [`pieces_near`] of a light that is large and near, else those of [`pieces`] where the
 /// plane does not cut the light, and as many on what it leaves where it does.
 ///
@@ -251,12 +255,13 @@ pub(crate) fn nodes_above(
     counts: [usize; 2],
     point: Point3<f64>,
     normal: &Vector3<f64>,
+    reach: f64,
 ) -> Vec<Node> {
     let frame = frame(light);
     let [a, b] = half_sides(light);
     let counts = counts.map(|n| n.max(1));
     let horizon = LightHorizon::new(&frame, [a, b], point, normal);
-    if let Some(near) = pieces_near(light, counts, point, &horizon) {
+    if let Some(near) = pieces_near(light, counts, point, reach, &horizon) {
         return near;
     }
     let Some(left) = horizon.visible_part(light.shape, counts) else {
@@ -482,7 +487,7 @@ mod tests {
                 (0.3, [0.0; 3]),
             ] {
                 let light = standing(shape, height, target);
-                let nodes = nodes_above(&light, [3; 2], Point3::origin(), &Vector3::z());
+                let nodes = nodes_above(&light, [3; 2], Point3::origin(), &Vector3::z(), 0.0);
                 assert!(nodes.iter().all(|n| n.point.z > 0.0), "{shape:?} {height}");
                 let [sum, fine] = [nodes, super::nodes(&light, [400; 2])]
                     .map(|nodes| irradiance(&nodes, &light, Point3::origin(), Vector3::z()));
@@ -498,7 +503,7 @@ mod tests {
     fn what_the_horizon_leaves_has_its_area() {
         let half = |shape| standing(shape, 0.0, [0.0; 3]);
         let area = |light: &AreaLight| -> f64 {
-            nodes_above(light, [3; 2], Point3::origin(), &Vector3::z())
+            nodes_above(light, [3; 2], Point3::origin(), &Vector3::z(), 0.0)
                 .iter()
                 .map(|n| n.area)
                 .sum()
@@ -521,7 +526,7 @@ mod tests {
     fn a_light_that_the_horizon_does_not_cut_is_whole() {
         let light = square();
         assert_eq!(
-            nodes_above(&light, [3; 2], Point3::origin(), &Vector3::z()),
+            nodes_above(&light, [3; 2], Point3::origin(), &Vector3::z(), 0.0),
             pieces(&light, [3; 2])
         );
     }
@@ -543,7 +548,7 @@ mod tests {
         tolerance: f64,
     ) {
         let case = format!("{:?} {:?} {counts:?} {normal:?}", light.shape, light.size);
-        let nodes = nodes_above(light, counts, Point3::origin(), &normal);
+        let nodes = nodes_above(light, counts, Point3::origin(), &normal, 0.0);
         let sum = irradiance(&nodes, light, Point3::origin(), normal);
         let exact = unit_irradiance(light, Point3::origin(), normal);
         assert!(

@@ -1,6 +1,6 @@
 //! Irradiance from a uniform polygon in closed form.
 
-use crate::geom::{Point3, Vector3};
+use crate::geom::{Point3, Vector3, sides};
 
 /// Irradiance at `point` with unit `normal` from a polygon of unit radiance: pi times the form
 /// factor.
@@ -17,11 +17,8 @@ pub fn polygon_irradiance(
     normal: Vector3<f64>,
 ) -> f64 {
     let rays = above_horizon(corners.iter().map(|c| c - point).collect(), normal);
-    let edges = rays.iter().zip(rays.iter().cycle().skip(1));
-    0.5 * edges
-        .map(|(a, b)| edge_irradiance(a, b, normal))
-        .sum::<f64>()
-        .abs()
+    let edges = sides(&rays).map(|[a, b]| edge_irradiance(&a, &b, normal));
+    0.5 * edges.sum::<f64>().abs()
 }
 
 fn edge_irradiance(a: &Vector3<f64>, b: &Vector3<f64>, normal: Vector3<f64>) -> f64 {

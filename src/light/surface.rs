@@ -127,18 +127,11 @@ fn tint_of(color: LinearRgb, share: f64) -> LinearRgb {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::geom::{Pose, UnitQuaternion, Vector2, Vector3};
     use crate::scene::{Exposure, Surface};
 
     /// A camera one metre above a surface that fills the middle half of its picture.
     pub(in crate::light) fn scene(cast: LightTint) -> Scene {
-        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-        let camera = Camera {
-            image: [40, 30],
-            focal_px: Vector2::new(40.0, 40.0),
-            principal_px: Point2::new(20.0, 15.0),
-            camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
-        };
+        let camera = Camera::looking_down(1.0, 40.0, [40, 30]);
         Scene {
             plate: "tray".into(),
             ambient: LinearRgb::WHITE,

@@ -12,7 +12,7 @@ use super::film::ColorUncertainty;
 use super::outline::Outline;
 use super::plate::{PlateOptions, ScreenPlate};
 use super::prepared::Prepared;
-use super::screen::{masked_pixels, mean_color, screen_color, screen_pixels};
+use super::screen::{mean_color, screen_color, screen_pixels};
 use super::screen_edge::screen_edge_seen;
 use super::segment::hull::sides;
 use super::segment::{Segmentation, segment_prepared};
@@ -200,7 +200,7 @@ fn even_plate(
     let plate = ScreenPlate::even(color, photo.size());
     let mismatch = plate.mismatch(photo, background);
     check_photo(mismatch <= MAX_COLOR_MISMATCH, || {
-        let seen = mean_color(masked_pixels(photo, background)).unwrap_or_default();
+        let seen = mean_color(photo.pixels_in(background)).unwrap_or_default();
         let [seen, given] = [seen, color].map(LinearRgb::channels);
         format!(
             "the screen is {seen:.2?} in the photo, expected the given {given:.2?} (scene-linear)"

@@ -1,7 +1,7 @@
 //! Difference Key: what differs from a picture without the subject.
 
 use super::check::{check_share, check_size};
-use super::key::{Photo, Profile};
+use super::key::{Photo, Profile, lesser};
 use crate::error::Result;
 use crate::image::Image;
 use crate::pixel::{Coverage, PremulRgba};
@@ -92,12 +92,6 @@ impl DifferenceKeyOptions {
 #[inline]
 fn mean_difference(a: PremulRgba, b: PremulRgba) -> f32 {
     ((a.r - b.r).abs() + (a.g - b.g).abs() + (a.b - b.b).abs()) / 3.0
-}
-
-/// The first where it is less, or else the second.
-#[inline]
-fn lesser(first: f32, second: f32) -> f32 {
-    if first < second { first } else { second }
 }
 
 #[inline]

@@ -66,9 +66,7 @@ impl LightPath {
 
     /// Light of what stays sharp and of what is scattered, by their shares.
     pub(crate) fn mixed(&self, sharp: LinearRgb, scattered: LinearRgb) -> LinearRgb {
-        sharp
-            .scale(1.0 - self.haze)
-            .add_scaled(self.haze, scattered)
+        sharp.mixed(scattered, self.haze)
     }
 
     /// The farthest that light comes from, the tails of what is scattered aside.

@@ -62,6 +62,7 @@ pub use key::{KeyOptions, Keyed, Keying, Screen, key};
 pub use keying_screen::{ScreenPoint, keying_screen};
 pub use outline::Outline;
 pub use plate::{PlateOptions, ScreenPlate};
+pub(crate) use screen::mean_color;
 #[doc(hidden)]
 pub use screen::screen_color;
 pub(crate) use screen_corners::from_top_left;

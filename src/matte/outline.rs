@@ -1,6 +1,6 @@
 //! Outline: what an object covers, as closed lines that may have holes.
 
-use crate::geom::Point2;
+use crate::geom::{Point2, doubled_area, sides};
 use crate::image::Image;
 use crate::pixel::Coverage;
 use contour::{Contour, ContourBuilder};
@@ -52,12 +52,13 @@ impl Outline {
 
     /// Area inside, square pixels, without the holes.
     pub fn area(&self) -> f64 {
-        self.rings.iter().map(|ring| signed_area(ring)).sum()
+        let rings = self.rings.iter();
+        rings.map(|ring| 0.5 * doubled_area(ring)).sum()
     }
 
     /// Area over that of the convex hull, 0 to 1 (OpenCV's solidity); 1 where there is nothing.
     pub fn solidity(&self) -> f64 {
-        match signed_area(&self.hull()) {
+        match 0.5 * doubled_area(&self.hull()) {
             whole if whole > 0.0 => self.area() / whole,
             _ => 1.0,
         }
@@ -127,17 +128,11 @@ fn large_polygons(contour: &Contour) -> impl Iterator<Item = &Polygon> {
 }
 
 /// Two neighbouring points of a ring.
-pub(super) type RingSide = [Point2<f64>; 2];
+type RingSide = [Point2<f64>; 2];
 
 /// The first and the last row of pixels that a side passes through.
 fn rows_crossed([a, b]: RingSide) -> [usize; 2] {
     [a.y.min(b.y), a.y.max(b.y)].map(|y| y.max(0.0) as usize)
-}
-
-/// The sides of a closed ring.
-pub(super) fn sides(ring: &[Point2<f64>]) -> impl Iterator<Item = RingSide> {
-    let next = ring.iter().cycle().skip(1);
-    ring.iter().zip(next).map(|(a, b)| [*a, *b])
 }
 
 /// The rings of a polygon without their repeated first points.
@@ -208,11 +203,6 @@ fn overlap(x: usize, x0: f64, x1: f64) -> f32 {
     length.clamp(0.0, 1.0) as f32
 }
 
-/// Area of a ring, positive where it goes clockwise as seen (shoelace formula).
-fn signed_area(ring: &[Point2<f64>]) -> f64 {
-    0.5 * sides(ring).map(|[a, b]| a.x * b.y - b.x * a.y).sum::<f64>()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -235,7 +225,7 @@ mod tests {
             "{} against {area}",
             outline.area()
         );
-        assert!(signed_area(&outline.rings[0]) > 0.0 && signed_area(&outline.rings[1]) < 0.0);
+        assert!(doubled_area(&outline.rings[0]) > 0.0 && doubled_area(&outline.rings[1]) < 0.0);
     }
 
     #[test]

@@ -39,21 +39,12 @@ fn background(mask: &Image<Coverage>, margin: f64) -> Mask {
 
 fn mean(photo: &Image<LinearRgb>, set: &Mask) -> Option<LinearRgb> {
     assert_eq!(photo.size(), set.size(), "photo and mask differ in size");
-    mean_color(masked_pixels(photo, set))
-}
-
-/// The pixels of a photo where a mask is set.
-pub(super) fn masked_pixels(
-    photo: &Image<LinearRgb>,
-    set: &Mask,
-) -> impl Iterator<Item = LinearRgb> {
-    let pixels = photo.pixels().iter().zip(set.pixels());
-    pixels.filter_map(|(p, set)| set.then_some(*p))
+    mean_color(photo.pixels_in(set))
 }
 
 /// Mean of colours; none where there are none. Sums in double precision and in the order of the
 /// pixels: the same at any thread count.
-pub(super) fn mean_color(pixels: impl Iterator<Item = LinearRgb>) -> Option<LinearRgb> {
+pub(crate) fn mean_color(pixels: impl Iterator<Item = LinearRgb>) -> Option<LinearRgb> {
     let (sum, count) = pixels.fold(([0.0_f64; 3], 0_u64), |([r, g, b], count), p| {
         let sum = [r + f64::from(p.r), g + f64::from(p.g), b + f64::from(p.b)];
         (sum, count + 1)

@@ -5,7 +5,7 @@ use super::screen::{is_keyable, strongest_channel};
 use super::screen_corners::{RIM_PX, at_search_size, four_corners, large_hue_regions};
 use super::segment::{SegmentOptions, segment};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::geom::Point2;
+use crate::geom::{Point2, doubled_area};
 use crate::image::{Image, Roi};
 use crate::pixel::LinearRgb;
 use std::ops::Range;
@@ -35,7 +35,8 @@ pub(super) fn screen_edge_seen(
     background: LinearRgb,
     options: &SegmentOptions,
 ) -> Option<Diagnostic> {
-    if is_screen_hue(background) || area(hull) < MIN_PHOTO_SHARE * photo.pixels().len() as f64 {
+    let least = MIN_PHOTO_SHARE * photo.pixels().len() as f64;
+    if is_screen_hue(background) || 0.5 * doubled_area(hull) < least {
         return None;
     }
     is_covered_screen(photo, hull, options).then(|| {
@@ -49,10 +50,6 @@ pub(super) fn screen_edge_seen(
 
 fn is_screen_hue(color: LinearRgb) -> bool {
     is_keyable(color) && strongest_channel(color) != RED_CHANNEL
-}
-
-fn area(ring: &[Point2<f64>]) -> f64 {
-    Outline::from_ring(ring.to_vec()).area()
 }
 
 /// Most of what lies in a hull is a quadrangle of one hue of a screen, and something lies on that.
@@ -71,7 +68,7 @@ fn is_covered_screen(
         .collect();
     let regions = large_hue_regions(&screen_hues(&picture, &hull));
     regions.iter().any(|screen| {
-        let is_most = area(&screen.hull) >= MIN_HUE_SHARE * area(&hull);
+        let is_most = doubled_area(&screen.hull) >= MIN_HUE_SHARE * doubled_area(&hull);
         let corners = quadrangle(&screen.hull).filter(|_| is_most);
         corners.is_some_and(|corners| screen.is_covered || shows_object(&picture, corners, options))
     })
@@ -79,7 +76,8 @@ fn is_covered_screen(
 
 /// The corners of a hull that is nearly a quadrangle.
 fn quadrangle(hull: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
-    four_corners(hull).filter(|corners| area(corners) >= MIN_QUADRANGLE_SHARE * area(hull))
+    let least = MIN_QUADRANGLE_SHARE * doubled_area(hull);
+    four_corners(hull).filter(|corners| doubled_area(corners) >= least)
 }
 
 /// The picture with what has a screen's hue inside a hull, and black elsewhere.
@@ -166,7 +164,8 @@ mod tests {
             [23.0, 90.0],
         ];
         let hull = hull.map(Point2::from);
-        assert!(area(&four_corners(&hull).unwrap()) < MIN_QUADRANGLE_SHARE * area(&hull));
+        let least = MIN_QUADRANGLE_SHARE * doubled_area(&hull);
+        assert!(doubled_area(&four_corners(&hull).unwrap()) < least);
         assert!(is_hull_told([BROWN, GREEN, RED], &hull));
     }
 

@@ -2,6 +2,7 @@
 
 use crate::deep::{DeepImage, DeepSample};
 use crate::pixel::ObjectId;
+use std::collections::HashMap;
 
 /// Sets of four channels, two ranks each: the usual six ranks.
 const CHANNEL_SETS: usize = 3;
@@ -37,11 +38,10 @@ impl Cryptomatte {
     /// Coverage is the visible part of an object. If more than six objects share a pixel, those
     /// with the least coverage are left out.
     pub fn new(deep: &DeepImage, layer: &str, names: &[(ObjectId, String)]) -> Self {
-        let ids: Vec<_> = names
+        let ids = names
             .iter()
-            .map(|(object, name)| (*object, id_of_name(name)))
-            .collect();
-        let planes = rank_planes(deep, &ids).into_iter().enumerate();
+            .map(|(object, name)| (*object, id_of_name(name)));
+        let planes = rank_planes(deep, &ids.collect()).into_iter().enumerate();
         Self {
             channels: planes
                 .map(|(i, plane)| (channel_name(layer, i), plane))
@@ -52,13 +52,15 @@ impl Cryptomatte {
 }
 
 /// Samples of each channel, row by row: id and coverage of each rank in turn.
-fn rank_planes(deep: &DeepImage, ids: &[(ObjectId, f32)]) -> Vec<Vec<f32>> {
+fn rank_planes(deep: &DeepImage, ids: &HashMap<ObjectId, f32>) -> Vec<Vec<f32>> {
     let count = CHANNEL_SETS * SET_CHANNELS.len();
     let mut planes = vec![Vec::with_capacity(deep.width() * deep.height()); count];
+    let mut ranks = Vec::new();
     for y in 0..deep.height() {
         for x in 0..deep.width() {
-            let ranks = ranked_objects(deep.at(x, y), ids, count / 2);
-            for (pair, (id, coverage)) in planes.chunks_exact_mut(2).zip(ranks) {
+            rank_objects(deep.at(x, y), ids, &mut ranks);
+            ranks.resize(count / 2, (0.0, 0.0));
+            for (pair, &(id, coverage)) in planes.chunks_exact_mut(2).zip(&ranks) {
                 pair[0].push(id);
                 pair[1].push(coverage);
             }
@@ -67,16 +69,11 @@ fn rank_planes(deep: &DeepImage, ids: &[(ObjectId, f32)]) -> Vec<Vec<f32>> {
     planes
 }
 
-/// Ids and visible coverage of a pixel's objects, each once, the most visible first, up to the
-/// number of ranks.
-fn ranked_objects(
-    samples: &[DeepSample],
-    ids: &[(ObjectId, f32)],
-    count: usize,
-) -> Vec<(f32, f32)> {
-    let mut ranks: Vec<(f32, f32)> = Vec::new();
+/// Ids and visible coverage of a pixel's objects, each once, the most visible first.
+fn rank_objects(samples: &[DeepSample], ids: &HashMap<ObjectId, f32>, ranks: &mut Vec<(f32, f32)>) {
+    ranks.clear();
     for s in samples.iter().filter(|s| s.visible > 0.0) {
-        let Some(&(_, id)) = ids.iter().find(|(known, _)| *known == s.object) else {
+        let Some(&id) = ids.get(&s.object) else {
             continue;
         };
         match ranks.iter_mut().find(|(ranked, _)| *ranked == id) {
@@ -86,8 +83,6 @@ fn ranked_objects(
     }
     // By id for equal coverage, so that nothing depends on depth.
     ranks.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
-    ranks.resize(count, (0.0, 0.0));
-    ranks
 }
 
 fn channel_name(layer: &str, i: usize) -> String {
@@ -206,6 +201,15 @@ mod tests {
         }
     }
 
+    fn ranked<const N: usize>(
+        samples: &[DeepSample],
+        ids: [(ObjectId, f32); N],
+    ) -> Vec<(f32, f32)> {
+        let mut ranks = vec![(9.0, 9.0)];
+        rank_objects(samples, &HashMap::from(ids), &mut ranks);
+        ranks
+    }
+
     #[test]
     fn equal_coverages_are_ranked_by_id_in_either_order_of_depth() {
         let ids = [1, 2].map(|id| (ObjectId(id), id_of_name(&format!("object{id}"))));
@@ -213,7 +217,7 @@ mod tests {
         expected.sort_by(|a, b| a.0.total_cmp(&b.0));
         for [front, back] in [[1, 2], [2, 1]] {
             let samples = [sample(front, 0.25), sample(back, 0.25)];
-            assert_eq!(ranked_objects(&samples, &ids, 2), expected);
+            assert_eq!(ranked(&samples, ids), expected);
         }
     }
 
@@ -222,8 +226,7 @@ mod tests {
         let bottle = id_of_name("bottle");
         let ids = [1, 2].map(|id| (ObjectId(id), bottle));
         let samples = [sample(1, 0.25), sample(2, 0.5)];
-        let ranks = ranked_objects(&samples, &ids, 2);
-        assert_eq!(ranks, [(bottle, 0.75), (0.0, 0.0)]);
+        assert_eq!(ranked(&samples, ids), [(bottle, 0.75)]);
     }
 
     #[test]

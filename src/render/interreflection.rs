@@ -37,6 +37,8 @@ const MAX_BOUNCE: f32 = 0.95;
 /// them, blurred over the surface.
 pub(super) struct Bounces {
     albedo: LinearRgb,
+    /// The surface's sides, metres, in its middle the origin.
+    catcher: [f64; 2],
     lens: RadialDistortion,
     /// None if there is nothing to brighten.
     seen: Option<(ProjectedPlane, BounceMap)>,
@@ -52,6 +54,7 @@ impl Bounces {
         let asked_for = !shot.interreflection.is_black();
         Self {
             albedo: shot.interreflection,
+            catcher: shot.catcher,
             lens: shot.distortion(),
             seen: asked_for
                 .then(|| Some((surface()?, BounceMap::new(shot)?)))
@@ -66,10 +69,16 @@ impl Bounces {
         deep.map_shadow(|x, y, factor| {
             let ideal = self.lens.undistort(pixel_center(x, y).xy().into());
             match surface.point_at(&ideal.to_homogeneous()) {
-                Some(point) => factor * endless_bounces(self.albedo * bounce.at(&point)),
-                None => factor,
+                Some(point) if self.is_on_surface(&point) => {
+                    factor * endless_bounces(self.albedo * bounce.at(&point))
+                }
+                _ => factor,
             }
         })
+    }
+
+    fn is_on_surface(&self, point: &Vector3<f64>) -> bool {
+        (0..2).all(|axis| 2.0 * point[axis].abs() <= self.catcher[axis])
     }
 }
 

@@ -27,6 +27,9 @@ pub(super) struct LitPatch {
     pub(super) normal: Vector3<f64>,
     /// Metres from its middle to its far ends.
     pub(super) reach: f64,
+    /// Metres from its middle to the farthest place whose light matters: more than its reach where
+    /// several cards throw shadows on it.
+    pub(super) spread: f64,
     /// Height of occluders above it, metres.
     pub(super) occluded: f64,
     /// Spacing of the finer lattice on it, metres; 0 if every sample is wanted.
@@ -185,7 +188,13 @@ impl LightGroup {
     /// much or too little.
     fn face_above(light: &AreaLight, count: usize, patch: &LitPatch) -> Self {
         let counts = patch.samples_along(light, count);
-        let nodes = light::nodes_above(light, counts, Point3::from(patch.center), &patch.normal);
+        let nodes = light::nodes_above(
+            light,
+            counts,
+            Point3::from(patch.center),
+            &patch.normal,
+            patch.spread,
+        );
         let group = Self::area_light(light, nodes);
         let factor = group.closed_form_ratio(light, patch);
         Self {
@@ -335,6 +344,7 @@ mod tests {
             center: Vector3::zeros(),
             normal: Vector3::z(),
             reach: 0.1,
+            spread: 0.1,
             occluded,
             cell,
         }
@@ -348,6 +358,7 @@ mod tests {
         let patch = LitPatch {
             normal,
             reach,
+            spread: reach,
             ..level_patch(0.1, 0.0)
         };
         LightSamples::faces_above(&shot, &options, &patch).remove(0)

@@ -131,13 +131,14 @@ impl<'a> LightingContext<'a> {
         &self,
         plane: &ScenePlane,
         center: Vector3<f64>,
-        reach: f64,
+        [reach, spread]: [f64; 2],
     ) -> Option<LightSamples> {
         let projected = ProjectedPlane::new(plane, &self.fine.view)?;
         let patch = LitPatch {
             center,
             normal: projected.normal,
             reach,
+            spread,
             occluded: self.occluders.height_above(&projected.normal, &center),
             cell: projected.cell_metres(&self.fine.view, &center),
         };
@@ -148,7 +149,7 @@ impl<'a> LightingContext<'a> {
     /// card is not visible at all.
     pub(super) fn card(&self, own: usize, seen: &VisibleSide<'_>) -> Option<ReceiverIrradiance> {
         let plane = &self.occluders.cards[own].plane;
-        let lights = self.light_samples(plane, plane.center, plane.half_length())?;
+        let lights = self.light_samples(plane, plane.center, [plane.half_length(); 2])?;
         let [sharp, soft] = SelectedLights::split(&lights);
         Some(ReceiverIrradiance {
             fine: self.card_on(&self.fine, own, seen, sharp)?,
@@ -181,10 +182,12 @@ impl<'a> LightingContext<'a> {
     /// visible one.
     pub(super) fn surface(&self) -> Option<ReceiverIrradiance> {
         // The surface may be infinite; its shadows are as large as cards.
-        let cards = self.occluders.cards.iter();
-        let reach = cards.map(|c| c.plane.half_length()).fold(0.0, f64::max);
         let center = self.occluders.middle_on_surface();
-        let lights = self.light_samples(&self.occluders.surface, center, reach)?;
+        let planes = || self.occluders.cards.iter().map(|card| &card.plane);
+        let reach = planes().map(ScenePlane::half_length).fold(0.0, f64::max);
+        let ends = planes().map(|plane| (plane.center - center).xy().norm() + plane.half_length());
+        let spread = ends.fold(0.0, f64::max);
+        let lights = self.light_samples(&self.occluders.surface, center, [reach, spread])?;
         let [sharp, soft] = SelectedLights::split(&lights);
         let fine = self.surface_on(&self.fine, sharp)?;
         let coarse = self.surface_on(&self.coarse, soft)?;

@@ -23,6 +23,7 @@ use crate::scene::{Card, Cylinder, Shot};
 use crate::work::{self, Kind};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Pixels around a position that an interpolated reading uses.
 const READING_MARGIN_PX: f64 = 3.0;
@@ -79,12 +80,22 @@ impl Change {
 }
 
 fn deep_with(deep: DeepImage, changes: &Changes, shot: &Shot) -> DeepImage {
-    if changes.is_empty() {
-        return deep;
-    }
-    deep.with_light_from_behind(shot.plate.as_deref(), |object, x, y| {
+    let blocks = || changes.values().map(|change| &change.block);
+    let area = [
+        span(blocks().map(|block| &block.x)),
+        span(blocks().map(|block| &block.y)),
+    ];
+    deep.with_light_from_behind(shot.plate.as_deref(), area, |object, x, y| {
         changes.get(&object)?.at(x, y)
     })
+}
+
+/// From where the first of some ranges begins to where the last ends; empty without any.
+fn span<'a>(ranges: impl Iterator<Item = &'a Range<usize>>) -> Range<usize> {
+    let all = ranges
+        .cloned()
+        .reduce(|a, b| a.start.min(b.start)..a.end.max(b.end));
+    all.unwrap_or_default()
 }
 
 /// The pixels with a sample of a card, and the depth of the nearest.

@@ -165,6 +165,7 @@ mod tests {
             center: occluders.surface.center,
             normal: seen.normal,
             reach: 0.15,
+            spread: 0.15,
             occluded: 0.3,
             cell: 0.0,
         };

@@ -1,7 +1,7 @@
 //! Curved cards.
 
 use crate::error::Result;
-use crate::geom::{Point2, Point3, Vector2, Vector3};
+use crate::geom::{Point2, Point3, Vector2, Vector3, sides};
 use crate::scene::Card;
 use crate::scene::bounds::{BEND, TURN};
 use crate::scene::check::field;
@@ -167,10 +167,8 @@ impl Card {
             return corners.map(|uv| self.quad.point(uv.x, uv.y)).collect();
         };
         let flat: Vec<_> = corners.map(|uv| self.flat_point(uv.x, uv.y)).collect();
-        let next = flat.iter().cycle().skip(1);
-        flat.iter()
-            .zip(next)
-            .flat_map(|(a, b)| cylinder.edge(*a, *b))
+        sides(&flat)
+            .flat_map(|[a, b]| cylinder.edge(a, b))
             .map(|p| self.quad.world_from_card * p)
             .collect()
     }

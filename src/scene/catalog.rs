@@ -44,6 +44,22 @@ pub struct Background {
     pub wall: Option<Wall>,
 }
 
+impl Background {
+    /// The whole of a photo that a lens without distortion took, of a surface of unknown albedo
+    /// without walls.
+    pub fn new(name: impl Into<String>, size: [f64; 2], camera: CameraSource) -> Self {
+        Self {
+            name: name.into(),
+            size,
+            camera,
+            k1: 0.0,
+            shown_share: 1.0,
+            albedo: None,
+            wall: None,
+        }
+    }
+}
+
 /// The assets of a library as a recipe sees them, in the library's order.
 pub fn catalog(library: &Library) -> Vec<AssetVariant> {
     library.assets.iter().map(variant_of).collect()

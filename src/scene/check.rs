@@ -311,19 +311,8 @@ mod tests {
     use crate::camera::tilted_camera;
 
     fn scene() -> Scene {
-        let object = Object {
-            role: Default::default(),
-            asset: "b1".into(),
-            photo: 0,
-            back: None,
-            size: [0.2, 0.1],
-            thickness: 0.005,
-            outline: vec![],
-            mass: 0.03,
-            placement: Placement::At(Pose::translation(0.1, 0.0, 0.01)),
-            grade: Grade::default(),
-            bend: Default::default(),
-        };
+        let lying = Placement::At(Pose::translation(0.1, 0.0, 0.01));
+        let object = Object::new("b1", [0.2, 0.1], 0.005, 0.03, lying);
         let falling = Placement::Drop {
             above: [0.0; 2],
             height: 0.3,

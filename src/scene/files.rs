@@ -38,20 +38,11 @@ impl SceneFiles {
     }
 }
 
-/// A path relative to a file.
+/// A path relative to a file; an empty one is the working folder, as older scenes name it.
 pub(crate) fn relative_to_file(path: &Path, file: &Path) -> Result<PathBuf> {
     let file = io::absolute(file)?;
     let folder = file.parent().unwrap_or(&file);
-    io::relative_on_disk(or_working_folder(path), folder)
-}
-
-/// The working folder for an empty path, as older scenes name it.
-fn or_working_folder(path: &Path) -> &Path {
-    if path.as_os_str().is_empty() {
-        Path::new(".")
-    } else {
-        path
-    }
+    io::relative_on_disk(io::or_working_folder(path), folder)
 }
 
 /// A path relative to one file, made relative to another.

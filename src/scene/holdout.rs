@@ -8,7 +8,7 @@
 use crate::camera::{Camera, RadialDistortion};
 use crate::deep::HoldoutSample;
 use crate::filter::sample_bilinear_clamped;
-use crate::geom::{Plane, Point2, Point3, Vector2, Vector3};
+use crate::geom::{Plane, Point2, Point3, Vector2, Vector3, sides};
 use crate::image::Image;
 use crate::pixel::{Coverage, Depth};
 use crate::scene::{Scene, Surface};
@@ -173,8 +173,7 @@ fn subsamples() -> impl Iterator<Item = Vector2<f64>> {
 fn seen_ring(face: &[Vector3<f64>; 4], camera: &Camera) -> Vec<Point2<f64>> {
     let in_camera = face.map(|corner| camera.camera_from_world * Point3::from(corner));
     let mut ring = Vec::new();
-    for i in 0..4 {
-        let (a, b) = (in_camera[i], in_camera[(i + 1) % 4]);
+    for [a, b] in sides(&in_camera) {
         ring.extend((a.z >= NEAR_PLANE_M).then_some(a));
         if (a.z >= NEAR_PLANE_M) != (b.z >= NEAR_PLANE_M) {
             ring.push(a + (b - a) * ((NEAR_PLANE_M - a.z) / (b.z - a.z)));
@@ -208,8 +207,7 @@ fn pixels_around(
 
 /// The lines along a convex ring, their normals inwards, whichever way it turns.
 fn inner_sides(ring: &[Point2<f64>]) -> Vec<(Vector2<f64>, f64)> {
-    let next = ring.iter().cycle().skip(1);
-    let edges: Vec<_> = ring.iter().zip(next).map(|(a, b)| (a, b - a)).collect();
+    let edges: Vec<_> = sides(ring).map(|[a, b]| (a, b - a)).collect();
     let area: f64 = edges.iter().map(|(a, edge)| a.coords.perp(edge)).sum();
     edges
         .into_iter()
@@ -224,6 +222,7 @@ fn inner_sides(ring: &[Point2<f64>]) -> Vec<(Vector2<f64>, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geom::doubled_area;
     use crate::scene::{CameraSource, View, Wall};
 
     fn tray(slope_deg: f64) -> Surface {
@@ -285,14 +284,12 @@ mod tests {
         let (camera, surface) = (camera(), tray(0.0));
         let face = surface.wall.unwrap().inner_faces(surface.size)[2];
         let ring = seen_ring(&face, &camera);
-        let doubled: f64 = (0..4)
-            .map(|i| ring[i].coords.perp(&ring[(i + 1) % 4].coords))
-            .sum();
+        let area = doubled_area(&ring).abs() / 2.0;
         let holdout = surface
             .holdout(&camera, &RadialDistortion::new(&camera, 0.0))
             .unwrap();
         let covered: f32 = holdout.pixels().iter().map(|p| p.coverage.0).sum();
-        assert!((f64::from(covered) / (doubled.abs() / 2.0) - 1.0).abs() < 0.005);
+        assert!((f64::from(covered) / area - 1.0).abs() < 0.005);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Corners of the convex prism that falls in place of a cut-out: few, so that contacts are cheap
 //! and stable.
 
-use crate::geom::Point2;
+use crate::geom::{Point2, doubled_area};
 
 /// Maximum number of corners of a prism. A hexagon has 0.95 to 1 times the area of a bottle's hull;
 /// falls of octagons take 1.6 times as long.
@@ -133,12 +133,6 @@ fn on_card(p: &Point2<f64>, [w, h]: [f64; 2]) -> [f64; 2] {
 pub(super) fn doubled_corner_area(ring: &[[f64; 2]], i: usize) -> f64 {
     let [a, b, c] = [i + ring.len() - 1, i, i + 1].map(|i| ring[i % ring.len()]);
     cross([b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]])
-}
-
-/// Twice the area of a ring; above 0 where it turns left.
-pub(crate) fn doubled_area(ring: &[[f64; 2]]) -> f64 {
-    let next = ring.iter().cycle().skip(1);
-    ring.iter().zip(next).map(|(a, b)| cross(*a, *b)).sum()
 }
 
 #[cfg(test)]

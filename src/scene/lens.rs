@@ -365,13 +365,8 @@ mod tests {
 
     fn background(k1: f64) -> Background {
         Background {
-            name: "tray".into(),
-            size: [0.4, 0.3],
-            camera: CameraSource::Known(photo()),
             k1,
-            shown_share: 1.0,
-            albedo: None,
-            wall: None,
+            ..Background::new("tray", [0.4, 0.3], CameraSource::Known(photo()))
         }
     }
 

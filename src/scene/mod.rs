@@ -12,19 +12,12 @@
 //! use petcomp::scene::{AssetVariant, Background, CameraSource, Recipe};
 //!
 //! let recipe: Recipe = toml::from_str("objects = 3\ngrade = { hue_deg = 0 }")?;
-//! let tray = Background {
-//!     name: "tray".into(),
-//!     size: [0.6, 0.4],
-//!     k1: 0.0,
-//!     shown_share: 1.0,
-//!     albedo: None,
-//!     wall: None,
-//!     camera: CameraSource::Rectangle {
-//!         corners_px: [[20.0, 40.0], [620.0, 40.0], [620.0, 440.0], [20.0, 440.0]],
-//!         photo: [640, 480],
-//!         focal_px: None,
-//!     },
+//! let camera = CameraSource::Rectangle {
+//!     corners_px: [[20.0, 40.0], [620.0, 40.0], [620.0, 440.0], [20.0, 440.0]],
+//!     photo: [640, 480],
+//!     focal_px: None,
 //! };
+//! let tray = Background::new("tray", [0.6, 0.4], camera);
 //! let bottle = AssetVariant {
 //!     asset: "bottle".into(),
 //!     role: Default::default(),
@@ -101,8 +94,6 @@ pub use fall::SettleOptions;
 pub(crate) use fall::{half_extent, level};
 pub(crate) use files::relative_to_file;
 pub use files::{SceneFiles, SceneSettings};
-#[cfg(feature = "settle")]
-pub(crate) use hull::doubled_area;
 #[doc(hidden)]
 pub use lens::{Lens, LensRanges, ThinLens};
 pub use light::{AreaLight, Exposure, LightShape, LightTint};

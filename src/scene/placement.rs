@@ -44,6 +44,30 @@ pub struct Object {
 }
 
 impl Object {
+    /// An object of this width and height, thickness (metres) and mass (kilograms) that shows its
+    /// asset's first photo, unbent and in its own colours, and falls as a box.
+    pub fn new(
+        asset: impl Into<String>,
+        size: [f64; 2],
+        thickness: f64,
+        mass: f64,
+        placement: Placement,
+    ) -> Self {
+        Self {
+            asset: asset.into(),
+            role: Role::default(),
+            photo: 0,
+            back: None,
+            size,
+            thickness,
+            outline: Vec::new(),
+            mass,
+            placement,
+            grade: Grade::default(),
+            bend: Bend::default(),
+        }
+    }
+
     /// Scales it by a factor; the mass follows the volume.
     pub(super) fn scale_by(&mut self, factor: f64) {
         self.size = self.size.map(|length| length * factor);

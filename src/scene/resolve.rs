@@ -291,7 +291,7 @@ mod tests {
     use super::*;
     use crate::geom::{UnitQuaternion, Vector2};
     use crate::pixel::PremulRgba;
-    use crate::scene::{Grade, Lens, Surface, View};
+    use crate::scene::{Lens, Surface, View};
 
     fn camera() -> Camera {
         Camera {
@@ -303,19 +303,8 @@ mod tests {
     }
 
     fn scene() -> Scene {
-        let object = Object {
-            outline: vec![],
-            asset: "b1".into(),
-            role: Default::default(),
-            photo: 0,
-            back: None,
-            size: [0.2, 0.1],
-            thickness: 0.005,
-            mass: 0.03,
-            placement: Placement::At(Pose::translation(0.1, 0.0, 0.01)),
-            grade: Grade::default(),
-            bend: Default::default(),
-        };
+        let lying = Placement::At(Pose::translation(0.1, 0.0, 0.01));
+        let object = Object::new("b1", [0.2, 0.1], 0.005, 0.03, lying);
         Scene {
             objects: vec![object.clone(), object],
             ambient: LinearRgb::WHITE,

@@ -276,22 +276,12 @@ pub(super) fn too_large(asset: &str, card: [f64; 2], background: &str, room: [f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Grade;
 
     fn cards(n: usize, size: [f64; 2]) -> Vec<Object> {
         let placement = DropRanges::unplaced();
-        let card = |i: usize| Object {
-            role: Role::Object,
-            asset: format!("b{i}"),
-            photo: 0,
-            back: None,
-            size,
-            thickness: 0.0002 * (i + 1) as f64,
-            outline: vec![],
-            mass: 0.03,
-            placement,
-            grade: Grade::default(),
-            bend: Default::default(),
+        let card = |i: usize| {
+            let thickness = 0.0002 * (i + 1) as f64;
+            Object::new(format!("b{i}"), size, thickness, 0.03, placement)
         };
         (0..n).map(card).collect()
     }

@@ -1,7 +1,7 @@
 //! Overlap of bodies and its depth, in `f64` and independent of the physics engine, to judge the
 //! engine's result.
 
-use crate::geom::{Pose, Vector3};
+use crate::geom::{Pose, Vector3, sides};
 use crate::scene::half_extent;
 
 /// Sine of the angle up to which edges count as parallel: their normal would be noise, and other
@@ -103,9 +103,8 @@ impl Solid {
 
     /// Unit directions of the sides of its base, in order.
     fn base_sides(&self, axes: &[Vector3<f64>; 3]) -> impl Iterator<Item = Vector3<f64>> {
-        let next = self.outline.iter().cycle().skip(1);
-        let sides = self.outline.iter().zip(next);
-        sides.map(|(a, b)| (axes[0] * (b[0] - a[0]) + axes[1] * (b[1] - a[1])).normalize())
+        sides(&self.outline)
+            .map(|[a, b]| (axes[0] * (b[0] - a[0]) + axes[1] * (b[1] - a[1])).normalize())
     }
 }
 

@@ -18,7 +18,7 @@ use super::contact::{Contact, contacts, perpendicular_axes};
 use super::envelope::EnvelopeMatrix;
 use super::overlap::{Solid, Touch, falling_from_lowest};
 use super::room::Room;
-use crate::geom::Vector3;
+use crate::geom::{Vector3, sides};
 use crate::scene::{Scene, SettleOptions};
 
 /// Factor on friction: the test is for bodies that would fall, not for those that would creep.
@@ -372,9 +372,8 @@ fn centroid(ring: &[[f64; 2]]) -> [f64; 2] {
 
 /// Twice the area of a ring, and six times its first moments.
 fn ring_moments(ring: &[[f64; 2]]) -> [f64; 3] {
-    let next = ring.iter().cycle().skip(1);
     let (mut area, mut x, mut y) = (0.0, 0.0, 0.0);
-    for (a, b) in ring.iter().zip(next) {
+    for [a, b] in sides(ring) {
         let cross = a[0] * b[1] - a[1] * b[0];
         area += cross;
         x += cross * (a[0] + b[0]);

@@ -6,19 +6,12 @@ use petcomp::scene::{AssetVariant, Background, CameraSource, Range, Recipe, Sett
 use petcomp::settle;
 
 fn scene(cards: u32, k: u64) -> Scene {
-    let tray = Background {
-        name: "tray".into(),
-        size: [0.6, 0.4],
-        k1: 0.0,
-        shown_share: 1.0,
-        albedo: None,
-        wall: None,
-        camera: CameraSource::Rectangle {
-            corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
-            photo: [60, 40],
-            focal_px: None,
-        },
+    let camera = CameraSource::Rectangle {
+        corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
+        photo: [60, 40],
+        focal_px: None,
     };
+    let tray = Background::new("tray", [0.6, 0.4], camera);
     let bottle = AssetVariant {
         role: Default::default(),
         asset: "b".into(),

@@ -1626,9 +1626,9 @@ fn a_written_difference_shows_one_of_alpha_alone() {
 fn diff_tells_channels_that_it_passes_over() {
     let desk = Desk::new();
     let write = |name: &str, channels: &[&str]| {
-        let grey = [0.5; 4];
-        let channels: Vec<(&str, &[f32])> = channels.iter().map(|&c| (c, &grey[..])).collect();
-        io::exr::write_channels(desk.path(name), (2, 2), &channels, &[]).expect("an EXR");
+        let channels: Vec<_> = channels.iter().map(|&c| (c, vec![0.5; 4])).collect();
+        let canvas = io::Canvas::default();
+        io::exr::write_channels(desk.path(name), (2, 2), canvas, channels, &[]).expect("an EXR");
     };
     write("colours.exr", &["R", "G", "B"]);
     write("depth.exr", &["R", "G", "B", "Z"]);
@@ -1822,7 +1822,7 @@ fn a_scene_goes_through_the_stages_one_by_one() {
         "{told}"
     );
     let told = text(&desk.run(&words(&format!("{parts} normals"))).stderr);
-    assert!(told.contains("expected some of beauty"), "{told}");
+    assert!(told.contains("expected one of beauty"), "{told}");
     desk.ok(&words(
         "scene export rest.json demo/recipe.toml --to cycles blender",
     ));

@@ -9,9 +9,10 @@ mod ellipse;
 
 use super::clock::timed;
 use super::{Diagram, Point};
-use ellipse::{ELLIPSE_HALF_M, Ellipse, Ring, ring_area};
+use ellipse::{ELLIPSE_HALF_M, Ellipse, Ring};
 use petcomp::DeepImage;
 use petcomp::Result;
+use petcomp::geom::doubled_area;
 use petcomp::label::{LabelOptions, Labels, RleMask, label, outline_of, trace};
 use petcomp::scene::Shot;
 
@@ -246,7 +247,8 @@ fn only_mask(labels: &Labels) -> RleMask {
 }
 
 fn total_area(rings: &[Ring]) -> f64 {
-    rings.iter().map(|ring| ring_area(ring)).sum()
+    let areas = rings.iter().map(|ring| 0.5 * doubled_area(ring).abs());
+    areas.sum()
 }
 
 fn count_corners(rings: &[Ring]) -> f64 {
@@ -256,13 +258,15 @@ fn count_corners(rings: &[Ring]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use petcomp::geom::sides;
     use std::f64::consts::TAU;
 
     #[test]
     fn the_outline_and_the_raster_show_the_same_ellipse() {
         let ellipse = Ellipse::seen_by([160, 120]);
         let shot = ellipse.shot(128);
-        let ring = &outline_of(&shot.cards[0], &shot.camera)[0];
+        let rings = outline_of(&shot.cards[0], &shot.camera);
+        let ring = &rings[0];
         assert!(
             ring.iter()
                 .all(|p| (ellipse.level(p.x, p.y) - 1.0).abs() < 1e-5),
@@ -271,18 +275,14 @@ mod tests {
         // An inscribed polygon of n corners lacks 1 - sin(2 pi / n) / (2 pi / n) of the area.
         let turn = TAU / 128.0;
         // `geo` snaps corners to 2^-30 of the extent, 1.5e-7 pixels of half lengths of 8 and 24.
-        assert!((ring_area(ring) / ellipse.area() - libm::sin(turn) / turn).abs() < 1e-7);
+        assert!((total_area(&rings) / ellipse.area() - libm::sin(turn) / turn).abs() < 1e-7);
         let half = LabelOptions {
             alpha_threshold: 0.5,
             ..LabelOptions::default()
         };
         let mask = only_mask(&label(&ellipse.deep(), &shot, &half));
         // A pixel on the border is wrong by at most a half, and by a quarter on average.
-        let border: f64 = ring
-            .iter()
-            .zip(ring.iter().cycle().skip(1))
-            .map(|(a, b)| (b - a).norm())
-            .sum();
+        let border: f64 = sides(ring).map(|[a, b]| (b - a).norm()).sum();
         assert!(
             1.0 - ellipse.iou(&mask) < 0.5 * border / ellipse.area(),
             "{}",
@@ -295,9 +295,7 @@ mod tests {
         let ellipse = Ellipse::seen_by([160, 120]);
         let rings = outline_of(&ellipse.shot(32).cards[0], &ellipse.shot(32).camera);
         // An inscribed polygon shares all of its area; lines are 1/16 of a pixel apart.
-        assert!(
-            (ellipse.iou_of_rings(&rings) - ring_area(&rings[0]) / ellipse.area()).abs() < 1e-3
-        );
+        assert!((ellipse.iou_of_rings(&rings) - total_area(&rings) / ellipse.area()).abs() < 1e-3);
         let y = ellipse.center.y + 3.0;
         assert!(
             ellipse

@@ -3,10 +3,9 @@
 use petcomp::Camera;
 use petcomp::Image;
 use petcomp::asset::Texture;
-use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
+use petcomp::geom::{Pose, Quad, UnitQuaternion, Vector3};
 use petcomp::scene::{AreaLight, Card, Shot};
 use petcomp::{LinearRgb, ObjectId, PremulRgba};
-use std::f64::consts::PI;
 
 /// Height of the camera over the surface, metres.
 pub(super) const CAMERA_HEIGHT_M: f64 = 1.1;
@@ -21,18 +20,7 @@ const CARD_SIZE_M: [f64; 2] = [0.07, 0.21];
 
 /// A camera that looks straight down from `height_m` over the origin.
 pub(super) fn camera_above(image: [u32; 2], height_m: f64) -> Camera {
-    let [w, h] = image.map(f64::from);
-    Camera {
-        image,
-        focal_px: Vector2::repeat(FOCAL_WIDTHS * w),
-        principal_px: Point2::new(0.5 * w, 0.5 * h),
-        camera_from_world: pose_looking_down(height_m),
-    }
-}
-
-fn pose_looking_down(height_m: f64) -> Pose {
-    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
-    Pose::from_parts(Vector3::new(0.0, 0.0, height_m).into(), down)
+    Camera::looking_down(height_m, FOCAL_WIDTHS * f64::from(image[0]), image)
 }
 
 /// A square lamp above and to the right of the origin that shines at it.

@@ -1,12 +1,12 @@
 //! One image of a dataset and its label file.
 
 use super::label_rows::{LabelRow, read_rows};
+use crate::dataset::Part;
 use crate::dataset::finding::Finding;
 use crate::dataset::near_duplicates::{Look, Thumbnail, boxes_in};
 use crate::dataset::yolo::MIN_SIDE_PX;
-use crate::dataset::{Part, YoloSet};
 use crate::diagnostic::Code;
-use crate::eval::GroundTruth;
+use crate::eval::{GroundTruth, label_of};
 use crate::io;
 use crate::pixel::PremulRgba;
 use std::path::{Path, PathBuf};
@@ -117,7 +117,7 @@ impl CheckedImage {
 
     pub(super) fn missing_label(&self) -> Finding {
         let mut message = format!("missing, but {} exists", self.path.display());
-        if self.label != YoloSet::label_of(&self.path) {
+        if self.label != label_of(&self.path) {
             message += ": trainers replace the last `images` of its absolute path, without links, by `labels`";
         }
         Finding::in_file(&self.label, Code::MissingLabel, message)

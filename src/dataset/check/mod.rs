@@ -15,10 +15,10 @@ use crate::dataset::merge::writers_of;
 use crate::dataset::near_duplicates::{Look, NEAR_DUPLICATE_RMS, nearest};
 use crate::dataset::paths::folder_of;
 use crate::dataset::yolo_yaml::DataYaml;
-use crate::dataset::{Part, Written, YoloSet};
+use crate::dataset::{Part, Written};
 use crate::diagnostic::Code;
 use crate::error::{Error, Result};
-use crate::eval::is_class_list;
+use crate::eval::{is_class_list, label_of};
 use crate::io;
 use image::{CheckedImage, ListedImage};
 use rayon::prelude::*;
@@ -191,7 +191,7 @@ fn boxes_of(image: &CheckedImage) -> impl Iterator<Item = CheckedBox> {
 
 /// The label files of a folder of images; empty if they cannot be listed.
 fn list_labels(images: &Path) -> Vec<PathBuf> {
-    let label = YoloSet::label_of(&images.join("x"));
+    let label = label_of(&images.join("x"));
     let is_label = |path: &Path| is_list(path) && !is_class_list(path);
     io::files_below(folder_of(&label), is_label, usize::MAX).unwrap_or_default()
 }
@@ -274,7 +274,7 @@ impl Checker<'_> {
         let trained = trained_place(place);
         let listed = found.iter().map(|image| {
             let below = image.strip_prefix(place).map(|below| trained.join(below));
-            let label = YoloSet::label_of(below.as_ref().unwrap_or(image));
+            let label = label_of(below.as_ref().unwrap_or(image));
             ListedImage {
                 path: io::relative(image, self.folder),
                 label: self.name_of(&label),

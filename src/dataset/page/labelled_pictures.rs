@@ -2,7 +2,7 @@
 
 use crate::dataset::{SampleSummary, Summary, YoloSet};
 use crate::error::{Error, Result};
-use crate::eval::{self, is_image};
+use crate::eval::{self, is_image, label_of};
 use crate::geom::BBox;
 use crate::io;
 use rayon::prelude::*;
@@ -117,7 +117,7 @@ impl LabelledPicture {
 
 /// The label file of an image: that of a YOLO dataset, or one of the same name in the same folder.
 fn label_beside(image: &Path) -> Option<PathBuf> {
-    let mut candidates = [YoloSet::label_of(image), image.with_extension("txt")].into_iter();
+    let mut candidates = [label_of(image), image.with_extension("txt")].into_iter();
     candidates.find(|label| label.is_file())
 }
 

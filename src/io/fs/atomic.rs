@@ -226,6 +226,14 @@ fn is_left_over(entry: &DirEntry, age: Duration) -> bool {
         && elapsed.is_ok_and(|elapsed| elapsed >= age)
 }
 
+/// Deletes a file if it exists.
+pub(crate) fn remove_if_exists(file: &Path) -> Result<()> {
+    match std::fs::remove_file(file) {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::file(file, e)),
+        _ => Ok(()),
+    }
+}
+
 /// A new file that is deleted unless it is moved to its destination, with the user's default
 /// permissions.
 fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {

@@ -19,12 +19,13 @@ pub use sanitize_path::{below, inside};
 pub use text_name::path_text;
 
 pub(crate) use atomic::{
-    Syncing, absolute_folder, sweep, sync_file_system, with_last_step, write_bytes, write_through,
+    Syncing, absolute_folder, remove_if_exists, sweep, sync_file_system, with_last_step,
+    write_bytes, write_through,
 };
 pub(crate) use distinct::real_path;
 pub(crate) use listing::{files_below, is_apple_double};
 pub(crate) use natural_order::natural_key;
 pub(crate) use open::{open_regular, read_regular, read_to_end, reason};
 pub(crate) use own_file::{open_own, refuse_foreign};
-pub(crate) use sanitize_path::{length_inside, refuse_links};
+pub(crate) use sanitize_path::{length_inside, or_working_folder, refuse_links};
 pub(crate) use text_name::stem_text;

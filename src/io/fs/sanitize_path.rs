@@ -89,7 +89,7 @@ fn through_links(folder: &Path, path: &Path) -> std::io::Result<Option<Metadata>
 }
 
 /// The folder; the working folder for an empty path.
-fn or_working_folder(folder: &Path) -> &Path {
+pub(crate) fn or_working_folder(folder: &Path) -> &Path {
     if folder.as_os_str().is_empty() {
         Path::new(".")
     } else {

@@ -195,16 +195,11 @@ fn warning_of_bare(share: f64, what: &str) -> Option<Diagnostic> {
 
 /// Mean of a matte where a mask is set; 0 where it is empty.
 fn mean_matte(matte: &Image<Coverage>, set: &Mask) -> f32 {
-    let pixels = matte.pixels().iter().zip(set.pixels());
-    let chosen = pixels.filter(|(_, inside)| **inside);
-    let (sum, count) = chosen.fold((0.0, 0u64), |(sum, count), (m, _)| {
+    let pixels = matte.pixels_in(set);
+    let (sum, count) = pixels.fold((0.0, 0_u64), |(sum, count), m| {
         (sum + f64::from(m.0), count + 1)
     });
-    if count == 0 {
-        0.0
-    } else {
-        (sum / count as f64) as f32
-    }
+    (sum / count.max(1) as f64) as f32
 }
 
 #[cfg(test)]

@@ -94,10 +94,7 @@ impl FromStr for MatteMethod {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        by_name(&Self::ALL, name).ok_or_else(|| {
-            let what = format!("\"{name}\", expected physical, key or outline");
-            Error::value("matte", what)
-        })
+        by_name("matte", &Self::ALL, name)
     }
 }
 

@@ -42,13 +42,9 @@ pub(super) fn without_shadow<'a>(
 ) -> Cow<'a, Image<LinearRgb>> {
     match claims {
         Some(claims) => Cow::Owned(transmittance.zip_map(claims, |t, claim| match claim {
-            Some(true) => larger(t, flat),
+            Some(true) => t.zip_map(flat, f32::max),
             _ => t,
         })),
         None => Cow::Borrowed(transmittance),
     }
-}
-
-fn larger(a: LinearRgb, b: LinearRgb) -> LinearRgb {
-    LinearRgb::new(a.r.max(b.r), a.g.max(b.g), a.b.max(b.b))
 }

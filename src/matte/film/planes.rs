@@ -65,11 +65,7 @@ mod tests {
         );
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("film.exr");
-        let planes: Vec<(&str, &[f32])> = planes
-            .iter()
-            .map(|(name, plane)| (*name, &plane[..]))
-            .collect();
-        io::exr::write_channels(&path, (3, 2), &planes, &[]).unwrap();
+        io::exr::write_channels(&path, (3, 2), io::Canvas::default(), planes, &[]).unwrap();
         assert_eq!(io::read::<Film>(&path).unwrap(), Image::filled(3, 2, film));
         assert_eq!(
             io::read::<crate::PremulRgba>(&path).unwrap()[(1, 1)],

@@ -41,7 +41,7 @@ impl Rows for Garbage<'_> {
 
 /// The first where it is less, or else the second.
 #[inline(always)]
-fn lesser(first: f32, second: f32) -> f32 {
+pub(in crate::matte) fn lesser(first: f32, second: f32) -> f32 {
     if first < second { first } else { second }
 }
 

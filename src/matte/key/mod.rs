@@ -92,6 +92,7 @@ mod running_blur;
 mod stream;
 mod ycc;
 
+pub(super) use limits::lesser;
 #[doc(hidden)]
 pub use options::{Blur, Falloff};
 pub use options::{KeyOptions, Profile};

@@ -45,9 +45,7 @@ impl std::str::FromStr for Profile {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        let names = Self::ALL.map(|(n, _)| n).join(", ");
-        by_name(&Self::ALL, name)
-            .ok_or_else(|| Error::value("profile", format!("\"{name}\", expected one of {names}")))
+        by_name("profile", &Self::ALL, name)
     }
 }
 

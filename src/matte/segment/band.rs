@@ -8,7 +8,6 @@ use crate::matte::check::check_value;
 use crate::matte::prepared::square_root;
 use crate::pixel::LinearRgb;
 use crate::quantile::{median, quantile};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::iter;
 
@@ -68,7 +67,7 @@ impl Bands {
             .map(|_| in_units_of_noise(channels.iter_mut().filter_map(Iterator::next).collect()));
         Self {
             finest: bands.next().unwrap_or_default(),
-            coarser: bands.map(|band| largest_around(&band, 1)).collect(),
+            coarser: bands.map(|band| filter::largest_around(&band, 1)).collect(),
         }
     }
 
@@ -130,38 +129,6 @@ fn in_units_of_noise(bands: Vec<Image<f32>>) -> Image<f32> {
 fn squared_in_units(band: &Image<f32>, noise: f32) -> Image<f32> {
     let unit = 1.0 / noise;
     band.map(|v| (v * unit) * (v * unit))
-}
-
-/// The largest value at most `reach` columns and rows away, for every pixel.
-pub(super) fn largest_around(band: &Image<f32>, reach: usize) -> Image<f32> {
-    let along = largest_along(band, reach);
-    let height = band.height();
-    let mut around = along.clone();
-    around.par_rows_mut().enumerate().for_each(|(y, row)| {
-        for near in y.saturating_sub(reach)..(y + reach + 1).min(height) {
-            raise(row, along.row(near));
-        }
-    });
-    around
-}
-
-/// The largest value at most `reach` columns away, for every pixel.
-fn largest_along(band: &Image<f32>, reach: usize) -> Image<f32> {
-    let mut along = band.clone();
-    along.par_rows_mut().enumerate().for_each(|(y, row)| {
-        for by in 1..=reach.min(band.width()) {
-            raise(row, &band.row(y)[by..]);
-            raise(&mut row[by..], band.row(y));
-        }
-    });
-    along
-}
-
-/// Raises values to others, where those are larger.
-fn raise(row: &mut [f32], other: &[f32]) {
-    for (value, &other) in row.iter_mut().zip(other) {
-        *value = if other > *value { other } else { *value };
-    }
 }
 
 /// Width of the frame along the border that shows the background, as a share of the longer side.
@@ -249,22 +216,6 @@ mod tests {
         // Two thirds of the frame are covered: the lower quartile is then the 0.76 quantile of the
         // noise, 3.7 times its own.
         assert!(noise_sigma(&busy) < 4.0 * noise_sigma(&quiet));
-    }
-
-    #[test]
-    fn the_largest_around_a_pixel_is_found_up_to_the_border() {
-        let band = Image::from_fn(7, 5, |x, y| ((x * 7919 + y * 104_729) % 31) as f32);
-        for reach in [1, 2, 9] {
-            let found = largest_around(&band, reach);
-            for (x, y) in (0..35_usize).map(|i| (i % 7, i / 7)) {
-                let near = (0..35_usize)
-                    .filter(|i| x.abs_diff(i % 7) <= reach && y.abs_diff(i / 7) <= reach);
-                assert_eq!(
-                    found[(x, y)],
-                    near.map(|i| band.pixels()[i]).fold(0.0, f32::max)
-                );
-            }
-        }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::image::{Image, Mask};
 use crate::matte::arrays::{differences, largest};
 use crate::matte::plate::{PlateOptions, ScreenPlate};
 use crate::matte::prepared::longer_side;
-use crate::matte::screen::{is_keyable, masked_pixels, screen_shade};
+use crate::matte::screen::{is_keyable, screen_shade};
 use crate::matte::stroke::{Claims, corrected, unclaimed};
 use crate::pixel::LinearRgb;
 
@@ -197,7 +197,7 @@ impl Hole {
 
 /// Whether the screen has enough colour to be distinguished from clear plastic.
 fn are_distinguishable(picture: &Image<LinearRgb>, background: &Mask) -> bool {
-    let free = masked_pixels(picture, background);
+    let free = picture.pixels_in(background);
     is_keyable(free.fold(LinearRgb::BLACK, |sum, p| sum + p))
 }
 

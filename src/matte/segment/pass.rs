@@ -2,7 +2,7 @@
 //! enclose.
 
 use super::SegmentOptions;
-use super::band::{self, Bands};
+use super::band::Bands;
 use super::cluster::{self, PixelGroups, both};
 use super::hull;
 use crate::diagnostic::{Code, Diagnostic};
@@ -165,7 +165,7 @@ fn clusters_with(others: &Mask, edges: &Mask, join_px: f64) -> Mask {
 
 /// Where a band has at least a share of the strongest value nearby.
 fn ridges(band: &Image<f32>, share: f32) -> Mask {
-    let strongest = band::largest_around(band, SMEAR_PX);
+    let strongest = filter::largest_around(band, SMEAR_PX);
     band.zip_map(&strongest, |v, most| v >= share * most)
 }
 

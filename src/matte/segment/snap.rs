@@ -1,10 +1,10 @@
 //! Moves an outline to where the photo itself changes, to a fraction of a pixel.
 
 use crate::filter;
-use crate::geom::{Point2, Vector2};
+use crate::geom::{Point2, Vector2, sides};
 use crate::image::Image;
 use crate::matte::Outline;
-use crate::matte::outline::{ring_length, sides};
+use crate::matte::outline::ring_length;
 use crate::pixel::LinearRgb;
 use crate::quantile::median;
 use rayon::prelude::*;

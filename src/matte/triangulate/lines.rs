@@ -364,7 +364,7 @@ pub(super) fn flat_transmittance(solved: &Image<PixelFilm>, inside: &Image<Cover
     let Some(clearest) = clearest(&object) else {
         return LinearRgb::WHITE;
     };
-    object.retain(|t| mean_channel(*t) >= MIN_FLAT_SHARE * clearest);
+    object.retain(|t| t.mean() >= MIN_FLAT_SHARE * clearest);
     median_color(&object).map(|t| t.clamp(0.001, 1.0))
 }
 
@@ -379,10 +379,6 @@ fn median_color(colors: &[LinearRgb]) -> LinearRgb {
 
 /// Mean transmittance of the clearest pixels; none without pixels.
 fn clearest(object: &[LinearRgb]) -> Option<f32> {
-    let means = object.iter().copied().map(mean_channel).collect();
+    let means = object.iter().copied().map(LinearRgb::mean).collect();
     quantile(means, 1.0 - CLEAREST_SHARE, f32::total_cmp)
-}
-
-fn mean_channel(t: LinearRgb) -> f32 {
-    (t.r + t.g + t.b) / 3.0
 }

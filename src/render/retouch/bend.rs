@@ -6,7 +6,7 @@ use crate::filter::sample_bilinear;
 use crate::geom::{BBox, Point2, Point3};
 use crate::image::Image;
 use crate::light;
-use crate::pixel::{Film, LinearRgb, Mix};
+use crate::pixel::{Film, LinearRgb};
 use crate::render::light_samples::{LightSamples, LitPatch};
 use crate::render::view::ScenePlane;
 use crate::scene::{Card, Cylinder};
@@ -96,6 +96,7 @@ impl BentShading {
                 center: plane.center,
                 normal: card.quad.world_from_card.rotation * cylinder.normal(arc) * side,
                 reach: plane.half_length(),
+                spread: plane.half_length(),
                 occluded: plane.half_length(),
                 cell: 0.0,
             };
@@ -119,7 +120,7 @@ impl BentShading {
         let before = (place as usize).min(SHADING_NODES - 2);
         let rest = (place - before as f64) as f32;
         let [a, b] = [self.shares[before], self.shares[before + 1]];
-        a.scale(1.0 - rest).add_scaled(rest, b)
+        a.mixed(b, rest)
     }
 }
 
@@ -142,8 +143,5 @@ fn open_irradiance(darkroom: &Darkroom<'_>, patch: &LitPatch) -> LinearRgb {
 
 /// 1 if the flat card is in the dark.
 fn ratio(light: LinearRgb, flat: LinearRgb) -> LinearRgb {
-    let pairs = [(light.r, flat.r), (light.g, flat.g), (light.b, flat.b)];
-    pairs
-        .map(|(light, flat)| if flat > 0.0 { light / flat } else { 1.0 })
-        .into()
+    light.zip_map(flat, |a, b| if b > 0.0 { a / b } else { 1.0 })
 }

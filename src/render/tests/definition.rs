@@ -4,7 +4,7 @@ use crate::asset::{Panorama, Texture};
 use crate::camera::Camera;
 use crate::composite;
 use crate::deep::{DeepImage, DeepSample};
-use crate::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
+use crate::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector3};
 use crate::image::Image;
 use crate::light;
 use crate::pixel::{Film, LinearRgb, ObjectId, PremulRgba};
@@ -34,13 +34,7 @@ pub(super) const HIGH: RenderOptions = RenderOptions {
 
 /// A camera at height 1 over the surface, looking straight down; picture up is world `+y`.
 pub(super) fn above(width: u32, height: u32, focal_px: f64) -> Camera {
-    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
-    Camera {
-        image: [width, height],
-        focal_px: Vector2::repeat(focal_px),
-        principal_px: Point2::new(0.5 * f64::from(width), 0.5 * f64::from(height)),
-        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
-    }
+    Camera::looking_down(1.0, focal_px, [width, height])
 }
 
 /// A light whose irradiance at five points was computed by hand and verified in Cycles.
@@ -798,6 +792,12 @@ fn interreflection_brightens_the_surface_under_a_card_alone() {
         "{middle:?}"
     );
     assert!((middle[2] - 1.0).abs() < 1e-6 && (gain(0)[0] - 1.0).abs() < 1e-3);
+    let small = Shot {
+        catcher: [0.06; 2],
+        ..lit
+    };
+    let beyond = render(&small, &RenderOptions::default()).shadow()[(14, 10)];
+    assert_eq!(beyond, LinearRgb::WHITE);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::definition::{HIGH, above, card, difference, pile, plate, same};
 use crate::camera::Camera;
 use crate::composite;
 use crate::deep::DeepImage;
-use crate::geom::{Point2, Point3, UnitQuaternion, Vector3};
+use crate::geom::{Point2, Point3, UnitQuaternion, Vector3, doubled_area};
 use crate::image::Image;
 use crate::label::{LabelOptions, label};
 use crate::pixel::PremulRgba;
@@ -168,12 +168,7 @@ fn label_and_picture_agree() {
         }
         // The area of the outline is the coverage, and the box of the mask that of the outline.
         let ring = &object.outline_px[0];
-        let ends = ring.iter().cycle().skip(1);
-        let doubled: f64 = ring
-            .iter()
-            .zip(ends)
-            .map(|(a, b)| a.x * b.y - b.x * a.y)
-            .sum();
+        let doubled = doubled_area(ring);
         let covered: f64 = coverage(&deep).pixels().iter().sum();
         assert!(
             (0.5 * doubled.abs() / covered - 1.0).abs() < 0.01,

@@ -4,7 +4,7 @@ use super::compose::SceneNumber;
 use crate::asset::Role;
 use crate::error::{Error, Result};
 use crate::scene::belt::SequencePlace;
-use crate::scene::{AssetVariant, Count, DrawLog, Draws, DropRanges, Grade, Object, Recipe, Take};
+use crate::scene::{AssetVariant, Count, DrawLog, Draws, DropRanges, Object, Recipe, Take};
 use serde::{Deserialize, Serialize};
 
 /// Collision shape of a cut-out, as thick as the asset.
@@ -225,18 +225,12 @@ impl AssetVariant {
             &format!("{path}.photo"),
             photos.slice_of(&self.photo_sizes).len(),
         );
+        let (size, placement) = (self.photo_sizes[photo], DropRanges::unplaced());
         Ok(Object {
-            asset: self.asset.clone(),
             role: self.role,
             photo,
-            back: None,
-            size: self.photo_sizes[photo],
-            thickness: self.thickness,
             outline: self.collider_outline(photo, collider),
-            mass: self.mass,
-            placement: DropRanges::unplaced(),
-            grade: Grade::default(),
-            bend: Default::default(),
+            ..Object::new(&self.asset, size, self.thickness, self.mass, placement)
         })
     }
 

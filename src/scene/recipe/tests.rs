@@ -13,19 +13,12 @@ use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
 pub(super) fn tray(name: &str) -> Background {
-    Background {
-        name: name.into(),
-        size: [0.6, 0.4],
-        k1: 0.0,
-        shown_share: 1.0,
-        albedo: None,
-        wall: None,
-        camera: CameraSource::Rectangle {
-            corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
-            photo: [60, 40],
-            focal_px: Some(55.0),
-        },
-    }
+    let camera = CameraSource::Rectangle {
+        corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
+        photo: [60, 40],
+        focal_px: Some(55.0),
+    };
+    Background::new(name, [0.6, 0.4], camera)
 }
 
 pub(super) fn catalog(n: usize) -> Vec<AssetVariant> {

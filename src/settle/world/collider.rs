@@ -1,7 +1,8 @@
 //! The shape of an object in the physics world: a box, or a convex prism.
 
 use super::prism::Prism;
-use crate::scene::{Object, SettleOptions, doubled_area};
+use crate::geom::doubled_area;
+use crate::scene::{Object, SettleOptions};
 use crate::settle::bodies::core_outline;
 use rapier3d::prelude::{ColliderBuilder, SharedShape};
 

@@ -1,6 +1,7 @@
 //! A convex prism, bounded by upright sides and two faces, as a shape of the engine; its edges may be
 //! rounded.
 
+use crate::geom::sides;
 use rapier3d::parry::bounding_volume::{Aabb, BoundingSphere, BoundingVolume};
 use rapier3d::parry::mass_properties::MassProperties;
 use rapier3d::parry::query::{PointProjection, PointQuery, Ray, RayCast, RayIntersection};
@@ -209,8 +210,7 @@ fn doubled_area_of(ring: &[Vector], corners: &[usize]) -> Real {
 
 /// Whether a point is in a part of a convex ring, seen along `z`.
 fn is_inside(ring: &[Vector], corners: &[usize], point: Vector) -> bool {
-    let next = corners.iter().cycle().skip(1);
-    corners.iter().zip(next).all(|(&from, &to)| {
+    sides(corners).all(|[from, to]| {
         let side = ring[to] - ring[from];
         side.cross(point - ring[from]).z >= 0.0
     })

@@ -209,14 +209,8 @@ impl FilmOptionArgs {
         canvas: Canvas,
     ) -> Result<()> {
         let planes = film_planes(film, transmittance);
-        let planes = planes.iter().map(|(name, plane)| (*name, &plane[..]));
-        let planes: Vec<(&str, &[f32])> = planes.collect();
-        Ok(io::exr::write_channels_on(
-            &self.output,
-            film.size(),
-            canvas,
-            &planes,
-        )?)
+        io::exr::write_channels(&self.output, film.size(), canvas, planes, &[])?;
+        Ok(())
     }
 
     fn write_extras(

@@ -163,19 +163,18 @@ fn not_a_number_never_reaches_an_integer_file() {
 fn named_channels_and_texts_come_back() {
     let folder = Folder::new();
     let path = folder.file("layers.exr");
-    let (red, depth) = ([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [9.0; 6]);
-    let more = ("diffuse.U", red.as_slice());
+    let red = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+    let channels = vec![
+        ("diffuse.R", red.clone()),
+        ("diffuse.U", red.clone()),
+        ("Z", vec![9.0; 6]),
+    ];
     let notes = [
         ("petcomp:seed".to_string(), "17".to_string()),
         ("petcomp:stage".to_string(), "render".to_string()),
     ];
-    io::exr::write_channels(
-        &path,
-        (3, 2),
-        &[("diffuse.R", &red), more, ("Z", &depth)],
-        &notes,
-    )
-    .unwrap();
+    let canvas = io::Canvas::default();
+    io::exr::write_channels(&path, (3, 2), canvas, channels, &notes).unwrap();
     let (size, channels) = io::exr::read_channels(&path).unwrap();
     assert_eq!(size, (3, 2));
     assert_eq!(
@@ -190,7 +189,8 @@ fn named_channels_and_texts_come_back() {
         e.contains("has the channels Z diffuse.R diffuse.U, expected R G B or Y"),
         "{e}"
     );
-    assert!(io::exr::write_channels(&path, (3, 2), &[("Z", &[1.0])], &[]).is_err());
+    let short = vec![("Z", vec![1.0])];
+    assert!(io::exr::write_channels(&path, (3, 2), canvas, short, &[]).is_err());
 }
 
 #[test]

@@ -328,12 +328,9 @@ fn layers_of_an_exr_are_found_by_name_and_single_channels_are_grey() {
     let path = folder.file("a.exr");
     let values: Vec<f32> = (0..7).map(|v| v as f32).collect();
     let read = |names: &[&str]| {
-        let channels: Vec<(&str, &[f32])> = names
-            .iter()
-            .zip(values.chunks(1))
-            .map(|(n, v)| (*n, v))
-            .collect();
-        write_channels(&path, (1, 1), &channels, &[]).unwrap();
+        let channels = names.iter().zip(&values);
+        let channels: Vec<_> = channels.map(|(n, v)| (*n, vec![*v])).collect();
+        write_channels(&path, (1, 1), io::Canvas::default(), channels, &[]).unwrap();
         io::read::<PremulRgba>(&path)
             .map(|image| image[(0, 0)])
             .map_err(|e| e.to_string())

@@ -2,7 +2,7 @@
 
 use crate::pile::camera_above;
 use petcomp::Image;
-use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector3};
+use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector3, sides};
 use petcomp::label::RleMask;
 use petcomp::scene::{Card, Shot};
 use petcomp::{DeepImage, DeepSample};
@@ -18,23 +18,12 @@ const POINTS_PER_SIDE: usize = 16;
 /// The corners of a polygon.
 pub(super) type Ring = Vec<Point2<f64>>;
 
-/// The sides of a ring, the last one back to its first corner.
-fn ring_sides(ring: &[Point2<f64>]) -> impl Iterator<Item = (&Point2<f64>, &Point2<f64>)> {
-    ring.iter().zip(ring.iter().cycle().skip(1))
-}
-
-/// Area of a ring, by the shoelace formula.
-pub(super) fn ring_area(ring: &[Point2<f64>]) -> f64 {
-    let doubled: f64 = ring_sides(ring).map(|(a, b)| a.x * b.y - b.x * a.y).sum();
-    0.5 * doubled.abs()
-}
-
 /// The parts of a row line that are in an odd number of rings.
 fn spans_inside(rings: &[Ring], y: f64) -> Vec<[f64; 2]> {
     let mut crossings: Vec<f64> = rings
         .iter()
-        .flat_map(|ring| ring_sides(ring))
-        .filter_map(|(a, b)| crossing(a, b, y))
+        .flat_map(|ring| sides(ring))
+        .filter_map(|side| crossing(side, y))
         .collect();
     crossings.sort_by(f64::total_cmp);
     let pairs = crossings.chunks_exact(2);
@@ -42,7 +31,7 @@ fn spans_inside(rings: &[Ring], y: f64) -> Vec<[f64; 2]> {
 }
 
 /// Where a side crosses a row line.
-fn crossing(a: &Point2<f64>, b: &Point2<f64>, y: f64) -> Option<f64> {
+fn crossing([a, b]: [Point2<f64>; 2], y: f64) -> Option<f64> {
     let is_crossed = (a.y <= y) != (b.y <= y);
     is_crossed.then(|| a.x + (y - a.y) * (b.x - a.x) / (b.y - a.y))
 }

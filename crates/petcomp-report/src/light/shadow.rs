@@ -2,7 +2,7 @@
 
 use crate::pile::camera_above;
 use petcomp::Image;
-use petcomp::geom::{Plane, Point2, Point3, Pose, Quad, UnitQuaternion, Vector3};
+use petcomp::geom::{Plane, Point2, Point3, Pose, Quad, UnitQuaternion, Vector3, sides};
 use petcomp::light::{frame, polygon_irradiance};
 use petcomp::scene::{AreaLight, Card, Shot};
 use petcomp::{LinearRgb, ObjectId, PremulRgba};
@@ -109,7 +109,7 @@ fn shadowed_part(
     point: Point3<f64>,
 ) -> Vec<Point3<f64>> {
     let middle = middle_of(card);
-    polygon_sides(card).fold(face.to_vec(), |kept, (a, b)| {
+    sides(card).fold(face.to_vec(), |kept, [a, b]| {
         let normal = (a - point).cross(&(b - point));
         let inwards = normal * normal.dot(&(middle - point)).signum();
         positive_part(&kept, |p| inwards.dot(&(p - point)))
@@ -121,20 +121,16 @@ fn middle_of(corners: &[Point3<f64>; 4]) -> Point3<f64> {
     Point3::from(sum / corners.len() as f64)
 }
 
-fn polygon_sides(corners: &[Point3<f64>]) -> impl Iterator<Item = (&Point3<f64>, &Point3<f64>)> {
-    corners.iter().zip(corners.iter().cycle().skip(1))
-}
-
 /// The part of a polygon on the positive side (Sutherland and Hodgman 1974).
 fn positive_part(
     polygon: &[Point3<f64>],
     distance: impl Fn(&Point3<f64>) -> f64,
 ) -> Vec<Point3<f64>> {
     let mut kept = Vec::with_capacity(polygon.len() + 1);
-    for (a, b) in polygon_sides(polygon) {
-        let (s, t) = (distance(a), distance(b));
+    for [a, b] in sides(polygon) {
+        let (s, t) = (distance(&a), distance(&b));
         if s >= 0.0 {
-            kept.push(*a);
+            kept.push(a);
         }
         if (s >= 0.0) != (t >= 0.0) {
             kept.push(a + (b - a) * (s / (s - t)));

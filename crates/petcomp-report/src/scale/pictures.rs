@@ -166,23 +166,17 @@ fn heap_camera(image: [u32; 2]) -> Camera {
 /// Card `k` of a heap.
 fn heap_card(case: &ScaleCase, k: usize) -> Object {
     let rise = MAX_RISE_M.min(PILE_HEIGHT_M / case.cards as f64);
+    let size = CARD_M.map(|side| side * case.scale);
+    let placement = Placement::At(heap_pose(k, rise));
     Object {
-        role: Default::default(),
-        asset: "bottle".into(),
         photo: k,
-        back: None,
-        size: CARD_M.map(|side| side * case.scale),
-        thickness: 0.5 * rise,
-        outline: Vec::new(),
-        mass: CARD_MASS_KG,
-        placement: Placement::At(heap_pose(k, rise)),
         grade: Grade {
             hue_deg: (7 * k % 60) as f32,
             saturation: 0.9,
             value: 1.1,
             ..Grade::default()
         },
-        bend: Default::default(),
+        ..Object::new("bottle", size, 0.5 * rise, CARD_MASS_KG, placement)
     }
 }
 

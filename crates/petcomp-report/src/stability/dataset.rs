@@ -393,19 +393,12 @@ fn make_invalid_shards() -> Result<Outcome> {
 }
 
 fn tray() -> Background {
-    Background {
-        name: "tray".into(),
-        size: [0.6, 0.4],
-        k1: 0.0,
-        shown_share: 1.0,
-        albedo: None,
-        wall: None,
-        camera: CameraSource::Rectangle {
-            corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
-            photo: [60, 40],
-            focal_px: None,
-        },
-    }
+    let camera = CameraSource::Rectangle {
+        corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
+        photo: [60, 40],
+        focal_px: None,
+    };
+    Background::new("tray", [0.6, 0.4], camera)
 }
 
 fn draw_empty_scenes() -> Result<Outcome> {

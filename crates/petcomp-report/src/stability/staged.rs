@@ -1,9 +1,8 @@
 //! Shots for cases: a camera straight above, level cards, small lights.
 
-use crate::pile;
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
-use petcomp::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
+use petcomp::geom::{Point3, Pose, Quad, UnitQuaternion, Vector3, doubled_area};
 use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{AreaLight, CameraSource, Card, Exposure, Scene, Shot, Surface};
 use petcomp::{DeepImage, DeepSample, Error, Image, LinearRgb, ObjectId, PremulRgba, Result};
@@ -11,10 +10,7 @@ use tempfile::TempDir;
 
 /// A camera at height 1 over the origin, looking straight down; picture up is world `+y`.
 pub(super) fn camera_above(image: [u32; 2], focal_px: f64) -> Camera {
-    Camera {
-        focal_px: Vector2::repeat(focal_px),
-        ..pile::camera_above(image, 1.0)
-    }
+    Camera::looking_down(1.0, focal_px, image)
 }
 
 /// A camera at `eye` whose image centre sees `target`.
@@ -120,18 +116,13 @@ pub(super) fn projected_area(card: &Card, camera: &Camera) -> f64 {
         .iter()
         .filter_map(|&corner| Some(camera.project(corner)?.0))
         .collect();
-    polygon_area(&seen)
-}
-
-fn polygon_area(corners: &[Point2<f64>]) -> f64 {
-    let next = corners.iter().cycle().skip(1);
-    let products = corners.iter().zip(next).map(|(a, b)| a.x * b.y - b.x * a.y);
-    0.5 * products.sum::<f64>().abs()
+    0.5 * doubled_area(&seen).abs()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use petcomp::geom::Point2;
 
     #[test]
     fn a_level_card_covers_its_size_over_its_distance() {

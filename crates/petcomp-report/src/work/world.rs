@@ -6,8 +6,7 @@ use petcomp::camera::Label;
 use petcomp::dataset::DatasetConfig;
 use petcomp::geom::{Pose, UnitQuaternion, Vector3};
 use petcomp::scene::{
-    AreaLight, CameraSource, Environment, Exposure, Grade, Object, Placement, Recipe, Scene,
-    Surface,
+    AreaLight, CameraSource, Environment, Exposure, Object, Placement, Recipe, Scene, Surface,
 };
 use petcomp::{Error, Film, Image, LinearRgb, PremulRgba, Result, io};
 use std::path::PathBuf;
@@ -150,19 +149,8 @@ fn grain(x: usize, y: usize) -> LinearRgb {
 
 /// Card `k` of a scene, at rest.
 fn card_at_rest(asset: &str, k: usize) -> Object {
-    Object {
-        role: Default::default(),
-        asset: asset.into(),
-        photo: 0,
-        back: None,
-        size: TEXELS.map(|n| n as f64 / TEXELS_PER_METRE),
-        thickness: 0.005,
-        outline: Vec::new(),
-        mass: 0.02,
-        placement: Placement::At(pose_at_rest(k)),
-        grade: Grade::default(),
-        bend: Default::default(),
-    }
+    let size = TEXELS.map(|n| n as f64 / TEXELS_PER_METRE);
+    Object::new(asset, size, 0.005, 0.02, Placement::At(pose_at_rest(k)))
 }
 
 fn pose_at_rest(k: usize) -> Pose {
