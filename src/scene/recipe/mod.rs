@@ -237,10 +237,13 @@ impl Recipe {
 
     /// Fails on the first asset whose largest size does not fit between the walls of some
     /// background in any direction, on a lens that folds over the pictures of some background, and
-    /// if there are no assets or, with [`at_most_once`](Self::at_most_once), too few: such a scene
-    /// would be rejected, however late it comes.
+    /// if there are no assets, more objects and distractors than a scene holds or, with
+    /// [`at_most_once`](Self::at_most_once), too few assets: such a scene would be rejected, however
+    /// late it comes.
     pub fn check_room(&self, backgrounds: &[Background], catalog: &[AssetVariant]) -> Result<()> {
         let recipe = self.narrowed();
+        let most = recipe.objects.max() + recipe.distractors.max();
+        check_count(most, "objects and distractors", MAX_OBJECTS)?;
         recipe.check_selections(catalog)?;
         if recipe.negatives > 0.0 {
             recipe.check_folds(self.places_of_negatives(backgrounds))?;
@@ -296,8 +299,6 @@ impl Recipe {
     fn check_objects(&self) -> Result<()> {
         self.objects.check("objects", &OBJECT_COUNT)?;
         self.distractors.check("distractors", &OBJECT_COUNT)?;
-        let most = self.objects.max() + self.distractors.max();
-        check_count(most, "objects and distractors", MAX_OBJECTS)?;
         SHARE.check("negatives", self.negatives)?;
         self.scale.check("scale", &SCALE)?;
         self.start.check()?;

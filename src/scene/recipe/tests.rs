@@ -771,7 +771,8 @@ fn nothing_is_drawn_or_written_of_retouching_where_it_is_not_asked_for() {
 #[test]
 fn objects_and_distractors_are_no_more_than_a_scene_holds() {
     let recipe: Recipe = toml::from_str("objects = [1, 800]\ndistractors = [0, 800]").unwrap();
-    let message = recipe.check().unwrap_err().to_string();
+    let told = recipe.check_room(&[tray("a")], &catalog(10));
+    let message = told.unwrap_err().to_string();
     assert!(
         message.starts_with("objects and distractors: 1600, expected at most 1000"),
         "{message}"
