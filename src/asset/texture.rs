@@ -115,7 +115,7 @@ fn checksum_of<P: NoUninit>(image: &Image<P>) -> u32 {
 
 impl From<Image<PremulRgba>> for Texture {
     fn from(image: Image<PremulRgba>) -> Self {
-        Self::Rgba(Arc::new(Pyramid::new(image)))
+        Self::Rgba(Arc::new(Pyramid::over_nothing(image)))
     }
 }
 
@@ -124,7 +124,7 @@ impl From<Image<Film>> for Texture {
         if is_grey(&image) {
             image.map(Film::to_rgba).into()
         } else {
-            Self::Film(Arc::new(Pyramid::new(image)))
+            Self::Film(Arc::new(Pyramid::over_nothing(image)))
         }
     }
 }

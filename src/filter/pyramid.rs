@@ -11,19 +11,37 @@ use std::sync::OnceLock;
 /// use.
 ///
 /// Each level is the 2 x 2 average of the one before ([`halve`]).
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Pyramid<P> {
     base: Image<P>,
     halves: Vec<OnceLock<Image<P>>>,
+    halve: fn(&Image<P>) -> Image<P>,
+}
+
+impl<P: Mix> Default for Pyramid<P> {
+    fn default() -> Self {
+        Self::new(Image::default())
+    }
 }
 
 impl<P: Mix> Pyramid<P> {
     /// A pyramid over a picture; no level but the first exists yet.
     pub fn new(base: Image<P>) -> Self {
+        Self::halved_by(base, halved)
+    }
+
+    /// The same of a picture with alpha: beyond its ends there is nothing, and where a pixel of a
+    /// level reaches beyond them, it is as transparent as that makes it.
+    pub fn over_nothing(base: Image<P>) -> Self {
+        Self::halved_by(base, halved_over_nothing)
+    }
+
+    fn halved_by(base: Image<P>, halve: fn(&Image<P>) -> Image<P>) -> Self {
         let count = halving_count(base.size());
         Self {
             base,
             halves: (0..count).map(|_| OnceLock::new()).collect(),
+            halve,
         }
     }
 
@@ -47,7 +65,7 @@ impl<P: Mix> Pyramid<P> {
         }
         // Halved before the cell is locked: the work is parallel, and a thread that waits for its
         // parts may be handed a task that asks for this very level.
-        let half = halved(self.level(n));
+        let half = (self.halve)(self.level(n));
         self.halves[n].get_or_init(|| {
             work::add(Kind::Levels, 1);
             half
@@ -64,6 +82,13 @@ pub fn halve<P: Mix>(image: &Image<P>) -> Image<P> {
 
 fn halved<P: Mix>(image: &Image<P>) -> Image<P> {
     let [columns, rows] = [image.width(), image.height()].map(halving_taps);
+    filter(image, &columns, &rows)
+}
+
+/// The same where pixels beyond the ends count as empty ones.
+fn halved_over_nothing<P: Mix>(image: &Image<P>) -> Image<P> {
+    let halves = |len: usize| line_taps(len.div_ceil(2), |i| Taps::equal(2 * i as usize, 2, len));
+    let [columns, rows] = [image.width(), image.height()].map(halves);
     filter(image, &columns, &rows)
 }
 
@@ -167,6 +192,24 @@ mod tests {
     fn halving_averages_what_is_there() {
         let img = Image::from_vec(3, 1, vec![1.0, 3.0, 8.0]);
         assert_eq!(halve(&img).pixels(), [2.0, 8.0]);
+    }
+
+    #[test]
+    fn nothing_is_averaged_in_beyond_the_ends_of_a_picture_with_alpha() {
+        let pyramid = Pyramid::over_nothing(Image::filled(9, 6, 1.0_f32));
+        let eighths = |level| {
+            let image: &Image<f32> = pyramid.level(level);
+            let last = image.width() - 1;
+            [
+                image[(0, 0)],
+                image[(last, 0)],
+                image[(last, image.height() - 1)],
+            ]
+            .map(|v| 8.0 * v)
+        };
+        assert_eq!(eighths(1), [8.0, 4.0, 4.0]);
+        assert_eq!(eighths(2), [8.0, 2.0, 1.0]);
+        assert_eq!(eighths(3), [6.0, 0.75, 0.75]);
     }
 
     #[test]

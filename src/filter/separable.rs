@@ -32,6 +32,15 @@ impl Taps {
         }
     }
 
+    /// So many samples of a line of `len` with equal weights, from `first` on: they add up to less
+    /// than 1 where the line ends before.
+    pub(super) fn equal(first: usize, count: usize, len: usize) -> Self {
+        Self {
+            first,
+            weights: vec![1.0 / count as f32; count.min(len - first)],
+        }
+    }
+
     /// The same weights one sample further on.
     fn follows(&self, before: &Self) -> bool {
         self.first == before.first + 1 && self.weights == before.weights

@@ -204,7 +204,7 @@ mod tests {
             let a = 0.1 * x as f32;
             PremulRgba::new(0.5 * a, 0.01 * y as f32 * a, 0.3 * a, a)
         });
-        let film = Texture::Film(std::sync::Arc::new(crate::filter::Pyramid::new(
+        let film = Texture::Film(std::sync::Arc::new(crate::filter::Pyramid::over_nothing(
             image.map(Film::from),
         )));
         let alpha = Texture::from(image);

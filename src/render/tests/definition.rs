@@ -74,6 +74,29 @@ fn grey(alpha: f32) -> PremulRgba {
     PremulRgba::new(0.5 * alpha, 0.5 * alpha, 0.5 * alpha, alpha)
 }
 
+#[test]
+fn a_card_ends_where_its_texture_does_whatever_its_number_of_texels() {
+    for texels in [256, 257, 260, 293, 383] {
+        let texture = Image::filled(texels, texels, grey(1.0));
+        let flat = card(
+            1,
+            [0.0, 0.0, 0.0],
+            UnitQuaternion::identity(),
+            [0.2; 2],
+            texture,
+        );
+        let deep = render(&Shot::new(above(40, 40, 100.0)).with_card(flat), &GOOD);
+        let pixels = (0..1600).map(|i| (i % 40, i / 40));
+        let alphas = pixels.map(|(x, y)| (x, f64::from(deep.flat(x, y).to_rgba().a)));
+        let (area, moment) = alphas.fold((0.0, 0.0), |(area, moment), (x, alpha)| {
+            (area + alpha, moment + alpha * (x as f64 + 0.5))
+        });
+        assert!((area / 400.0 - 1.0).abs() < 0.01, "{texels}: {area}");
+        let middle = moment / area;
+        assert!((middle - 20.0).abs() < 0.03, "{texels}: {middle}");
+    }
+}
+
 /// One ray per pixel, many light samples.
 fn sharp() -> RenderOptions {
     RenderOptions {
@@ -685,7 +708,8 @@ fn grey_film_gives_the_bits_of_alpha() {
         })
     };
     let as_alpha = tinted(|film| grey(film).into());
-    let as_film = tinted(|film| Texture::Film(Arc::new(crate::filter::Pyramid::new(grey(film)))));
+    let as_film =
+        tinted(|film| Texture::Film(Arc::new(crate::filter::Pyramid::over_nothing(grey(film)))));
     for way in [render, render_reference] {
         let [a, b] = [&as_alpha, &as_film].map(|shot| way(shot, &RenderOptions::default()));
         assert_eq!(a.shadow(), b.shadow());
