@@ -17,6 +17,8 @@ pub(crate) const OBJECT: Bounds = Bounds::metres(0.005, 5.0, "objects are 5 mm t
 pub(crate) const WIDTH: Bounds = Bounds::metres(1e-4, 5.0, "objects are 5 mm to 5 m long");
 /// Thickness of the body that falls, metres.
 pub(crate) const THICKNESS: Bounds = Bounds::metres(1e-5, 1.0, "from a film to a box");
+pub(crate) const HALF_THICKNESS: Bounds =
+    Bounds::metres(5e-6, 0.5, "half of that of a film to a box");
 /// Mass of an object, kilograms.
 pub(crate) const MASS: Bounds = Bounds::new(1e-6, 1e6, "kilograms");
 /// Pixels of a photo per metre: for objects of such lengths that fill part of it.

@@ -614,6 +614,13 @@ mod tests {
         let refused = build(&list, &out).unwrap().refused;
         assert!(refused[0].ends_with(stays), "{refused:?}");
         kept("a scale that is wrong");
+        // Twice as long as wide, so that both together make it longer than an object may be.
+        let square = TWO.replace("px_per_metre = 100.0", "length = 5.0\nwidth = 5.0");
+        std::fs::write(&list, square).unwrap();
+        let refused = build(&list, &out).unwrap().refused;
+        let starts = refused[0].starts_with("two.png: ");
+        assert!(starts && refused[0].ends_with(stays), "{refused:?}");
+        kept("a size that no object has");
         let two = folder.path().join("two.png");
         let options = CutOutOptions::default();
         // There is no marker in the photo.

@@ -29,6 +29,9 @@ pub(super) struct CapturedObject {
     pub(super) record: PhotoRecord,
 }
 
+/// Memory that a photo takes for each of its pixels while its frame is recognised: the picture, its
+/// samples as decoded, and copies that markers are searched in.
+const BYTES_PER_PIXEL: u64 = 40;
 /// Noise of a corner of the display, pixels: those of four markers, carried to the corners.
 const CORNER_SIGMA_PX: f64 = 0.15;
 /// Standard error of one side of the outline, pixels of the view: on synthetic captures the area of
@@ -101,8 +104,9 @@ impl CaptureFiles {
         };
         let mut files = self.photos.iter().chain(&self.empty);
         files.try_for_each(io::check_square_pixels)?;
-        let recognised = sources.recognised(display)?;
-        let empty_recognised = empty_sources.recognised(display)?;
+        let at_once = io::pictures_at_once(self.photos.iter().chain(&self.empty), BYTES_PER_PIXEL);
+        let recognised = sources.recognised(display, at_once)?;
+        let empty_recognised = empty_sources.recognised(display, at_once)?;
         let number = number_of_white(&recognised, &names)?;
         let view = View::of_photo(display, &recognised[number]);
         let photos = Photos {

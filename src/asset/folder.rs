@@ -193,12 +193,18 @@ impl CutOutWriter<'_> {
     }
 
     /// Writes film and thumbnail, and notes the checksum of the film.
+    ///
+    /// # Errors
+    /// [`Error::Photo`] for a record that no manifest may hold: it would keep all others out, too.
     fn write_film(
         &self,
         film: &Image<Film>,
         transmittance: &Image<LinearRgb>,
         record: PhotoRecord,
     ) -> Result<PhotoRecord> {
+        record.check().map_err(|e| Error::Photo {
+            what: format!("{}: {e}", record.source),
+        })?;
         let path = self.folder.join(&record.file);
         io::create_folder(path.parent().unwrap_or(self.folder))?;
         let film = files::write(&path, film, transmittance)?;
@@ -223,7 +229,7 @@ fn review_of(photo: &Path) -> Result<Review> {
 }
 
 /// Fails where strokes were painted on a picture of another size.
-fn check_reviewed_size(review: &Review, entry: &PhotoEntry, photo: &OpenPhoto<'_>) -> Result<()> {
+fn check_reviewed_size(review: &Review, entry: &PhotoEntry, photo: &OpenPhoto) -> Result<()> {
     if review.strokes.is_empty() {
         return Ok(());
     }

@@ -4,7 +4,7 @@ use super::body::KnownBody;
 use super::review::Verdict;
 use super::role::Role;
 use super::{DEFAULT_THICKNESS, MANIFEST};
-use crate::bounds::{Bounds, MASS, OBJECT, PX_PER_METRE, THICKNESS, WIDTH};
+use crate::bounds::{Bounds, HALF_THICKNESS, MASS, OBJECT, PX_PER_METRE, THICKNESS, WIDTH};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::io::{self, Checksum};
@@ -151,7 +151,7 @@ impl CaptureRecord {
     fn check(&self) -> Result<()> {
         CONFIDENCE.check("transmittance_sigma", self.transmittance_sigma)?;
         CONFIDENCE.check("haze", self.haze)?;
-        THICKNESS.check("height", self.height)?;
+        HALF_THICKNESS.check("height", self.height)?;
         let flow = self.flow.as_ref();
         flow.map_or(Ok(()), |flow| io::below("flow", flow).map(drop))
     }
@@ -536,7 +536,7 @@ impl PhotoRecord {
         self.size_m.map(|side| side * self.px_per_metre)
     }
 
-    fn check(&self) -> Result<()> {
+    pub(super) fn check(&self) -> Result<()> {
         io::below("", &self.file)?;
         PX_PER_METRE.check("px_per_metre", self.px_per_metre)?;
         self.size_m

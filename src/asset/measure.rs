@@ -37,7 +37,11 @@ impl MeasuredSize {
         });
         let px_per_metre = scale_of_outline(tight, scale, screen.px_per_metre, cut.scale);
         let error_px = outline_error_px(cut, tight);
-        let object_m = tight.map(|px| px / px_per_metre);
+        let object_m = match scale {
+            // As it was given, whatever rounding makes of it.
+            Scale::Length(length) => [length, tight[1] / px_per_metre],
+            _ => tight.map(|px| px / px_per_metre),
+        };
         let measured_m = libm::hypot(error_px / px_per_metre, screen.sigma * object_m[0]);
         let error_m = libm::hypot(measured_m, distance_from_given(object_m, scale));
         let is_of_a_part = cut.segmentation.is_truncated() && scale.is_of_object();

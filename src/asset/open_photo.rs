@@ -9,46 +9,32 @@ use crate::image::Image;
 use crate::io;
 use crate::matte::{CutOut, CutOutOptions, Stroke, cut_out_corrected};
 use crate::pixel::LinearRgb;
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A photo as it is cut out: seen from straight above where something in it shows the screen's
 /// plane, beside the empty screen where there is a photo of that.
-pub struct OpenPhoto<'a> {
+pub struct OpenPhoto {
     file: PathBuf,
     pub(super) rectified: RectifiedPhoto,
-    empty: Option<Cow<'a, Image<LinearRgb>>>,
+    empty: Option<Arc<Image<LinearRgb>>>,
     options: CutOutOptions,
 }
 
-impl OpenPhoto<'static> {
+impl OpenPhoto {
     /// Reads the photo of an entry whose paths are relative to the working folder.
     ///
     /// # Errors
     /// [`Error::Value`] where the entry has no scale; those of reading pictures; [`Error::Photo`]
     /// where the screen or marker that gives the scale is not found.
     pub fn read(entry: &PhotoEntry, options: &CutOutOptions) -> Result<Self> {
-        let screens = EmptyScreens::default();
-        let OpenPhoto {
-            file,
-            rectified,
-            empty,
-            options,
-        } = OpenPhoto::beside(entry, &screens, options)?;
-        Ok(Self {
-            file,
-            rectified,
-            empty: empty.map(|empty| Cow::Owned(empty.into_owned())),
-            options,
-        })
+        Self::beside(entry, &EmptyScreens::default(), options)
     }
-}
 
-impl<'a> OpenPhoto<'a> {
     /// The same beside empty screens that several photos share.
     pub(super) fn beside(
         entry: &PhotoEntry,
-        screens: &'a EmptyScreens,
+        screens: &EmptyScreens,
         options: &CutOutOptions,
     ) -> Result<Self> {
         let rectified = read_rectified(entry).map_err(|e| with_name(e, &entry.file))?;

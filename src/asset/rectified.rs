@@ -14,7 +14,7 @@ use crate::io::Header;
 use crate::matte::{ScreenCorners, from_top_left, screen_corners};
 use crate::pixel::{LinearRgb, Mix};
 use crate::quantile::median;
-use std::borrow::Cow;
+use std::sync::Arc;
 
 /// Noise of a corner that a person clicked, pixels.
 const CLICK_SIGMA_PX: f64 = 1.0;
@@ -108,15 +108,12 @@ impl RectifiedPhoto {
     }
 
     /// The empty screen from the same place in the same way.
-    pub(super) fn same_view<'a>(
-        &self,
-        empty: Cow<'a, Image<LinearRgb>>,
-    ) -> Result<Cow<'a, Image<LinearRgb>>> {
+    pub(super) fn same_view(&self, empty: Arc<Image<LinearRgb>>) -> Result<Arc<Image<LinearRgb>>> {
         let Some(view) = &self.view else {
             return Ok(empty);
         };
         check_shape(size_px(&empty), view.pose.camera.image)?;
-        view.rectify(empty.into_owned()).map(Cow::Owned)
+        view.rectify(Arc::unwrap_or_clone(empty)).map(Arc::new)
     }
 
     /// The scale at a pixel, where something in the photo shows it.
@@ -596,7 +593,7 @@ mod tests {
             RectifiedPhoto::by_corners(photo.clone(), SCREEN, None, 0.0, &header).unwrap();
         let same_view = |width, height| {
             let empty = resize(&photo, width, height);
-            rectified.same_view(Cow::Owned(empty))
+            rectified.same_view(Arc::new(empty))
         };
         for (width, height) in [(1000, 750), (500, 375), (333, 250), (1501, 1126)] {
             let seen = same_view(width, height).unwrap();

@@ -3,14 +3,14 @@
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::io;
+use crate::lru::LruCache;
 use crate::pixel::LinearRgb;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
 
 /// What is known about the screen: `auto`, a colour `R,G,B` (scene-linear) or a photo of the empty
 /// screen.
@@ -106,10 +106,20 @@ impl From<ScreenSource> for String {
     }
 }
 
-/// Photos of empty screens that several photos share, each decoded once.
-#[derive(Debug, Default)]
+/// Memory for photos of empty screens that several photos share, bytes: two of 48 megapixels.
+const KEPT_BYTES: usize = 1 << 30;
+
+/// Photos of empty screens: the last of those that several photos share are kept.
+#[derive(Debug)]
 pub(super) struct EmptyScreens {
-    shared: BTreeMap<PathBuf, Image<LinearRgb>>,
+    shared: BTreeSet<PathBuf>,
+    kept: LruCache<Arc<Image<LinearRgb>>>,
+}
+
+impl Default for EmptyScreens {
+    fn default() -> Self {
+        Self::shared_by(std::iter::empty())
+    }
 }
 
 /// How often each photo of an empty screen is named.
@@ -122,30 +132,32 @@ fn use_counts<'a>(screens: impl Iterator<Item = &'a ScreenSource>) -> BTreeMap<&
 }
 
 impl EmptyScreens {
-    /// Reads those that are named more than once. One that cannot be read is left to the first
-    /// photo that needs it, whose error names it.
+    /// Keeps those that are named more than once.
     pub(super) fn shared_by<'a>(screens: impl Iterator<Item = &'a ScreenSource>) -> Self {
-        let shared = use_counts(screens)
-            .into_par_iter()
-            .filter(|(_, count)| *count > 1)
-            .filter_map(|(path, _)| Some((path.to_owned(), io::read(path).ok()?)))
-            .collect();
-        Self { shared }
+        let often = use_counts(screens).into_iter().filter(|(_, n)| *n > 1);
+        Self {
+            shared: often.map(|(path, _)| path.to_owned()).collect(),
+            kept: LruCache::of_bytes(KEPT_BYTES),
+        }
     }
 
     /// The photo of the empty screen, where there is one.
     ///
     /// # Errors
     /// Those of [`io::read`].
-    pub(super) fn get(&self, screen: &ScreenSource) -> Result<Option<Cow<'_, Image<LinearRgb>>>> {
+    pub(super) fn get(&self, screen: &ScreenSource) -> Result<Option<Arc<Image<LinearRgb>>>> {
         let path = screen.photo();
         path.map(|path| self.image(path)).transpose()
     }
 
-    fn image(&self, path: &Path) -> Result<Cow<'_, Image<LinearRgb>>> {
-        match self.shared.get(path) {
-            Some(image) => Ok(Cow::Borrowed(image)),
-            None => io::read(path).map(Cow::Owned),
+    fn image(&self, path: &Path) -> Result<Arc<Image<LinearRgb>>> {
+        if !self.shared.contains(path) {
+            return io::read(path).map(Arc::new);
+        }
+        let name = format!("{path:?}");
+        match self.kept.get(&name) {
+            Some(image) => Ok(image),
+            None => Ok(self.kept.insert(&name, Arc::new(io::read(path)?))),
         }
     }
 }
@@ -197,8 +209,10 @@ mod tests {
         let lost = ScreenSource::Photo(folder.path().join("lost.png"));
         let all = [&shared, &shared, &lost, &lost, &ScreenSource::Auto];
         let screens = EmptyScreens::shared_by(all.into_iter());
+        let read = || screens.get(&shared).unwrap().unwrap();
+        assert_eq!(*read(), green);
         std::fs::remove_file(path).unwrap();
-        assert_eq!(screens.get(&shared).unwrap().unwrap().into_owned(), green);
+        assert_eq!(*read(), green);
         assert!(
             screens
                 .get(&lost)
@@ -208,6 +222,6 @@ mod tests {
         );
         assert!(screens.get(&ScreenSource::Auto).unwrap().is_none());
         let one = EmptyScreens::shared_by([&shared].into_iter());
-        assert!(one.get(&shared).is_err(), "read when it is needed");
+        assert!(one.get(&shared).is_err(), "read each time");
     }
 }

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb};
-use crate::quantile::median;
+use crate::quantile::{median, quantile};
 
 /// How much of an area may be clipped in photos of the white frame.
 struct ClippingLimits {
@@ -152,8 +152,11 @@ const MAX_COLOR_CHANGE: f32 = 0.2;
 
 /// The warning about a display whose white changes its colour from one side to the other.
 pub(super) fn color_change(empty_white: &Image<LinearRgb>, free: &Mask) -> Option<Diagnostic> {
-    let changes = [|p: LinearRgb| p.r / p.g, |p: LinearRgb| p.b / p.g];
-    let changes = changes.map(|ratio| change_where(&empty_white.map(ratio), free));
+    // Finite: a blur spreads what is not.
+    let changes = [|p: LinearRgb| p.r, |p: LinearRgb| p.b].map(|light| {
+        let ratio = empty_white.map(|p| light(p) / p.g.max(1e-6));
+        change_where(&ratio, free)
+    });
     let change = changes[0].max(changes[1]);
     (change > MAX_COLOR_CHANGE).then(|| {
         let what = format!(
@@ -166,11 +169,15 @@ pub(super) fn color_change(empty_white: &Image<LinearRgb>, free: &Mask) -> Optio
     })
 }
 
-/// The largest over the smallest value where a mask is set, less 1.
+/// Share of the display, at either end of the values, that may be specks and noise.
+const SPECKS: f64 = 0.01;
+
+/// A large over a small value where a mask is set, less 1.
 fn change_where(image: &Image<f32>, mask: &Mask) -> f32 {
-    let values = image.pixels_in(mask);
-    let [low, high] = values.fold([f32::MAX, 0.0], |[low, high], v| [v.min(low), v.max(high)]);
-    high / low.max(f32::MIN_POSITIVE) - 1.0
+    let smooth = filter::gaussian_blur(image, DIFFERENCE_BLUR_PX);
+    let values: Vec<f32> = smooth.pixels_in(mask).collect();
+    let end = |share| quantile(values.clone(), share, f32::total_cmp).unwrap_or(1.0);
+    end(1.0 - SPECKS) / end(SPECKS).max(f32::MIN_POSITIVE) - 1.0
 }
 
 /// Light through an object, over that of the display without it, that noise explains.

@@ -25,16 +25,22 @@ pub struct Sources<'a> {
 }
 
 impl Sources<'_> {
-    /// Which frame each shows, and where.
+    /// Which frame each shows, and where; so many are read at once, since each is large.
     ///
     /// # Errors
     /// Those of reading, and of [`FramePhoto::read`], naming the photo.
-    pub fn recognised(&self, display: &Display) -> Result<Vec<FramePhoto>> {
-        let numbers = 0..self.names.len();
-        numbers
-            .into_par_iter()
-            .map(|i| FramePhoto::read(&(self.read)(i)?, display).map_err(|e| self.named(i, e)))
-            .collect()
+    pub fn recognised(&self, display: &Display, at_once: usize) -> Result<Vec<FramePhoto>> {
+        let numbers: Vec<usize> = (0..self.names.len()).collect();
+        let mut all = Vec::with_capacity(numbers.len());
+        for some in numbers.chunks(at_once.max(1)) {
+            let some = some.par_iter().map(|&i| self.recognise(i, display));
+            all.extend(some.collect::<Result<Vec<_>>>()?);
+        }
+        Ok(all)
+    }
+
+    fn recognise(&self, i: usize, display: &Display) -> Result<FramePhoto> {
+        FramePhoto::read(&(self.read)(i)?, display).map_err(|e| self.named(i, e))
     }
 
     fn named(&self, i: usize, error: Error) -> Error {

@@ -207,8 +207,8 @@ fn measured_of(
         read: &read_empty,
     };
     let (recognised, empty_recognised) = (
-        sources.recognised(&DISPLAY)?,
-        empty_sources.recognised(&DISPLAY)?,
+        sources.recognised(&DISPLAY, usize::MAX)?,
+        empty_sources.recognised(&DISPLAY, usize::MAX)?,
     );
     let photos = Photos {
         sources,

@@ -142,7 +142,8 @@ struct ScaleArgs {
     /// Or: width and height of the object, metres
     #[arg(long, value_name = "WxH", value_parser = parse_metres)]
     size: Option<[f64; 2]>,
-    /// Or: scale of the photos at half the object's height, pixels per metre
+    /// Or: scale of the photos at half the object's height, pixels per metre (px_per_metre in a
+    /// list)
     #[arg(long, value_name = "PX_PER_M")]
     scale: Option<f64>,
     /// Or: width and height of the whole screen, metres; it must lie on another colour, with all

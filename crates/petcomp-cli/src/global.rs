@@ -28,7 +28,8 @@ pub(crate) struct GlobalArgs {
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
     /// Raise or lower a limit on input images and documents: side=65536, pixels=512M,
-    /// decoded_bytes=4G, seconds=60, document_bytes=64M, ...
+    /// decoded_bytes=4G, seconds=60, document_bytes=64M; also channels, ratio, file_bytes,
+    /// metadata_bytes, parts, document_depth, memory_percent
     #[arg(long = "limit", value_name = "NAME=N", global = true)]
     limits: Vec<LimitOverride>,
     /// Where OpenImageIO reads images that petcomp's own decoders do not support

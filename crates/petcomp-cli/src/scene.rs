@@ -81,7 +81,7 @@ fn draw_scene(args: &DrawArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 fn check_scene(path: &Path) -> anyhow::Result<()> {
     let scene = read_scene(path)?;
     DatasetConfig::from_settings(&scene.settings, &[]).map_err(|e| e.in_file(path))?;
-    print::line(format_args!("{}: possible", path.display()));
+    print::line(format_args!("{}: valid", path.display()));
     Ok(())
 }
 

@@ -4,7 +4,7 @@ use super::band::LumaMode;
 use super::threshold::Threshold;
 use crate::bounds::Bounds;
 use crate::error::{Error, Result};
-use crate::matte::check::check_share;
+use crate::matte::check::{check_length, check_share};
 use crate::matte::prepared::MIN_SEARCH_SIZE_PX;
 use serde::{Deserialize, Serialize};
 
@@ -64,6 +64,16 @@ impl SegmentOptions {
         if let Some(levels) = self.levels.filter(|levels| !(2..=8).contains(levels)) {
             return Err(Error::value("levels", format!("{levels}, expected 2 to 8")));
         }
+        let thresholds = [
+            ("first_threshold", self.finest_threshold),
+            ("last_threshold", self.coarsest_threshold),
+        ];
+        for (at, threshold) in thresholds {
+            if let Threshold::Noise(times) = threshold {
+                check_length(at, times)?;
+            }
+        }
+        check_length("least_contrast", self.least_contrast)?;
         check_share("ridge", f64::from(self.ridge))?;
         check_share("join", self.join)?;
         self.tone.check()?;

@@ -376,3 +376,18 @@ proptest! {
         assert_box(&found, [cx - size, cy - size, cx + size, cy + size]);
     }
 }
+
+#[test]
+fn thresholds_that_no_value_reaches_are_refused() {
+    let refused = |options: SegmentOptions| options.check().unwrap_err().to_string();
+    let last = SegmentOptions {
+        coarsest_threshold: Threshold::Noise(f32::NAN),
+        ..SegmentOptions::default()
+    };
+    assert_eq!(refused(last), "last_threshold: NaN, expected at least 0");
+    let least = SegmentOptions {
+        least_contrast: -1.0,
+        ..SegmentOptions::default()
+    };
+    assert_eq!(refused(least), "least_contrast: -1, expected at least 0");
+}

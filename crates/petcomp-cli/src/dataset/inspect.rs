@@ -24,8 +24,8 @@ pub(crate) enum InspectCommand {
 pub(crate) struct CheckArgs {
     /// Dataset folder
     folder: PathBuf,
-    /// Exit with status 1 instead of 0 if there are only notes: classes with few or no labels, very
-    /// small boxes
+    /// Exit with status 1 instead of 0 if there are only notes: images without a label file, classes
+    /// with few or no labels, very small boxes
     #[arg(long)]
     strict: bool,
 }

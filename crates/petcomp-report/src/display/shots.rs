@@ -176,7 +176,7 @@ impl Series {
             names: &self.names,
             read: &read,
         };
-        let recognised = sources.recognised(display)?;
+        let recognised = sources.recognised(display, usize::MAX)?;
         use_photos(&Photos {
             sources,
             recognised: &recognised,

@@ -27,7 +27,7 @@ const SOLVED: usize = 6;
 #[derive(Default)]
 pub(crate) struct Mattes {
     turns: Turns,
-    open: Recent<PhotoKey, OpenPhoto<'static>>,
+    open: Recent<PhotoKey, OpenPhoto>,
     solved: Recent<u64, Solved>,
 }
 
@@ -84,7 +84,7 @@ impl PhotoKey {
 
 /// A photo and its cut-out.
 pub(super) struct Solved {
-    pub(super) photo: Arc<OpenPhoto<'static>>,
+    pub(super) photo: Arc<OpenPhoto>,
     /// None if the photo gives no cut-out.
     pub(super) cut: Option<ShownCut>,
 }
@@ -100,7 +100,7 @@ pub(super) struct ShownCut {
 }
 
 impl Mattes {
-    fn open(&self, key: PhotoKey) -> Answer<Arc<OpenPhoto<'static>>> {
+    fn open(&self, key: PhotoKey) -> Answer<Arc<OpenPhoto>> {
         if let Some(open) = self.open.get(&key) {
             return Ok(open);
         }
@@ -136,7 +136,7 @@ pub(super) struct SolveRequest {
 impl SolveRequest {
     /// Why its strokes do not apply to a photo, in the words of `asset build`: they were painted on
     /// another size.
-    fn outdated(&self, photo: &OpenPhoto<'_>) -> Option<String> {
+    fn outdated(&self, photo: &OpenPhoto) -> Option<String> {
         let size = self.size.filter(|_| !self.strokes.is_empty())?;
         let checked = Review::new(size.into(), Vec::new()).check_size(photo.picture().size());
         let error = checked.err()?;
@@ -183,11 +183,7 @@ pub(super) async fn solve(
     turns.run(tab, work).await
 }
 
-fn cut_out(
-    mattes: &Mattes,
-    photo: Arc<OpenPhoto<'static>>,
-    strokes: &[Stroke],
-) -> Answer<SolvedInWords> {
+fn cut_out(mattes: &Mattes, photo: Arc<OpenPhoto>, strokes: &[Stroke]) -> Answer<SolvedInWords> {
     let start = Instant::now();
     let outcome = photo.cut_out(strokes);
     let seconds = start.elapsed().as_secs_f64();
