@@ -11,7 +11,8 @@ const NAMES = ["top left", "top right", "bottom right", "bottom left"];
 /** What was changed and is not saved, by photo. */
 const drafts = new Map();
 /**
- * The photo on the stage: { photo, label, version, corners, history, camera, markers, lensSigma, changes, saving }.
+ * The photo on the stage: { photo, label, version, corners, wantsFirst, history, camera, markers, lensSigma, changes, saving }.
+ * `wantsFirst` where the first corner was removed, and the next click is it.
  * `lensSigma` is the error of the lens's height as the file states it, `changes` counts what was changed here.
  */
 let open = null;
@@ -105,7 +106,7 @@ async function load(photo) {
     const { label, version, remark } = await api(query("api/corners/label", { photo, like }));
     if (remark) say(`${remark}: the label of ${photo} starts without it`, "bad");
     return {
-      photo, label, version, corners: fromLabel(label), history: [], camera: null, markers: [],
+      photo, label, version, corners: fromLabel(label), wantsFirst: false, history: [], camera: null, markers: [],
       lensSigma: statedSigma(label.camera), changes: 0, saving: false,
     };
   });
@@ -134,7 +135,7 @@ function labelOf(state) {
 }
 
 function remember() {
-  open.history.push(open.corners.map((corner) => [...corner]));
+  open.history.push({ corners: open.corners.map((corner) => [...corner]), wantsFirst: open.wantsFirst });
 }
 
 /** What was changed since is not saved, however late the answers to what was asked before. */
@@ -163,8 +164,11 @@ function addCorner(px) {
   if (!open || open.corners.length === 4) return;
   const near = open.markers.flatMap((marker) => marker.corners_px)
     .find((corner) => Math.hypot(corner[0] - px[0], corner[1] - px[1]) * view.zoom < 8);
-  const corners = [...open.corners, near ? [...near] : px];
-  setCorners(corners.length === 4 ? clockwise(corners) : corners, corners.length - 1);
+  const corner = near ? [...near] : px;
+  const corners = open.wantsFirst ? [corner, ...open.corners] : [...open.corners, corner];
+  open.wantsFirst = false;
+  const sorted = corners.length === 4 ? clockwise(corners) : corners;
+  setCorners(sorted, sorted.indexOf(corner));
 }
 
 /** Corners in the order around their middle, from the first one on. */
@@ -179,7 +183,9 @@ function clockwise(corners) {
 function undo() {
   if (!open?.history.length) return;
   open.history.pop();
-  open.corners = (open.history.at(-1) ?? fromLabel(open.label)).map((corner) => [...corner]);
+  const before = open.history.at(-1) ?? { corners: fromLabel(open.label), wantsFirst: false };
+  open.corners = before.corners.map((corner) => [...corner]);
+  open.wantsFirst = before.wantsFirst;
   view.setPoints(open.corners);
   changed(false);
   showHint();
@@ -188,6 +194,7 @@ function undo() {
 function removeCorner() {
   if (!open?.corners.length) return;
   const i = view.chosen >= 0 ? view.chosen : open.corners.length - 1;
+  open.wantsFirst = open.corners.length > 1 && (open.wantsFirst || i === 0);
   setCorners(open.corners.filter((_, k) => k !== i), -1);
 }
 
@@ -411,7 +418,7 @@ function showHint() {
   if (!open) return;
   const count = open.corners.length;
   at("hint").textContent = count < 4
-    ? `Click the ${NAMES[count]} corner${count === 0 ? " of the surface (its inner edge)" : ""}.`
+    ? `Click the ${NAMES[open.wantsFirst ? 0 : count]} corner${count === 0 ? " of the surface (its inner edge)" : ""}.`
     : view.chosen < 0 ? "Drag a corner, or choose one and press the arrow keys." : `Corner ${view.chosen + 1}, ${NAMES[view.chosen]}.`;
 }
 
@@ -441,11 +448,20 @@ function drawCamera() {
 // Saving.
 
 async function save(next = true) {
-  if (!open || open.saving || !isReadable()) return;
+  if (!open || open.saving || !isReadable() || !isWorthSaving()) return;
   const here = open;
   here.saving = true;
   await trying(() => saveOpened(here, next));
   here.saving = false;
+}
+
+/** Whether there is something to save, and no part of it would be lost. */
+function isWorthSaving() {
+  const count = open.corners.length;
+  if (!open.version && !drafts.has(open.photo)) say("nothing is marked in this photo yet");
+  else if (count % 4) say(`not saved: ${count} of 4 corners are marked`, "bad");
+  else return true;
+  return false;
 }
 
 /** Whether each field holds what it should; the first that does not is shown. */
@@ -474,7 +490,7 @@ async function saveOpened(here, next) {
   const rest = isWhole ? "" : "; not the changes made since";
   say(saved.camera ? `saved ${saved.name} and ${saved.camera}${rest}` : `saved ${saved.name}${rest}; no camera: ${saved.why}`,
     saved.camera && isWhole ? "good" : "bad");
-  if (next && saved.camera && isWhole) list.next(isOpen);
+  if (next && saved.camera && isWhole && open === here) list.next(isOpen);
 }
 
 /** Saves the label of a photo; null where theirs is loaded in its place. */
@@ -504,6 +520,11 @@ async function solveTogether() {
   });
 }
 
+function focalText({ focal_px: px, focal_sigma: sigma }) {
+  if (px === null) return "none";
+  return sigma === null ? `${px.toFixed(0)} px, not known` : `${px.toFixed(0)} px ± ${(100 * sigma).toFixed(1)} %`;
+}
+
 function table(solved) {
   const row = (cell, cells) => element("tr", {}, ...cells.map((text) => element(cell, {}, text)));
   return element("table", { class: "solved" },
@@ -511,7 +532,7 @@ function table(solved) {
     ...solved.map((one) => row("td", [
       one.photo.split("/").pop(),
       one.together > 1 ? `${one.together} photos` : "alone",
-      one.focal_px === null ? "none" : `${one.focal_px.toFixed(0)} px ± ${(100 * one.focal_sigma).toFixed(1)} %`,
+      focalText(one),
       one.rms_px === null ? "" : `${one.rms_px.toFixed(2)} px`,
       one.why ?? "",
     ])));

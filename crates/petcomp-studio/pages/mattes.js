@@ -39,7 +39,7 @@ const BRUSHES = [0.002, 0.12];
 const stage = new Stage(at("canvas"), paint);
 const list = photoList(at("photos"), open, mark);
 /** `entry` is the photo that is shown, `shown` the layer that was asked for last, `unsaved` why what is shown is not kept. */
-const state = { entry: null, layer: "checker", review: null, undone: [], solved: null, shown: null, saving: Promise.resolve(), unsaved: null };
+const state = { entry: null, layer: "checker", review: null, past: [], future: [], solved: null, shown: null, saving: Promise.resolve(), unsaved: null };
 
 frame("mattes");
 
@@ -59,8 +59,8 @@ function markSaved(entry, { verdict, strokes }) {
 
 async function open(photo) {
   const entry = list.entryOf(photo);
-  Object.assign(state, { entry, review: null, solved: null, undone: [], shown: null, unsaved: null });
-  Object.assign(stage, { size: null, strokes: [] });
+  Object.assign(state, { entry, review: null, solved: null, past: [], future: [], shown: null, unsaved: null });
+  Object.assign(stage, { size: null, strokes: [], current: null, held: null });
   stage.draw();
   list.choose(photo);
   document.title = `${base(photo)} · Mattes`;
@@ -101,7 +101,7 @@ async function solve() {
 
 /** Without the strokes that were painted on another size; the file has them until something else is said. */
 function beginAgain(why) {
-  Object.assign(state, { undone: [], unsaved: why });
+  Object.assign(state, { past: [], future: [], unsaved: why });
   Object.assign(state.review, { strokes: [], verdict: null });
   Object.assign(stage, { size: null, strokes: [] });
   showReview();
@@ -175,26 +175,32 @@ function changeRadius(by) {
 
 function paint(stroke) {
   if (!state.review) return;
-  state.undone = [];
-  setStrokes([...state.review.strokes, stroke]);
+  change([...state.review.strokes, stroke]);
 }
 
+/** Other strokes, which can be undone. */
+function change(strokes) {
+  state.past.push(state.review.strokes);
+  state.future = [];
+  setStrokes(strokes);
+}
+
+/** The strokes before the last change; of those that the file has, the last one goes. */
 function undo() {
   const strokes = state.review?.strokes ?? [];
-  if (!strokes.length) return;
-  state.undone.push(strokes.at(-1));
-  setStrokes(strokes.slice(0, -1));
+  if (!(state.past.length || strokes.length)) return;
+  state.future.push(strokes);
+  setStrokes(state.past.pop() ?? strokes.slice(0, -1));
 }
 
 function redo() {
-  const stroke = state.undone.pop();
-  if (stroke) setStrokes([...state.review.strokes, stroke]);
+  if (!state.review || !state.future.length) return;
+  state.past.push(state.review.strokes);
+  setStrokes(state.future.pop());
 }
 
 function clear() {
-  if (!state.review?.strokes.length) return;
-  state.undone = [...state.review.strokes].reverse();
-  setStrokes([]);
+  if (state.review?.strokes.length) change([]);
 }
 
 /** What is painted is solved and kept at once; a verdict was on what was there before. */
@@ -244,8 +250,9 @@ function keep() {
 
 function showReview() {
   const { strokes, verdict } = state.review ?? { strokes: [], verdict: null };
-  at("undo").disabled = at("clear").disabled = !strokes.length;
-  at("redo").disabled = !state.undone.length;
+  at("clear").disabled = !strokes.length;
+  at("undo").disabled = !(state.past.length || strokes.length);
+  at("redo").disabled = !state.future.length;
   for (const [id, said] of [["accept", "accepted"], ["reject", "rejected"]]) {
     at(id).disabled = !state.review || !state.solved;
     at(id).setAttribute("aria-pressed", verdict === said);

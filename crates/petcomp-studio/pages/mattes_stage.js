@@ -23,10 +23,12 @@ export class Stage {
     this.current = null;
     this.pointer = null;
     this.held = null;
+    /** The pointer that holds it. */
+    this.holder = null;
     new ResizeObserver(() => this.draw()).observe(canvas);
     canvas.addEventListener("pointerdown", (event) => this.#down(event));
     canvas.addEventListener("pointermove", (event) => this.#move(event));
-    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => this.#up());
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => this.#up(event));
     canvas.addEventListener("pointerleave", () => { this.pointer = null; this.draw(); });
     canvas.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
   }
@@ -81,6 +83,10 @@ export class Stage {
 
   #down(event) {
     if (!this.size || event.button > 1) return;
+    // One at a time: a palm or a second finger does not paint, and a pen goes first.
+    if (this.held && event.pointerType !== "pen") return;
+    this.holder = event.pointerId;
+    this.current = null;
     this.canvas.focus({ preventScroll: true });
     this.canvas.setPointerCapture(event.pointerId);
     const paints = this.tool && event.button === 0;
@@ -96,6 +102,7 @@ export class Stage {
   }
 
   #move(event) {
+    if (this.held && event.pointerId !== this.holder) return;
     const here = this.#at(event);
     if (this.held === "brush") this.#extend(this.#rounded(event));
     if (this.held === "photo") {
@@ -113,11 +120,12 @@ export class Stage {
     if (Math.hypot(point[0] - x, point[1] - y) >= this.radius / 4) points.push(point);
   }
 
-  #up() {
+  #up(event) {
+    if (event.pointerId !== this.holder) return;
     const stroke = this.current;
     this.held = null;
     this.current = null;
-    if (stroke) this.painted(stroke);
+    if (stroke && event.type === "pointerup") this.painted(stroke);
     this.draw();
   }
 

@@ -84,9 +84,6 @@ export class PhotoView {
   }
 
   resized() {
-    const ratio = devicePixelRatio;
-    this.canvas.width = Math.round(this.canvas.clientWidth * ratio);
-    this.canvas.height = Math.round(this.canvas.clientHeight * ratio);
     if (this.fitted) this.fit();
     else this.draw();
   }
@@ -153,11 +150,14 @@ export class PhotoView {
   }
 
   pressed(event) {
+    // The others open menus, which swallow the release.
+    if (event.button !== 0 || event.ctrlKey) return;
     const at = this.place(event);
     this.canvas.focus({ preventScroll: true });
     this.canvas.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, at);
-    this.press = { at, last: at, point: this.near(at), moved: this.pointers.size > 1 };
+    const pinches = this.pointers.size > 1;
+    this.press = { at, last: at, point: pinches ? -1 : this.near(at), moved: pinches };
     if (this.press.point >= 0) this.choose(this.press.point);
   }
 
@@ -223,10 +223,14 @@ export class PhotoView {
 
   drawNow() {
     const { context, canvas } = this;
+    // Each time: a window that goes to another screen has other pixels and the same size.
+    const ratio = devicePixelRatio;
+    const [wide, high] = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.round(side * ratio));
+    if (canvas.width !== wide || canvas.height !== high) Object.assign(canvas, { width: wide, height: high });
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, canvas.width, canvas.height);
     if (!this.photo) return;
-    context.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
     const [width, height] = this.size;
     context.imageSmoothingEnabled = this.zoom < 3;
     context.imageSmoothingQuality = "high";

@@ -173,7 +173,7 @@ async function save() {
     list.entryOf(photo).scaled = true;
     list.showMarks();
     say(`saved in ${saved.list}`, "good");
-    list.next((entry) => !entry.scaled);
+    if (open === here) list.next((entry) => !entry.scaled);
   });
   here.isSaving = false;
 }

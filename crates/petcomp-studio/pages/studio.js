@@ -132,14 +132,18 @@ function isPressed(target, key) {
   return (key === "Enter" || key === " ") && target instanceof Element && target.matches("button, a, summary");
 }
 
+/** Keys that go on while they are held; the others act once for each press. */
+const HELD = /Arrow|^(Ctrl\+(Shift\+)?z|[-+=[\].,])$/i;
+
 function pressed(event) {
   const name = keyName(event);
+  if (event.repeat && event.key === "Enter") event.preventDefault();
   if (isPressed(event.target, event.key)) return;
   if (document.querySelector("dialog[open]") || (isTyping(event.target) && name !== "Ctrl+s")) return;
   const found = keys.find(([key]) => key.toLowerCase() === name.toLowerCase());
   if (!found) return;
   event.preventDefault();
-  found[2](event);
+  if (!event.repeat || HELD.test(name)) found[2](event);
 }
 
 const SIGNS = { ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRight: "→", " ": "Space", Escape: "Esc" };
@@ -200,6 +204,8 @@ export function choice(title, what, options) {
     const dialog = element("dialog", { "aria-label": title },
       element("h2", {}, title),
       element("form", { method: "dialog", class: "choice" }, element("div", {}, what), element("div", { class: "buttons" }, ...buttons)));
+    // A key that is still held answers nothing.
+    dialog.addEventListener("keydown", (event) => event.repeat && event.preventDefault());
     dialog.addEventListener("close", () => {
       dialog.remove();
       resolve(dialog.returnValue || null);
@@ -211,14 +217,14 @@ export function choice(title, what, options) {
 
 /**
  * Saves a file of which the page has read a version, and returns what `save(version)` does. Where the file has changed since, a person says
- * whose it shall be: `load()` takes theirs, and null is returned; mine is saved over the version that `now()` finds.
+ * whose it shall be, or nothing yet: `load()` takes theirs, and null is returned; mine is saved over the version that `now()` finds.
  */
 export async function saveOrAsk(version, { save, now, load }) {
   try {
     return await save(version);
   } catch (error) {
     if (!error.stale) throw error;
-    const whose = await choice("Which version do you want to keep?", error.message, ["Load theirs", "Save mine"]);
+    const whose = await choice("Which version do you want to keep?", error.message, ["Decide later", "Load theirs", "Save mine"]);
     if (whose === "Save mine") return save(await now());
     if (whose !== "Load theirs") throw error;
     await load();

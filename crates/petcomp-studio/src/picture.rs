@@ -3,7 +3,6 @@
 use crate::message::Query;
 use crate::refusal::{Answer, Refusal};
 use crate::studio::Studio;
-use crate::turn::blocking;
 use axum::Router;
 use axum::extract::State;
 use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, ETAG, IF_NONE_MATCH};
@@ -92,8 +91,7 @@ async fn photo(
     if is_known {
         return Ok((StatusCode::NOT_MODIFIED, keeping).into_response());
     }
-    let _permit = studio.decoding.acquire().await;
-    let response = blocking(move || shown(&path, query.side)).await?;
+    let response = studio.decode(move || shown(&path, query.side)).await?;
     Ok((keeping, response).into_response())
 }
 

@@ -229,6 +229,27 @@ fn what_is_not_saved_stays_with_its_photo_beside_a_label_that_cannot_be_read() {
 }
 
 #[test]
+fn a_first_corner_that_is_clicked_anew_stays_the_first() {
+    let Some((mut browser, dir, _studio)) = opened(&["bg0000"], "bg0000.jpg") else {
+        return;
+    };
+    browser.wait("document.querySelectorAll('#facts dt').length > 5");
+    browser.press("1", 0);
+    browser.press("Backspace", 0);
+    browser.press("s", CTRL);
+    browser.wait(
+        "document.querySelector('footer').innerText === 'not saved: 3 of 4 corners are marked'",
+    );
+    assert!(browser.text("#hint").contains("top left"));
+    click_corners(&mut browser, &truth("bg0000")[..1]);
+    browser.press("s", CTRL);
+    browser.wait("document.querySelector('footer').innerText.startsWith('saved')");
+    let label: Label = io::read_json(dir.path().join("bg0000.label.json")).unwrap();
+    assert!(farthest_px(&label, truth("bg0000")) < 2.0);
+    browser.assert_content();
+}
+
+#[test]
 fn a_stale_save_is_asked_about() {
     let Some((mut browser, dir, _studio)) = opened(&["bg0000"], "bg0000.jpg") else {
         return;

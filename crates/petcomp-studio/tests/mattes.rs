@@ -124,6 +124,10 @@ fn a_matte_is_corrected_by_strokes_that_a_build_keeps_to() {
     assert!(review(folder.path()).unwrap().strokes.is_empty());
     saved(&mut browser, |browser| browser.press("z", CTRL | SHIFT));
     assert_eq!(review(folder.path()).unwrap().strokes, kept.strokes);
+    saved(&mut browser, |browser| browser.click_on("#clear"));
+    assert!(review(folder.path()).unwrap().strokes.is_empty());
+    saved(&mut browser, |browser| browser.press("z", CTRL));
+    assert_eq!(review(folder.path()).unwrap().strokes, kept.strokes);
 
     // A verdict goes on to the next photo.
     saved(&mut browser, |browser| browser.press("a", 0));

@@ -131,7 +131,7 @@ fn written(
         photo: name.into(),
         together: all.len(),
         focal_px: Some(solution.camera.focal_px.x),
-        focal_sigma: Some(solution.sigma.ln_focal),
+        focal_sigma: Some(solution.sigma.ln_focal).filter(|sigma| sigma.is_finite()),
         rms_px: Some(solution.rms_px),
         why: None,
     })

@@ -205,14 +205,15 @@ async fn picture(
     State(studio): State<Arc<Studio>>,
     Query(asked): Query<OneRow>,
 ) -> Answer<Response> {
-    let response = blocking(move || {
-        let catalog = studio.catalog(&asked.folder, asked.listing)?;
+    let here = studio.clone();
+    let decoded = studio.decode(move || {
+        let catalog = here.catalog(&asked.folder, asked.listing)?;
         shown(
-            &picture_file(&studio.folder, &catalog, asked.row)?,
+            &picture_file(&here.folder, &catalog, asked.row)?,
             asked.side,
         )
-    })
-    .await?;
+    });
+    let response = decoded.await?;
     Ok(([(CACHE_CONTROL, "private, max-age=300")], response).into_response())
 }
 

@@ -6,7 +6,7 @@ use crate::message::Json;
 use crate::picture::tag_of;
 use crate::refusal::{Answer, Refusal};
 use crate::studio::{Studio, next_number};
-use crate::turn::{Tab, Turns};
+use crate::turn::{Tab, Turn, Turns};
 use axum::extract::State;
 use axum::http::StatusCode;
 use petcomp::asset::{OpenPhoto, PhotoEntry, Review, ScreenSource};
@@ -28,6 +28,8 @@ const SOLVED: usize = 6;
 pub(crate) struct Mattes {
     turns: Turns,
     open: Recent<PhotoKey, OpenPhoto>,
+    /// Held while a photo is read: one at a time.
+    reading: Mutex<()>,
     solved: Recent<u64, Solved>,
 }
 
@@ -100,7 +102,10 @@ pub(super) struct ShownCut {
 }
 
 impl Mattes {
-    fn open(&self, key: PhotoKey) -> Answer<Arc<OpenPhoto>> {
+    /// A photo, unless the tab has asked for another one while this waited.
+    fn open(&self, key: PhotoKey, turn: &Turn) -> Answer<Arc<OpenPhoto>> {
+        let _alone = self.reading.lock().unwrap_or_else(PoisonError::into_inner);
+        turn.check()?;
         if let Some(open) = self.open.get(&key) {
             return Ok(open);
         }
@@ -167,10 +172,9 @@ pub(super) async fn solve(
     Json(request): Json<SolveRequest>,
 ) -> Answer<Json<SolvedInWords>> {
     let turns = studio.mattes.turns.clone();
-    let work = move |turn: &crate::turn::Turn| {
-        let photo = studio
-            .mattes
-            .open(PhotoKey::new(&request.name, &studio.folder)?)?;
+    let work = move |turn: &Turn| {
+        let key = PhotoKey::new(&request.name, &studio.folder)?;
+        let photo = studio.mattes.open(key, turn)?;
         turn.check()?;
         let outdated = request.outdated(&photo);
         let strokes = match outdated {
