@@ -32,6 +32,16 @@ typedef enum {
   PETCOMP_STATUS_INTERNAL = 10,
 } petcomp_status;
 
+// How serious a message is.
+typedef enum {
+  // Something failed.
+  PETCOMP_LOG_LEVEL_ERROR = 1,
+  // Something to look at, such as a photo that is not used.
+  PETCOMP_LOG_LEVEL_WARNING = 2,
+  // Something to know.
+  PETCOMP_LOG_LEVEL_INFO = 3,
+} petcomp_log_level;
+
 // A pinhole camera without distortion, with OpenCV's axes: x right, y down, z forward.
 typedef struct {
   // Focal lengths along x and y, pixels.
@@ -41,6 +51,9 @@ typedef struct {
   // Three rows of rotation and translation (metres): camera point = matrix * (world point, 1).
   double camera_from_world[3][4];
 } petcomp_camera;
+
+// Receives a message, one line of UTF-8 that is valid until the function returns.
+typedef void (*petcomp_log_function)(petcomp_log_level level, const char *message);
 
 // An open recipe with its assets and photos. 0 is no pipeline.
 typedef struct {
@@ -105,6 +118,13 @@ petcomp_status petcomp_key(const float *rgba,
                            const char *options,
                            float *matte,
                            float *cutout);
+
+// Sets the function that receives the library's messages, or ends them if null, as at first.
+//
+// # Safety
+// `function` is null or may be called from any thread, several at once, until it is replaced and
+// the calls of petcomp that run meanwhile have returned. It must not throw.
+petcomp_status petcomp_log_to(petcomp_log_function function);
 
 // Opens a recipe file and the assets and photos that it names.
 //
