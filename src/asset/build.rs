@@ -618,7 +618,7 @@ mod tests {
         let square = TWO.replace("px_per_metre = 100.0", "length = 5.0\nwidth = 5.0");
         std::fs::write(&list, square).unwrap();
         let refused = build(&list, &out).unwrap().refused;
-        let starts = refused[0].starts_with("two.png: ");
+        let starts = refused[0].starts_with("no cut-out: two.png: object_m[0]: ");
         assert!(starts && refused[0].ends_with(stays), "{refused:?}");
         kept("a size that no object has");
         let two = folder.path().join("two.png");

@@ -85,7 +85,7 @@ pub(super) struct OpacityLevel {
     pub(super) passing: Vec<Float4>,
     /// Where it blocks any light.
     pub(super) extent: TexelExtent,
-    /// Whether every texel blocks all light.
+    /// Whether every texel that is wholly on the texture blocks all light.
     opaque: bool,
 }
 
@@ -113,7 +113,7 @@ impl OpacityLevel {
             width,
             height,
             extent: TexelExtent::around(texels.pixels(), width, &grid),
-            opaque: is_opaque(&texels),
+            opaque: is_opaque(&texels, &grid),
             passing: passing(texels),
         }
     }
@@ -121,8 +121,9 @@ impl OpacityLevel {
     /// How far inside its sides an opaque texture is certain to be read as opaque, as shares of it;
     /// none for one that is not opaque.
     pub(super) fn opaque_inset(&self) -> Option<[f64; 2]> {
-        self.opaque
-            .then(|| self.grid.texels.map(|n| (0.5 + POSITION_ERROR_TEXELS) / n))
+        // A last texel that is on the texture for a part only is not opaque.
+        let inset = |n: f64| (0.5 + n.fract() + POSITION_ERROR_TEXELS) / n;
+        self.opaque.then(|| self.grid.texels.map(inset))
     }
 
     /// Multiplies transmittances along a line over bordered texels from its sample `first` on.
@@ -151,11 +152,13 @@ fn passing(mut texels: Image<Float4>) -> Vec<Float4> {
     texels.into_vec()
 }
 
-/// Whether every texel inside the border blocks all light.
-fn is_opaque(texels: &Image<Float4>) -> bool {
-    let inner = |n: usize| BORDER_TEXELS..n - BORDER_TEXELS;
+/// Whether every texel inside the border that is wholly on the texture blocks all light.
+fn is_opaque(texels: &Image<Float4>, grid: &TexelGrid) -> bool {
+    let [columns, rows] = grid
+        .texels
+        .map(|n| BORDER_TEXELS..BORDER_TEXELS + n as usize);
     let stops_all = |o: &Float4| o.rgb() == LinearRgb::WHITE;
-    let mut rows = inner(texels.height()).map(|y| &texels.row(y)[inner(texels.width())]);
+    let mut rows = rows.map(|y| &texels.row(y)[columns.clone()]);
     rows.all(|row| row.iter().all(stops_all))
 }
 
