@@ -80,7 +80,8 @@ fn scores_of(
     metrics_json(&metrics[0], &options)
 }
 
-/// Where the truth is, and what YOLO labels need: the folder of their images, or the size of all.
+/// Where the truth is, the folder of its images if they are elsewhere, and the size of all images
+/// that YOLO labels need without them.
 struct TruthFiles<'a> {
     path: &'a Path,
     images: Option<&'a Path>,
@@ -90,10 +91,10 @@ struct TruthFiles<'a> {
 impl TruthFiles<'_> {
     fn read(&self) -> Result<EvalTruth> {
         let Self { path, images, size } = *self;
-        if (size.is_some() || images.is_some()) && EvalTruth::is_coco(path) {
+        if size.is_some() && EvalTruth::is_coco(path) {
             let what =
                 "given without a folder of YOLO labels as truth: COCO files contain the sizes";
-            return Err(Error::value("size, images", what));
+            return Err(Error::value("size", what));
         }
         EvalTruth::read(path, images, size)
     }

@@ -368,7 +368,7 @@ def test_evaluation_of_files_takes_nothing_in_vain(tmp_path, monkeypatch, caplog
     Path("metrics.json").write_text("[]")
     for options, says in (
         ({"output": "."}, "metrics.json: is an input and would be overwritten"),
-        ({"size": (64, 48)}, "size, images: given without a folder of YOLO labels"),
+        ({"size": (64, 48)}, "size: given without a folder of YOLO labels"),
         ({"output": "s3://bucket/page"}, "output: s3://bucket/page is a URL, expected a folder"),
     ):
         with pytest.raises(petcomp.Error, match=says):

@@ -81,7 +81,7 @@ def evaluate(
     Files: both are folders of YOLO labels or COCO JSON files. The truth may also be a list of images (``.txt``), or
     a folder with a ``data.yaml`` and no labels, which stands for its validation images. ``size`` (width and height,
     pixels) applies to YOLO labels only, which need it if their images are missing; ``images`` is the folder of
-    those images if they are elsewhere. ``output`` is a folder for the full report.
+    the truth's images if they are elsewhere. ``output`` is a folder for the full report.
 
     Boxes in memory: both are lists with one mapping per image: ``boxes`` (n x 4: left, top, right, bottom, pixels)
     and ``classes`` (n); for predictions ``scores`` (n, 0 to 1); for the truth optionally ``ignored`` (n, as of a
